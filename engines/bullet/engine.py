@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
+from functools import lru_cache
 from math import ceil, pi, sin
 from typing import ClassVar
 
 import numpy as np
 
-from engines.bullet.elasticity.stable_step import longest_step
+from engines.bullet.elasticity.stable_step import ACCURATE_PHASE, face_loss, longest_step
 from engines.bullet.organs.anchors import add_rigid
 from engines.bullet.organs.organ import Organ
 from engines.bullet.params import BulletParams
@@ -33,6 +35,14 @@ _GRAVITY_DIGITS = 6
 """Digits to which the growing gravity is rounded: sines differ in their last bit between processors."""
 
 _NO_CLIENT = -1
+
+_log = logging.getLogger(__name__)
+
+
+@lru_cache(maxsize=64)
+def _warn_once(text: str) -> None:
+    """Warn, but not again where the same scene is configured again, as for the next episode of learning."""
+    _log.warning("%s", text)
 
 
 class BulletEngine(Stepped):
@@ -93,6 +103,8 @@ class BulletEngine(Stepped):
         for name, organ in self.params.organs.items():
             self._organs.append(Organ(name, organ, client, parts))
         self._check_tissue()
+        if setup.bonds:
+            self._warn_of_long_step()
         self._settle()
         for bond in self.bonds:
             if plan := setup.bonds.get(bond.name):
@@ -257,11 +269,24 @@ class BulletEngine(Stepped):
 
     def _check_tissue(self) -> None:
         for organ in self._organs:
-            limit = longest_step(organ.frequency, self.params.organs[organ.name].damping * 1e-9)
+            limit = longest_step(organ.frequency, self.params.organs[organ.name].elastic.damping)
             if self._dt > limit:
                 raise ScenarioError(
                     f"participant '{self.name}', organ '{organ.name}': timestep {self.params.timestep} ns is"
                     f" above {limit * 1e9:.0f} ns, up to which tissue with a highest natural frequency of"
                     f" {organ.frequency:.0f} rad/s is stable. Shorten it, raise the damping, or take fewer"
                     " nodes"
+                )
+
+    def _warn_of_long_step(self) -> None:
+        """Warn where the sub-step is stable but takes more than a tenth of the force of contacts."""
+        for organ in self._organs:
+            phase = self._dt * organ.frequency
+            if phase > ACCURATE_PHASE:
+                least, largest = face_loss(phase)
+                _warn_once(
+                    f"participant '{self.name}', organ '{organ.name}': with the timestep of"
+                    f" {self.params.timestep} ns forces of contact are {least:.0%} to {largest:.0%} too small"
+                    f" over faces of the mesh (what is held is not concerned); up to"
+                    f" {ACCURATE_PHASE / organ.frequency * 1e9:.0f} ns they are within 10 %"
                 )

@@ -36,7 +36,7 @@ class _NumbersInARow(TyperCommand):
     """Accepts `--q 0.1 -0.2 0.3` like `--q 0.1,-0.2,0.3`: all numbers that follow belong to the option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        for option in ("--q", "--dq"):
+        for option in ("--q", "--dq", "--orientation", "--setup-joints"):
             if option in args:
                 start = args.index(option) + 1
                 end = start
@@ -99,6 +99,26 @@ Own = Annotated[
         help="Of a PSM: a file of `trocar identify`; the published ones unless given.",
     ),
 ]
+Mounting = Annotated[
+    Literal["cart", "free"],
+    typer.Option(help="On the cart's setup joints, or one arm alone with its base in the origin."),
+]
+Orientation = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X Y Z W",
+        callback=_checked,
+        help="Of a free base in the world, whose z is up: a quaternion; upright unless given.",
+    ),
+]
+SetupJoints = Annotated[
+    str | None,
+    typer.Option(
+        metavar="Q1 ... Q6",
+        callback=_checked,
+        help="Of the setup joints that carry it on the cart, m and rad; the simulated ones unless given.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
 
@@ -118,9 +138,12 @@ def dynamics(
     own: Own = None,
     q: Positions,
     dq: Velocities = None,
+    mounting: Mounting = "free",
+    orientation: Orientation = None,
+    setup_joints: SetupJoints = None,
     as_json: Json = False,
 ) -> None:
-    """Print an arm's joint-space inertia, gravity, friction and elasticity, its base upright; SI units."""
+    """Print an arm's joint-space inertia, gravity, friction and elasticity as its base stands; SI units."""
     _need_mujoco("dynamics")
     name, positions = _cart_arm(arm), _numbers(q) or []
     tool = instrument or ("straight" if name == "ECM" else DEFAULT_INSTRUMENT)
@@ -133,7 +156,9 @@ def dynamics(
             raise MotionError(f"{arm}: not all joint velocities are finite: {velocities}")
         from engines.mujoco.model.dynamics import dynamics as of
 
-        found = of(name, tool, positions, velocities, own)
+        stand = {"orientation": orientation, "setup_joints": setup_joints}
+        base = {key: _numbers(text) for key, text in stand.items() if text is not None}
+        found = of(name, tool, positions, velocities, own, base={"mounting": mounting, **base})
     if as_json:
         typer.echo(
             json.dumps(
@@ -159,6 +184,8 @@ def _print(found: JointDynamics) -> None:
         "coulomb": found.coulomb_friction,
         "friction": found.friction,
     }
+    up = ", ".join(f"{part:.4f}" for part in found.base[2].tolist())
+    typer.echo(f"the world's z in the base frame: {up}")
     width = max(map(len, found.joints))
     typer.echo(f"{'':{width}}{''.join(f'{title:>11}' for title in columns)}   inertia matrix")
     for i, name in enumerate(found.joints):
@@ -194,10 +221,7 @@ def export(
             help="File of `trocar identify` for a PSM (published dynamics unless given). May be repeated.",
         ),
     ] = None,
-    mounting: Annotated[
-        Literal["cart", "free"],
-        typer.Option(help="On the cart's setup joints, or one arm alone with its base in the origin."),
-    ] = "cart",
+    mounting: Mounting = "cart",
     form: Annotated[
         Literal["mjcf", "urdf"] | None,
         typer.Option("--format", help="By default that of the file's suffix, else mjcf."),

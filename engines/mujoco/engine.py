@@ -98,11 +98,12 @@ class MujocoEngine(Stepped):
         from engines.mujoco.arms.servos import Servos
         from engines.mujoco.interaction import holding
         from engines.mujoco.interaction.rigid_contact import RigidContact
+        from engines.mujoco.model import ties
 
         # else MuJoCo writes MUJOCO_LOG.TXT into the working directory
         mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
         spec = model.spec(self.params)
-        brakes.prepare(spec, self.params)
+        ties.add(spec, self.params)
         holding.prepare(spec, self.params)
         spec.option.timestep = timestep * 1e-9
         self._mujoco, self._model = mujoco, spec.compile()

@@ -3,8 +3,8 @@
 Each carries its arm's remote centre of motion (RCM): a lift, then revolute joints, of which all but `tilt`
 stand vertical. The cart's frame has z up and y from the column towards the patient. Sources: SAW =
 jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68), share/arm/suj-simulated.json (right angles and 0.7853
-taken as exact); dvrk_model = jhu-dvrk/dvrk_model (commit 70998aa), urdf/Classic/SUJ.urdf.xacro. SI units,
-radians.
+taken as exact); dvrk_model = jhu-dvrk/dvrk_model (commit 70998aa), urdf/Classic/SUJ.urdf.xacro; dvrk_env =
+WPI-AIM/dvrk_env (commit 7759cad), dvrk_description/suj/suj.xacro. SI units, radians.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Literal
 from robots.serial_chain import Joint, SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["JOINT_NAMES", "SIMULATED", "CartArm", "base_pose", "chain", "joint_names"]
+__all__ = ["CART_MASS", "JOINT_NAMES", "MASSES", "SIMULATED", "CartArm", "base_pose", "chain", "joint_names"]
 
 CartArm = Literal["PSM1", "PSM2", "PSM3", "ECM"]
 """The arms that the cart carries."""
@@ -32,6 +32,20 @@ SIMULATED: Mapping[CartArm, tuple[float, ...]] = {
 }
 """Positions that the dVRK's simulation gives them (SAW, simulated_position): three arms about the endoscope's
 view.
+"""
+
+CART_MASS = 251.3
+"""kg: base and column (dvrk_env, CAD, base_link)."""
+
+_ARM_MASSES = (8.190, 4.285, 3.374, 0.955, 3.171, 0.0)
+MASSES: Mapping[CartArm, tuple[float, ...]] = {
+    "PSM1": _ARM_MASSES,
+    "PSM2": _ARM_MASSES,
+    "PSM3": (6.048, 9.214, 3.374, 1.460, 3.171, 0.0),
+    "ECM": (8.190, 4.285, 3.374, 3.459, 0.0, 0.0),
+}
+"""kg of the links that these joints move (dvrk_env, CAD, suj_<arm>_L0 to L4; what mounts the manipulator is
+part of the last one). Not measured: 20 to 23 kg an arm, without what balances the lift.
 """
 
 _LIFT = (-0.3798, 0.8425)

@@ -11,7 +11,7 @@ from engines.bullet.elasticity.material import Material
 from engines.bullet.meshing.tet_mesh import TetMesh, volumes
 from schemas.vectors import Vector
 
-__all__ = ["highest_frequency", "longest_step", "lowest_frequency"]
+__all__ = ["ACCURATE_PHASE", "face_loss", "highest_frequency", "longest_step", "lowest_frequency"]
 
 _POWER_ITERATIONS = 200
 
@@ -23,6 +23,23 @@ _LARGEST_PHASE = 4.0
 
 A block pressed at a node is stable at 4.0 and chatters at 4.7 (elasticity/test_limits.py in the tests).
 """
+
+
+ACCURATE_PHASE = 1.7
+"""Timestep x highest frequency up to which the force of contacts is within 10 %."""
+_FACE_LOSS = (0.02, 0.04)
+"""Of the force of a contact on a face, at a phase of 1: a sphere sinks into faces by about the square of the
+sub-step (docs/decisions/0015-contact-force.md).
+"""
+
+
+def face_loss(phase: float) -> tuple[float, float]:
+    """Return the least and the largest share of the force that a contact in a face loses.
+
+    `phase`: timestep x highest frequency. Contacts at nodes lose next to nothing, what is held nothing.
+    """
+    least, largest = _FACE_LOSS
+    return least * phase**2, largest * phase**2
 
 
 def highest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:

@@ -85,7 +85,7 @@ class Organ:
                 NeoHookeanDamping=params.elastic.damping,
                 useSelfCollision=False,
                 useFaceContact=True,
-                frictionCoeff=params.friction,
+                frictionCoeff=params.contact_friction,
                 physicsClientId=self._client,
             )
 

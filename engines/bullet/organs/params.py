@@ -17,6 +17,7 @@ from engines.bullet.meshing.tet_mesh import TetMesh
 from engines.bullet.meshing.vtk_file import read_vtk
 from engines.bullet.organs.anchors import AnchorParams, Edges
 from engines.bullet.organs.catalogue import SHAPES, block_shape
+from engines.bullet.organs.material_file import MaterialFile
 from engines.bullet.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
 from engines.bullet.organs.shape import Shape
 from robots import rotation
@@ -55,6 +56,13 @@ class OrganParams(BaseModel):
             "name of a material that `trocar organs` shows with its source; default: that of the shape"
         ),
     )
+    material_file: Path | None = Field(
+        default=None,
+        description=(
+            "instead: a file of `trocar calibrate tissue`, with a damping and perhaps a friction of its own; a"
+            " relative path starts at the scenario"
+        ),
+    )
     young_modulus: TissueModulus | None = Field(default=None, description="instead of a material")
     poisson_ratio: TissuePoissonRatio | None = Field(
         default=None, description=f"with young_modulus; default: {_POISSON_RATIO}"
@@ -83,7 +91,7 @@ class OrganParams(BaseModel):
     )
     friction: float = Field(default=0.3, ge=0, le=2, description="Coulomb coefficient against probes")
 
-    @field_validator("mesh")
+    @field_validator("mesh", "material_file")
     @classmethod
     def _from_scenario(cls, path: Path | None, info: ValidationInfo) -> Path | None:
         directory: Path = info.context["directory"] if info.context else Path.cwd()
@@ -107,8 +115,8 @@ class OrganParams(BaseModel):
             )
         if self.young_modulus is None and (self.poisson_ratio is not None or self.density is not None):
             raise ValueError("poisson_ratio and density go with young_modulus; a material has its own")
-        if self.material is not None and self.young_modulus is not None:
-            raise ValueError("an organ has a material or a young_modulus, not both")
+        if sum(part is not None for part in (self.material, self.material_file, self.young_modulus)) > 1:
+            raise ValueError("an organ has a material, a material_file or a young_modulus, one of them")
         _ = self.elastic, self.local, self.anchored_nodes
         return self
 
@@ -116,6 +124,10 @@ class OrganParams(BaseModel):
     def elastic(self) -> Material:
         """The material in numbers. Raises ValueError where none is given."""
         damping = self.damping * 1e-9
+        if (own := self._own_material) is not None:
+            if "damping" not in self.model_fields_set:
+                damping = own.damping
+            return Material(own.young_modulus, own.poisson_ratio, own.density, damping)
         if self.young_modulus is not None:
             poisson_ratio, density = self.poisson_ratio, self.density
             return Material(
@@ -131,6 +143,18 @@ class OrganParams(BaseModel):
             )
         known = preset(name)
         return Material(known.young_modulus, known.poisson_ratio, known.density, damping)
+
+    @cached_property
+    def contact_friction(self) -> float:
+        """Coulomb's coefficient against probes: as stated, else that of the material's file, if it has one."""
+        own = self._own_material
+        if own is None or own.friction is None or "friction" in self.model_fields_set:
+            return self.friction
+        return own.friction
+
+    @cached_property
+    def _own_material(self) -> MaterialFile | None:
+        return None if self.material_file is None else MaterialFile.load(self.material_file)
 
     @cached_property
     def body(self) -> Shape:

@@ -5,39 +5,23 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from engines.mujoco.model import ties
 from engines.mujoco.params import SceneParams
 from schemas.vectors import Vector
 
-__all__ = ["Brakes", "prepare"]
-
-_BRAKED = "ECM"
-_RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
-
-
-def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
-    """Add the brakes to the model of `scene`, open."""
-    if _BRAKED in scene.arms:
-        for joint in scene.arms[_BRAKED].chain.joints:
-            name = f"{_BRAKED}/{joint.name}"
-            spec.add_equality(
-                name=f"{name}/brake",
-                type=mujoco.mjtEq.mjEQ_JOINT,
-                objtype=mujoco.mjtObj.mjOBJ_JOINT,
-                name1=name,
-                active=False,
-                **_RIGID,
-            )
+__all__ = ["Brakes"]
 
 
 class Brakes:
     """The brakes of the ECM, which hold its joints where they are when its drives go off."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scene: SceneParams) -> None:
-        """Find the brakes that `prepare` added."""
-        joints = [joint.name for joint in scene.arms[_BRAKED].chain.joints] if _BRAKED in scene.arms else []
+        """Find the brakes that `engines.mujoco.model.ties` added."""
+        arm = scene.arms.get(ties.BRAKED)
+        joints = [] if arm is None else [joint.name for joint in arm.chain.joints]
         self._model, self._data = model, data
-        self._locks = [model.equality(f"{_BRAKED}/{joint}/brake").id for joint in joints]
-        self._positions = [int(model.joint(f"{_BRAKED}/{joint}").qposadr[0]) for joint in joints]
+        self._locks = [model.equality(ties.brake(joint)).id for joint in joints]
+        self._positions = [int(model.joint(f"{ties.BRAKED}/{joint}").qposadr[0]) for joint in joints]
         self._on = False
         self._state = np.array([*model.eq_data[self._locks, 0], self._on], float)
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from engines.mujoco.arms.friction import Friction
 from engines.mujoco.model import FINGERS
 from hub.participant import Inputs
 from robots.dvrk.instruments import Jaw
@@ -88,6 +89,7 @@ class Servos:
         self._springs, self._rest = self._elasticity(shares, n)
         self._gains = model.actuator_gainprm.copy(), model.actuator_biasprm.copy()
         self._gravity_compensation = model.body_gravcomp.copy()
+        self._friction = {arm: Friction(model, arm) for arm in arms}
         self._mode_ports = {arm: f"{arm}/control_mode" for arm in arms}
         self._ports = *self._mode_ports.values(), *(f"{group.ports}servo_jp" for group in self._groups)
         self._state = np.concatenate([start, np.full(2 * len(arms), _POSITION)])
@@ -246,6 +248,7 @@ class Servos:
                 )
                 self._model.body_gravcomp[group.weighed] *= number == mode
                 group.mode = mode
+            self._friction[arm].set(dry=asked[0] in (_EFFORT, _EFFORT + _BARE))
         self._modes[:] = modes
         self.off = frozenset(
             arm for arm, mode in zip(self._mode_ports, modes[::2].tolist(), strict=True) if mode == _OFF

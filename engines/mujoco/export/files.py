@@ -12,7 +12,7 @@ import mujoco
 from engines.mujoco.export.assets import FOLDER, meshes
 from engines.mujoco.export.mjcf import mjcf
 from engines.mujoco.export.urdf import urdf
-from engines.mujoco.model import place, spec
+from engines.mujoco.model import place, spec, ties
 from engines.mujoco.params import SceneParams
 
 __all__ = ["FORMATS", "START", "Format", "write"]
@@ -29,8 +29,17 @@ START = "start"
 
 
 def write(scene: SceneParams, path: Path, form: Format) -> list[Path]:
-    """Write the model of `scene` to `path`, its meshes to the folder `assets` beside it; return all files."""
+    """Write the model of `scene` to `path`, its meshes to the folder `assets` beside it; return all files.
+
+    As in a session, two fingers are one jaw, and the ECM has brakes. They are open; `active` closes them,
+    where the ECM starts.
+    """
     model = spec(scene)
+    ties.add(model, scene)
+    if ties.BRAKED in scene.arms:
+        arm = scene.arms[ties.BRAKED]
+        for joint, position in zip(arm.chain.joints, arm.start, strict=True):
+            model.equality(ties.brake(joint.name)).data[0] = position
     _add_start(model, scene)
     root = _WRITERS[form](model)
     ElementTree.indent(root)

@@ -19,6 +19,7 @@ __all__ = ["mjcf"]
 
 _INERTIAL = {"pos": "ipos", "quat": "iquat", "diaginertia": "inertia"}
 """Attributes of the element `inertial` that a compiled body calls otherwise."""
+_EQUALITY = {"polycoef": "data"}
 _DIGITS = 1e-5
 """What six digits leave of a number, relative to the largest of its attribute."""
 
@@ -40,6 +41,8 @@ def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
         "general": spec.actuator,
         "key": spec.key,
     }
+    for element in root.iterfind("equality/joint"):
+        _restore(element, spec.equality(element.attrib["name"]), _EQUALITY)
     for element in root.iter():
         if element.tag in by_tag and (name := element.get("name")):
             _restore(element, by_tag[element.tag](name), {})

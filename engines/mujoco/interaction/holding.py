@@ -27,21 +27,7 @@ _RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 
 
 def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
-    """Add to the model of `scene` what makes two fingers one jaw, and welds, which are not active yet.
-
-    With the tie between its fingers a jaw does not give way to one side, however hard it closes.
-    """
-    for arm in _jawed(scene):
-        left, right = (f"{arm}/{finger}" for finger in FINGERS)
-        spec.add_equality(
-            name=f"{arm}/jaw",
-            type=mujoco.mjtEq.mjEQ_JOINT,
-            objtype=mujoco.mjtObj.mjOBJ_JOINT,
-            name1=left,
-            name2=right,
-            data=[0.0, 1.0, *[0.0] * 10],
-            **_RIGID,
-        )
+    """Add to the model of `scene` the welds between jaws and objects, which are not active yet."""
     if scene.grasp != "friction":
         for thing in scene.objects:
             for arm in _jawed(scene):

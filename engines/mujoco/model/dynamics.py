@@ -7,9 +7,11 @@ a load G' f.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -22,7 +24,10 @@ from robots.dvrk.mounted import MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
-__all__ = ["JointDynamics", "dynamics"]
+__all__ = ["UPRIGHT", "JointDynamics", "dynamics"]
+
+UPRIGHT: Mapping[str, Any] = MappingProxyType({"mounting": "free"})
+"""The base frame stands as the world's does."""
 
 
 @dataclass(frozen=True)
@@ -30,10 +35,12 @@ class JointDynamics:
     """At one configuration; rad, m, N m, N, by joint in the order of `joints`."""
 
     joints: tuple[str, ...]
+    base: Vector
+    """Rotation from the arm's base frame to the world, whose z is up, shape (3, 3)."""
     inertia: Vector
     """Joint-space inertia matrix, shape (n, n)."""
     gravity: Vector
-    """Effort that holds the arm against gravity, its base upright, shape (n,)."""
+    """Effort that holds the arm against gravity as its base stands, shape (n,)."""
     viscous_friction: Vector
     """Effort per velocity of a joint that moves alone, shape (n,); the discs of an instrument couple wrist
     and jaw, see `friction`.
@@ -49,9 +56,15 @@ class JointDynamics:
 
 
 def dynamics(
-    arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float], own: Path | None = None
+    arm: CartArm,
+    tool: str,
+    q: Sequence[float],
+    dq: Sequence[float],
+    own: Path | None = None,
+    *,
+    base: Mapping[str, Any] = UPRIGHT,
 ) -> JointDynamics:
-    """Return the dynamics of `arm`, alone with its base upright.
+    """Return the dynamics of `arm`, alone on its base.
 
     Args:
         arm: PSM1, PSM2, PSM3 or ECM.
@@ -59,13 +72,20 @@ def dynamics(
         q: joint positions (rad, m), one per joint, in range.
         dq: joint velocities (rad/s, m/s), one per joint.
         own: file of `trocar identify` of a PSM; the published dynamics unless given.
+        base: how the base stands, in the words of a scene: `mounting`, and either `orientation` (quaternion
+            x, y, z, w of the base frame in the world) or `setup_joints` (m, rad, six numbers).
 
-    Raises ValidationError if `own` cannot be read or does not fit the arm.
+    Raises ValidationError if `own` cannot be read or does not fit the arm, or if `base` is no way to stand.
     """
-    what: dict[str, str | Path] = {"endoscope" if arm == "ECM" else "instrument": tool}
+    stand = dict(base)
+    what: dict[str, Any] = {"endoscope" if arm == "ECM" else "instrument": tool}
+    if "orientation" in stand:
+        what["orientation"] = stand.pop("orientation")
+    if "setup_joints" in stand:
+        stand["setup_joints"] = {arm: stand["setup_joints"]}
     if own is not None:
         what["dynamics"] = own
-    scene = SceneParams.model_validate({"arms": {arm: what}, "looks": False})
+    scene = SceneParams.model_validate({"arms": {arm: what}, "looks": False, **stand})
     params = scene.arms[arm]
     model = build(scene)
     data = mujoco.MjData(model)
@@ -92,6 +112,7 @@ def dynamics(
     ]
     return JointDynamics(
         joints=tuple(joints),
+        base=data.site(f"{arm}/base").xmat.reshape(3, 3).copy(),
         inertia=to_all.T @ inertia @ to_all,
         gravity=to_all.T @ data.qfrc_bias,
         viscous_friction=np.array(alone[0]),

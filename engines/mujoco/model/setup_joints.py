@@ -1,4 +1,7 @@
-"""The patient cart and its setup joints: braked, so bodies that stand still where they are set."""
+"""The patient cart and its setup joints: braked, so bodies that stand still where they are set.
+
+Their masses move nothing here; they are for those who take the model elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -26,6 +29,7 @@ def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
     """
     cart = spec.worldbody.add_body(name=CART)
     shapes.add(spec, CART, CART, {CART: (cart, np.eye(4))}, seen=scene.looks)
+    _weigh(cart, setup_joints.CART_MASS)
     mounts: dict[CartArm, Vector] = {}
     for arm in scene.arms:
         chain = setup_joints.chain(arm)
@@ -36,4 +40,13 @@ def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
             body = body.add_body(name=f"SUJ/{arm}/{joint}", **placed(inverse_pose(above) @ pose))
             bodies[joint], above = (body, zero), pose
         shapes.add(spec, f"suj/{arm}", f"SUJ/{arm}", bodies, seen=scene.looks)
+        for joint, mass in zip(setup_joints.JOINT_NAMES, setup_joints.MASSES[arm], strict=True):
+            _weigh(bodies[joint][0], mass)
     return mounts
+
+
+def _weigh(body: mujoco.MjsBody, mass: float) -> None:
+    """Spread `mass` (kg) evenly over the collision shapes of `body`."""
+    colliding = [geom for geom in body.geoms if geom.conaffinity]
+    for geom in colliding:
+        geom.mass = mass / len(colliding)

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from engines.mujoco.command_line import app
 from engines.mujoco.export import START, write
-from engines.mujoco.model import build
+from engines.mujoco.model import build, spec, ties
 from engines.mujoco.params import SceneParams
 from robots.dvrk import setup_joints
 from robots.dvrk.linkage import LINKAGES
@@ -40,8 +40,14 @@ def some_positions(model):
     return np.random.default_rng(1).uniform(lower, upper)
 
 
+def as_in_a_session():
+    whole = spec(SCENE)
+    ties.add(whole, SCENE)
+    return whole.compile()
+
+
 def test_mjcf_reads_back_as_it_was(folder):
-    model, back = build(SCENE), mujoco.MjModel.from_xml_path(str(folder / "dvrk.xml"))
+    model, back = as_in_a_session(), mujoco.MjModel.from_xml_path(str(folder / "dvrk.xml"))
     assert (model.nq, model.nv, model.nu, model.neq, model.ngeom, model.nsensor) == (
         back.nq,
         back.nv,
@@ -89,6 +95,37 @@ def test_a_keyframe_holds_the_arms_where_they_start(folder):
     mujoco.mj_step(model, data, nstep=1000)
     # no more than the springs of roll and pitch pull their servos away
     assert np.abs(data.qpos - start).max() < 5e-3
+
+
+def test_fingers_of_the_mjcf_are_one_jaw(folder):
+    model = mujoco.MjModel.from_xml_path(str(folder / "dvrk.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(START).id)
+    data.joint("PSM1/jaw_left").qfrc_applied = 0.02
+    mujoco.mj_step(model, data, nstep=400)
+    left, right = (float(data.joint(f"PSM1/jaw_{side}").qpos[0]) for side in ("left", "right"))
+    assert left > 1e-4
+    assert abs(left - right) < 1e-5
+
+
+def test_brakes_of_the_mjcf_hold_the_endoscope_where_it_starts(folder):
+    model = mujoco.MjModel.from_xml_path(str(folder / "dvrk.xml"))
+    names = [joint.name for joint in SCENE.arms["ECM"].chain.joints]
+    locks = [model.equality(ties.brake(name)).id for name in names]
+    assert np.array_equal(model.eq_data[locks, 0], SCENE.arms["ECM"].start)
+    assert not model.eq_active0[locks].any()
+
+    def sunk(*, braked):
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, model.key(START).id)
+        data.eq_active[locks] = braked
+        model.actuator_gainprm[:] = model.actuator_biasprm[:] = model.body_gravcomp[:] = 0.0
+        mujoco.mj_step(model, data, nstep=400)
+        found = [float(data.joint(f"ECM/{name}").qpos[0]) for name in names]
+        return np.abs(np.array(found) - SCENE.arms["ECM"].start).max()
+
+    assert sunk(braked=True) < 1e-4
+    assert sunk(braked=False) > 1e-2
 
 
 def test_meshes_read_back_where_they_were(folder):

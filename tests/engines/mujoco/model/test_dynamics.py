@@ -13,6 +13,7 @@ from engines.mujoco.model.dynamics import dynamics
 from engines.mujoco.params import MujocoParams, SceneParams
 from hub.participant import Inputs, Setup
 from robots import rotation
+from robots.dvrk import setup_joints
 from robots.dvrk.dynamics import of_ecm, of_psm
 from robots.dvrk.instruments import instrument
 
@@ -49,6 +50,33 @@ def test_the_model_moves_as_the_closed_form_says(arm):
     found = dynamics(arm, "straight" if arm == "ECM" else NEEDLE_DRIVER, q.tolist(), [0.0] * q.size)
     assert np.allclose(found.inertia, closed.inertia_matrix(q), atol=1e-6)
     assert np.allclose(found.gravity, closed.gravity(q), atol=1e-5)
+
+
+@pytest.mark.parametrize("arm", ["PSM2", "ECM"])
+@pytest.mark.parametrize(
+    "base",
+    [
+        {"mounting": "free", "orientation": (TILTS[2] / np.linalg.norm(TILTS[2])).tolist()},
+        {"mounting": "cart"},
+        {"mounting": "cart", "setup_joints": [0.1, 0.4, -0.3, 0.2, 0.9, -0.7]},
+    ],
+    ids=str,
+)
+def test_gravity_is_that_of_the_base_as_it_stands(arm, base):
+    if arm == "ECM" and "setup_joints" in base:
+        base = {**base, "setup_joints": [*base["setup_joints"][:4], 0.0, 0.0]}
+    q = np.array([0.4, -0.5, 0.13, 0.7, 0.3, -0.6])[: 4 if arm == "ECM" else 6]
+    closed = of_ecm() if arm == "ECM" else of_psm(instrument(NEEDLE_DRIVER))
+    tool = "straight" if arm == "ECM" else NEEDLE_DRIVER
+    found = dynamics(arm, tool, q.tolist(), [0.0] * q.size, base=base)
+    if "orientation" in base:
+        turn = rotation.matrix(np.array(base["orientation"]))
+    else:
+        held = np.array(base.get("setup_joints", setup_joints.SIMULATED[arm]))
+        turn = setup_joints.base_pose(arm, held)[:3, :3]
+    assert np.allclose(found.base, turn, atol=1e-12)
+    assert np.allclose(found.gravity, closed.gravity(q, turn.T @ [0.0, 0.0, -9.81]), atol=2e-5)
+    assert np.allclose(found.inertia, closed.inertia_matrix(q), atol=1e-6)
 
 
 class Run:

@@ -1,0 +1,1 @@
+"""The material of tissue from measured depths and forces of an indenter."""

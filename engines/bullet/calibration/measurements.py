@@ -1,0 +1,65 @@
+"""Depths and forces of an indenter over time, from a CSV file."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from schemas.errors import RecordingError, did_you_mean
+from schemas.vectors import Vector
+
+__all__ = ["Measured", "read"]
+
+_NEEDED = ("time", "depth", "force")
+_SLIDING = ("slide", "tangential_force")
+_FEWEST = 20
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Samples of one press, each of shape (n,)."""
+
+    time: Vector
+    """s, increasing."""
+    depth: Vector
+    """m, below the unloaded surface; negative above it."""
+    force: Vector
+    """N, along the depth; positive where the tissue pushes back."""
+    slide: Vector | None = None
+    """m, along the surface."""
+    tangential_force: Vector | None = None
+    """N, along the slide; None: not measured."""
+
+
+def read(path: Path) -> Measured:
+    """Return the samples of `path`, a CSV file with a line of names.
+
+    Columns in any order: `time` (s), `depth` (m), `force` (N); to tell the friction also `slide` (m) and
+    `tangential_force` (N). Raises RecordingError where one is missing or is not a number.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = csv.reader(file)
+            names = [name.strip() for name in next(rows, list[str]())]
+            cells = [[float(cell) for cell in row] for row in rows if row]
+    except OSError as error:
+        raise RecordingError(f"cannot read '{path}': {error.strerror}") from error
+    except ValueError as error:
+        raise RecordingError(f"'{path}' is not a table of numbers below a line of names: {error}") from error
+    for name in _NEEDED:
+        if name not in names:
+            raise RecordingError(f"'{path}' has no column '{name}'.{did_you_mean(name, names)}")
+    if len({len(names), *map(len, cells)}) > 1 or len(cells) < _FEWEST:
+        raise RecordingError(
+            f"'{path}' has {len(cells)} samples, at least {_FEWEST} of {len(names)} numbers are needed"
+        )
+    columns = dict(zip(names, np.array(cells, np.float64).T.copy(), strict=True))
+    if not all(np.isfinite(column).all() for column in columns.values()):
+        raise RecordingError(f"'{path}' has numbers that are not finite: leave such samples out")
+    if (np.diff(columns["time"]) <= 0.0).any():
+        raise RecordingError(f"'{path}': the time does not increase from sample to sample")
+    given = [name for name in (*_NEEDED, *_SLIDING) if name in columns]
+    return Measured(**{name: columns[name] for name in given})
