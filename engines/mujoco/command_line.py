@@ -184,8 +184,9 @@ def _print(found: JointDynamics) -> None:
         "coulomb": found.coulomb_friction,
         "friction": found.friction,
     }
-    up = ", ".join(f"{part:.4f}" for part in found.base[2].tolist())
-    typer.echo(f"the world's z in the base frame: {up}")
+    if not np.array_equal(found.base, np.eye(3)):
+        up = ", ".join(f"{part:.4f}" for part in found.base[2].tolist())
+        typer.echo(f"the base is turned: up is {up} in its frame")
     width = max(map(len, found.joints))
     typer.echo(f"{'':{width}}{''.join(f'{title:>11}' for title in columns)}   inertia matrix")
     for i, name in enumerate(found.joints):

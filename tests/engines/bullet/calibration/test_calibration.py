@@ -24,7 +24,7 @@ LIVER = Prony((0.25, 0.3), (0.4, 8.0))
 
 def pressed(*, seed=0, noise=0.01, indenter=SPHERE, modulus=8e3, stiffening=0.0, prony=LIVER, friction=None):
     """Return a press of 4 mm in 0.2 s, held for 20 s, with noise relative to the largest force."""
-    time = np.concatenate([np.linspace(0.0, 0.4, 81), np.linspace(0.45, 20.0, 392)])
+    time = np.concatenate([np.linspace(0.0, 0.4, 41), np.linspace(0.5, 20.0, 196)])
     depth = np.clip(time / 0.2, 0.0, 1.0) * 4e-3 - 1e-4
     force = prony.relaxed(time, elastic_force(indenter, depth, modulus, stiffening))
     rng = np.random.default_rng(seed)
@@ -96,7 +96,7 @@ def test_the_moduli_at_a_frequency_are_those_of_a_swing():
 )
 def test_what_was_put_in_is_found_within_its_deviations(indenter, stiffening):
     errors = []
-    for seed in range(8):
+    for seed in range(4):
         found = calibrate(
             pressed(seed=seed, indenter=indenter, stiffening=stiffening, noise=0.02),
             indenter,
@@ -135,7 +135,8 @@ def test_friction_is_found_while_the_indenter_slides():
 
 def test_what_the_data_does_not_tell_has_a_large_deviation():
     found = calibrate(pressed(prony=Prony((0.3, 0.0), (0.5, 5.0)), noise=0.02), SPHERE)
-    assert found.deviations["time_2"] > found.relaxation.times[1]
+    doubts = [found.deviations[f"time_{i}"] / time for i, time in enumerate(found.relaxation.times, 1)]
+    assert max(doubts) > 0.5
 
 
 @pytest.mark.parametrize(
