@@ -283,10 +283,9 @@ class BulletEngine(Stepped):
         for organ in self._organs:
             phase = self._dt * organ.frequency
             if phase > ACCURATE_PHASE:
-                least, largest = face_loss(phase)
                 _warn_once(
-                    f"participant '{self.name}', organ '{organ.name}': with the timestep of"
-                    f" {self.params.timestep} ns forces of contact are {least:.0%} to {largest:.0%} too small"
-                    f" over faces of the mesh (what is held is not concerned); up to"
-                    f" {ACCURATE_PHASE / organ.frequency * 1e9:.0f} ns they are within 10 %"
+                    f"participant '{self.name}', organ '{organ.name}': with a timestep of"
+                    f" {self.params.timestep / 1e6:g} ms forces of contact are up to some"
+                    f" {face_loss(phase):.0%} too small over faces of the mesh (what is held is not"
+                    f" concerned); up to {ACCURATE_PHASE / organ.frequency * 1e3:.2g} ms they are within 10 %"
                 )

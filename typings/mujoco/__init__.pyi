@@ -153,6 +153,7 @@ class MjsGeom(MjsElement):
     material: str
     contype: int
     conaffinity: int
+    mass: float
 
 class MjsBody(MjsElement):
     pos: _Array
@@ -248,8 +249,12 @@ class MjModel:
     actuator_gainprm: _Array
     actuator_trnid: NDArray[np.int32]
     actuator_trntype: NDArray[np.int32]
+    njnt: int
+    ntendon: int
     tendon_adr: NDArray[np.int32]
     tendon_num: NDArray[np.int32]
+    tendon_solimp_fri: _Array
+    tendon_solref_fri: _Array
     wrap_objid: NDArray[np.int32]
     wrap_prm: _Array
     body_gravcomp: _Array
@@ -284,6 +289,8 @@ class MjModel:
     body_jntadr: NDArray[np.int32]
     dof_damping: _Array
     dof_frictionloss: _Array
+    dof_solimp: _Array
+    dof_solref: _Array
     jnt_stiffness: _Array
     qpos_spring: _Array
     skin_vert: NDArray[np.float32]
@@ -291,7 +298,8 @@ class MjModel:
     def body(self, name: str | int) -> _Element: ...
     def equality(self, name: str | int) -> _Element: ...
     def skin(self, name: str) -> _Skin: ...
-    def joint(self, name: str) -> _Element: ...
+    def joint(self, name: str | int) -> _Element: ...
+    def tendon(self, name: str | int) -> _Element: ...
     def sensor(self, name: str | int) -> _Element: ...
     def site(self, name: str | int) -> _Element: ...
 

@@ -20,6 +20,7 @@ _UNIFORM = float(np.sqrt(12.0))
 """Width over standard deviation of a uniform distribution."""
 _STARTS = ((0.02, 0.3), (0.1, 1.0), (0.3, 0.5))
 """Of the time constants, as parts of the measured time: least squares may end beside the best."""
+_MOST_STEPS = 200
 _SLIDING = 0.1
 """Of the largest speed along the surface: above it the indenter slides."""
 _PRESSING = 0.1
@@ -136,7 +137,11 @@ def _solved(model: _Model, bounds: tuple[Vector, Vector], scale: float) -> tuple
         ratio = max(slow * length / first - 1.0, 0.6)
         start = np.array([guess + 0.3, 0.0, 0.4, 0.5, np.log(first), np.log(ratio), min(1.0, 0.5 * most)])
         found = least_squares(
-            lambda x: (model.force(x) - model.measured.force) / scale, start, bounds=bounds, x_scale="jac"
+            lambda x: (model.force(x) - model.measured.force) / scale,
+            start,
+            bounds=bounds,
+            x_scale="jac",
+            max_nfev=_MOST_STEPS,
         )
         if best is None or found.cost < best.cost:
             best = found

@@ -8,7 +8,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from engines.bullet.elasticity import half_space
+from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
+from engines.bullet.elasticity.material import Material
 from schemas.errors import RecordingError
 from schemas.vectors import Vector
 
@@ -20,6 +21,8 @@ SHAPES: tuple[Shape, ...] = get_args(Shape)
 
 _TABOR = 0.2
 """Representative strain over contact radius over sphere radius (Tabor, The Hardness of Metals, 1951)."""
+_NO_DENSITY = 0.0
+"""Nothing moves of itself here."""
 _LARGEST_CONTACT = 1.0
 """Contact radius over thickness up to which the series for a layer is trusted."""
 
@@ -38,11 +41,13 @@ class Indenter:
         """Raise RecordingError where no law here holds for presses as deep as `depth` (m)."""
         deepest = float(depth.max())
         if self.shape == "punch" and self.thickness is not None:
-            raise RecordingError("a thickness is known for a sphere only: leave it out, or press with a sphere")
-        if self.shape == "sphere" and deepest > half_space.DEEPEST * self.radius:
             raise RecordingError(
-                f"depths up to {deepest * 1e3:.3g} mm, allowed up to {half_space.DEEPEST:g} radii,"
-                f" {half_space.DEEPEST * self.radius * 1e3:.3g} mm: leave deeper samples out"
+                "a thickness is known for a sphere only: leave it out, or press with a sphere"
+            )
+        if self.shape == "sphere" and deepest > DEEPEST * self.radius:
+            raise RecordingError(
+                f"depths up to {deepest * 1e3:.3g} mm, allowed up to {DEEPEST:g} radii,"
+                f" {DEEPEST * self.radius * 1e3:.3g} mm: leave deeper samples out"
             )
         contact = np.sqrt(self.radius * max(deepest, 0.0))
         if self.thickness is not None and contact > _LARGEST_CONTACT * self.thickness:
@@ -64,7 +69,7 @@ def elastic_force(indenter: Indenter, depth: Vector, young_modulus: float, stiff
     radius, nu = indenter.radius, indenter.poisson_ratio
     if indenter.shape == "punch":
         return 2.0 * young_modulus * radius / (1.0 - nu**2) * pressed
-    force = half_space.hertz(pressed, radius, young_modulus, nu) * half_space.share(pressed / radius, nu)
+    force = sphere_force(pressed, radius, Material(young_modulus, nu, _NO_DENSITY, damping=0.0))
     contact = np.sqrt(radius * pressed)
     if indenter.thickness is not None:
         force = force * _of_layer(contact / indenter.thickness, nu)

@@ -1,51 +1,99 @@
-"""The force of a rigid sphere on a neo-Hookean half-space, at depths up to its diameter.
+"""What a half-space of tissue does: pressed by a sphere, deep too, and by a force at a point.
 
-Hertz' law, 4/3 E / (1 - nu^2) sqrt(R) d^1.5 (Johnson, Contact Mechanics, 1985, section 4.2), times a share
-that converged axisymmetric finite elements gave.
+The law of the sphere is Hertz's (Johnson, Contact Mechanics, 1985, section 4.2) times a share, which is the
+force of converged finite elements of Bullet's neo-Hookean material, without friction, over Hertz's: it falls
+as the contact is no longer small beside the sphere (`python bench/tissue_truth.py law` computes the table).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from engines.bullet.elasticity.material import Material
 from schemas.vectors import Vector
 
-__all__ = ["DEEPEST", "hertz", "share"]
+__all__ = ["DEEPEST", "POISSON_RATIOS", "point_displacement", "point_stress", "sphere_force"]
 
 DEEPEST = 2.0
-"""Depth over radius up to which the shares are known."""
+"""Depth in radii up to which the law is known."""
 
-_RATIOS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0)
-_POISSON_RATIOS = (0.3, 0.4, 0.45)
-_SHARES: Vector = np.array(
+_DEPTHS = np.array([0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
+"""In radii."""
+
+POISSON_RATIOS = (0.3, 0.4, 0.45)
+"""Of the table; between them shares are interpolated, beyond them taken from the nearest."""
+
+_SHARES = np.array(
     [
-        [1, 0.9841, 0.9874, 0.9901, 0.9868, 0.9833, 0.9754, 0.9665, 0.9568]
-        + [0.9469, 0.9255, 0.9026, 0.8782, 0.8528, 0.8260, 0.7982, 0.7694],
-        [1, 0.9818, 0.9809, 0.9821, 0.9765, 0.9724, 0.9611, 0.9502, 0.9393]
-        + [0.9280, 0.9035, 0.8781, 0.8518, 0.8243, 0.7959, 0.7663, 0.7356],
-        [1, 0.9812, 0.9784, 0.9763, 0.9693, 0.9643, 0.9520, 0.9398, 0.9273]
-        + [0.9145, 0.8886, 0.8615, 0.8335, 0.8047, 0.7746, 0.7434, 0.7109],
+        [1, 0.9841, 0.9874, 0.9901, 0.9868, 0.9833, 0.9754, 0.9665, 0.9568, 0.9469]
+        + [0.9255, 0.9026, 0.8782, 0.8528, 0.8260, 0.7982, 0.7694],
+        [1, 0.9818, 0.9809, 0.9821, 0.9765, 0.9724, 0.9611, 0.9502, 0.9393, 0.9280]
+        + [0.9035, 0.8781, 0.8518, 0.8243, 0.7959, 0.7663, 0.7356],
+        [1, 0.9812, 0.9784, 0.9763, 0.9693, 0.9643, 0.9520, 0.9398, 0.9273, 0.9145]
+        + [0.8886, 0.8615, 0.8335, 0.8047, 0.7746, 0.7434, 0.7109],
     ]
 )
-"""By Poisson ratio and depth over radius. Finite elements: neo-Hookean half-space, axisymmetric, refined until
-two meshes agreed within 1 %; below a tenth of the radius that error is most of what they say.
+"""Of Hertz's force, by Poisson ratio and depth."""
+
+_HIGHEST_OVER_PLANE = -0.5
+"""Height over the tangent plane, in distances from the point, where the fields of a force at a point end:
+they are singular on the axis above it.
 """
 
 
-def hertz(depth: Vector, radius: float, young_modulus: float, poisson_ratio: float) -> Vector:
-    """Return the force (N) by Hertz at `depth` (m, any shape); 0 above the surface. SI units."""
-    modulus = young_modulus / (1.0 - poisson_ratio**2)
-    return 4.0 / 3.0 * modulus * np.sqrt(radius) * np.maximum(depth, 0.0) ** 1.5
+def sphere_force(depth: Vector, radius: float, material: Material) -> Vector:
+    """Return the force (N) of a sphere of `radius` (m) at every `depth` (m, up to 2 radii)."""
+    nu = material.poisson_ratio
+    ratio = np.clip(np.interp(nu, POISSON_RATIOS, np.arange(len(POISSON_RATIOS))), 0.0, None)
+    low = min(int(ratio), len(POISSON_RATIOS) - 2)
+    shares = _SHARES[low] + (ratio - low) * (_SHARES[low + 1] - _SHARES[low])
+    plane_strain = material.young_modulus / (1.0 - nu**2)
+    return (
+        4.0 / 3.0 * plane_strain * np.sqrt(radius) * depth**1.5 * np.interp(depth / radius, _DEPTHS, shares)
+    )
 
 
-def share(ratio: Vector, poisson_ratio: float) -> Vector:
-    """Return what part of Hertz' force is felt at depth over radius `ratio` (any shape).
+def point_displacement(away: Vector, inward: Vector, material: Material) -> Vector:
+    """Return the displacement (m) by 1 N at a point of the surface of a half-space, shape (n, 3).
 
-    Outside the table, of Poisson ratios of 0.3 to 0.45 and ratios up to `DEEPEST`, its end is taken.
+    Boussinesq's solution: Johnson, Contact Mechanics (1985), section 3.2. away: from that point, m, shape
+    (n, 3). inward: the direction of the force, into the half-space, shape (3,).
     """
-    nu = float(np.clip(poisson_ratio, _POISSON_RATIOS[0], _POISSON_RATIOS[-1]))
-    row = int(np.clip(np.searchsorted(_POISSON_RATIOS, nu), 1, len(_POISSON_RATIOS) - 1))
-    low, high = _POISSON_RATIOS[row - 1 : row + 1]
-    weight = (nu - low) / (high - low)
-    shares = (1.0 - weight) * _SHARES[row - 1] + weight * _SHARES[row]
-    return np.interp(ratio, _RATIOS, shares)
+    nu, shear = material.poisson_ratio, material.lame[0]
+    R, depth, across, above = _cylindrical(away, inward)
+    along = depth**2 / R**3 + 2.0 * (1.0 - nu) / R
+    out = depth / R**3 - (1.0 - 2.0 * nu) / (R * above)
+    return (along[:, None] * inward + out[:, None] * across) / (4.0 * np.pi * shear)
+
+
+def point_stress(away: Vector, inward: Vector, material: Material) -> Vector:
+    """Return the stress (Pa) by 1 N at a point of the surface of a half-space, shape (n, 3, 3).
+
+    Arguments and source are those of `point_displacement`.
+    """
+    free = 1.0 - 2.0 * material.poisson_ratio
+    R, depth, across, above = _cylindrical(away, inward)
+    radius = np.linalg.norm(across, axis=1)
+    outward = across / np.maximum(radius, 1e-12)[:, None]
+    hoop_line = np.cross(inward, outward)
+    z, r = depth, radius
+    radial = free / (R * above) - 3.0 * r**2 * z / R**5
+    hoop = free * (z / R**3 - 1.0 / (R * above))
+    axial, shear = -3.0 * z**3 / R**5, -3.0 * r * z**2 / R**5
+    mixed = np.einsum("ni,j->nij", outward, inward)
+    stress = (
+        radial[:, None, None] * np.einsum("ni,nj->nij", outward, outward)
+        + hoop[:, None, None] * np.einsum("ni,nj->nij", hoop_line, hoop_line)
+        + axial[:, None, None] * np.multiply.outer(inward, inward)
+        + shear[:, None, None] * (mixed + mixed.transpose(0, 2, 1))
+    )
+    return stress / (2.0 * np.pi)
+
+
+def _cylindrical(away: Vector, inward: Vector) -> tuple[Vector, Vector, Vector, Vector]:
+    """Return distance R, depth z, the vector across the axis, and R + z, all in m."""
+    R = np.linalg.norm(away, axis=1)
+    depth = away @ inward
+    across = away - depth[:, None] * inward
+    depth = np.maximum(depth, _HIGHEST_OVER_PLANE * R)
+    return R, depth, across, R + depth

@@ -38,7 +38,9 @@ class MaterialFile(BaseModel):
         """Return the content of `file`. Raises ValueError if it cannot be read or is not valid."""
         try:
             if file.stat().st_size > _LARGEST:
-                raise ValueError(f"'{file}' is larger than {_LARGEST} bytes: not a file of `trocar calibrate`")
+                raise ValueError(
+                    f"'{file}' is larger than {_LARGEST} bytes: not a file of `trocar calibrate`"
+                )
             yaml: Any = YAML(typ="safe")
             return cls.model_validate(yaml.load(file.read_text(encoding="utf-8")))
         except OSError as error:
@@ -46,7 +48,9 @@ class MaterialFile(BaseModel):
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             where = ".".join(map(str, first["loc"]))
-            raise ValueError(f"'{file}': {where}: {first['msg']}; `trocar calibrate tissue` writes it") from error
+            raise ValueError(
+                f"'{file}': {where}: {first['msg']}; `trocar calibrate tissue` writes it"
+            ) from error
         except (YAMLError, UnicodeDecodeError) as error:
             raise ValueError(f"'{file}' is not YAML: {error}") from error
 

@@ -59,8 +59,8 @@ class OrganParams(BaseModel):
     material_file: Path | None = Field(
         default=None,
         description=(
-            "instead: a file of `trocar calibrate tissue`, with a damping and perhaps a friction of its own; a"
-            " relative path starts at the scenario"
+            "instead: a file of `trocar calibrate tissue`, with a damping and perhaps a friction of its own;"
+            " a relative path starts at the scenario"
         ),
     )
     young_modulus: TissueModulus | None = Field(default=None, description="instead of a material")
@@ -146,7 +146,7 @@ class OrganParams(BaseModel):
 
     @cached_property
     def contact_friction(self) -> float:
-        """Coulomb's coefficient against probes: as stated, else that of the material's file, if it has one."""
+        """Coulomb's coefficient against probes: as stated, else that of the material's file, if any."""
         own = self._own_material
         if own is None or own.friction is None or "friction" in self.model_fields_set:
             return self.friction

@@ -39,7 +39,7 @@ def write(scene: SceneParams, path: Path, form: Format) -> list[Path]:
     if ties.BRAKED in scene.arms:
         arm = scene.arms[ties.BRAKED]
         for joint, position in zip(arm.chain.joints, arm.start, strict=True):
-            model.equality(ties.brake(joint.name)).data[0] = position
+            ties.set_brake(model, joint.name, position)
     _add_start(model, scene)
     root = _WRITERS[form](model)
     ElementTree.indent(root)

@@ -112,7 +112,7 @@ def dynamics(
     ]
     return JointDynamics(
         joints=tuple(joints),
-        base=data.site(f"{arm}/base").xmat.reshape(3, 3).copy(),
+        base=data.site_xmat[model.site(f"{arm}/base").id].reshape(3, 3).copy(),
         inertia=to_all.T @ inertia @ to_all,
         gravity=to_all.T @ data.qfrc_bias,
         viscous_friction=np.array(alone[0]),

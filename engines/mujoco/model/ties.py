@@ -7,7 +7,7 @@ import mujoco
 from engines.mujoco.model.names import FINGERS
 from engines.mujoco.params import SceneParams, has_jaw
 
-__all__ = ["BRAKED", "add", "brake"]
+__all__ = ["BRAKED", "add", "brake", "set_brake"]
 
 BRAKED = "ECM"
 """The arm whose joints have brakes."""
@@ -17,6 +17,12 @@ _RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 def brake(joint: str) -> str:
     """Return the name of the equality that brakes `joint` of the ECM; its first number is the position."""
     return f"{BRAKED}/{joint}/brake"
+
+
+def set_brake(spec: mujoco.MjSpec, joint: str, position: float) -> None:
+    """Let the brake of `joint`, which `add` has added, close at `position` (rad, m)."""
+    if (equality := spec.equality(brake(joint))) is not None:
+        equality.data[0] = position
 
 
 def add(spec: mujoco.MjSpec, scene: SceneParams) -> None:

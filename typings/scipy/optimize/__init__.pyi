@@ -6,6 +6,8 @@ from numpy.typing import ArrayLike, NDArray
 
 class OptimizeResult:
     x: NDArray[np.float64]
+    cost: float
+    jac: NDArray[np.float64]
 
 def least_squares(
     fun: Callable[[NDArray[np.float64]], NDArray[np.float64]],

@@ -13,7 +13,6 @@ from engines.bullet.calibration.fit import calibrate
 from engines.bullet.calibration.indentation import Indenter, elastic_force
 from engines.bullet.calibration.measurements import Measured, read
 from engines.bullet.calibration.relaxation import Prony
-from engines.bullet.elasticity import half_space
 from engines.bullet.organs.material_file import MaterialFile
 from engines.bullet.organs.params import OrganParams
 from schemas.errors import RecordingError
@@ -34,12 +33,6 @@ def pressed(*, seed=0, noise=0.01, indenter=SPHERE, modulus=8e3, stiffening=0.0,
     slide = np.maximum(time - 15.0, 0.0) * 2e-3
     drag = friction * force * (time > 15.0) + noise * force.max() * rng.standard_normal(time.size)
     return Measured(time, depth, force, slide, drag)
-
-
-@given(st.floats(0.3, 0.45), st.floats(0.0, 2.0))
-def test_the_share_of_hertz_is_between_those_of_its_neighbours(nu, ratio):
-    low, high = (float(half_space.share(np.array(ratio), end)) for end in (0.45, 0.3))
-    assert low - 1e-12 <= float(half_space.share(np.array(ratio), nu)) <= high + 1e-12
 
 
 @given(st.floats(0.0, 1.99), st.floats(1e-3, 1e-2))
@@ -73,9 +66,12 @@ def test_relaxation_is_the_convolution(first, second, quick, slow):
     rate = np.diff(np.interp(fine, time, elastic)) / np.diff(fine)
     middle = (fine[1:] + fine[:-1]) / 2
     kernel = 1.0 - sum(
-        share * (1 - np.exp(-(6.0 - middle) / tau)) for share, tau in zip(prony.shares, prony.times, strict=True)
+        share * (1 - np.exp(-(6.0 - middle) / tau))
+        for share, tau in zip(prony.shares, prony.times, strict=True)
     )
-    assert prony.relaxed(time, elastic)[-1] == pytest.approx((kernel * rate).sum() * (fine[1] - fine[0]), abs=1e-5)
+    assert prony.relaxed(time, elastic)[-1] == pytest.approx(
+        (kernel * rate).sum() * (fine[1] - fine[0]), abs=1e-5
+    )
 
 
 def test_the_moduli_at_a_frequency_are_those_of_a_swing():
@@ -112,9 +108,7 @@ def test_what_was_put_in_is_found_within_its_deviations(indenter, stiffening):
         }
         if stiffening:
             wanted["stiffening"] = found.stiffening, stiffening
-        errors.append(
-            [(value - true) / found.deviations[name] for name, (value, true) in wanted.items()]
-        )
+        errors.append([(value - true) / found.deviations[name] for name, (value, true) in wanted.items()])
         assert found.residual < 0.05
     assert np.sqrt(np.mean(np.square(errors))) < 1.6
     assert np.abs(errors).max() < 5.0

@@ -1,14 +1,17 @@
 """What the stated limits of the time step are worth."""
 
+import logging
+
 import numpy as np
 import pytest
 
 from engines.bullet.elasticity import stable_step
-from engines.bullet.elasticity.stable_step import longest_step
+from engines.bullet.elasticity.stable_step import ACCURATE_PHASE, face_loss, longest_step
 from engines.bullet.organs.organ import Organ
 from engines.bullet.organs.params import OrganParams
 from engines.bullet.world import connect, disconnect
 from schemas.errors import SessionError
+from tests.engines.bullet.finite_elements import Body
 from tests.engines.bullet.rig import RADIUS, SMALL_BLOCK, Rig, params
 
 
@@ -58,3 +61,36 @@ def test_a_contact_is_steady_below_the_largest_phase(monkeypatch):
 
 def test_a_contact_chatters_above_it(monkeypatch):
     assert ripple(4.7, monkeypatch) > 0.02
+
+
+def at_phase(phase):
+    """Return the small block, as stiff as sub-steps of 1 ms make `phase`."""
+    soft = OrganParams.model_validate(SMALL_BLOCK)
+    free = np.where(soft.rest.nodes[:, 2] > soft.rest.nodes[:, 2].min(), 1.0, 0.0)
+    frequency = stable_step.highest_frequency(soft.rest, free, soft.elastic)
+    return {**SMALL_BLOCK, "young_modulus": soft.young_modulus * (phase / (1e-3 * frequency)) ** 2}
+
+
+@pytest.mark.parametrize("phase", [2.0, 3.0])
+def test_contacts_in_faces_lose_no_more_force_than_stated(phase):
+    block = at_phase(phase)
+    mesh = OrganParams.model_validate(block).rest
+    top = mesh.nodes[mesh.triangles]
+    middles = top[(top[:, :, 2] == mesh.nodes[:, 2].max()).all(axis=1)].mean(axis=1)
+    at = middles[np.linalg.norm(middles[:, :2], axis=1).argmin(), :2]
+    with Rig(params(block), start=(*at, RADIUS + 1e-3)) as rig:
+        rig.move((*at, RADIUS - 1e-3), 0.06)
+        rig.hold(0.2)
+        force = rig.force[2]
+    true = Body(OrganParams.model_validate(block)).press([[*at, RADIUS - 1e-3]], [RADIUS])[0, 2]
+    assert 0.02 < 1.0 - force / true < face_loss(phase) + 0.02
+
+
+@pytest.mark.parametrize(("ratio", "warnings"), [(0.98, 0), (1.1, 1)])
+def test_a_session_warns_once_of_a_long_step(ratio, warnings, caplog):
+    block = at_phase(ratio * ACCURATE_PHASE)
+    with caplog.at_level(logging.WARNING):
+        for _ in range(2):
+            with Rig(params(block)):
+                pass
+    assert [record.getMessage().count("too small") for record in caplog.records] == [1] * warnings
