@@ -54,6 +54,13 @@ def _numbers(text: str) -> list[float] | None:
         return None
 
 
+def _row(text: str, count: int, option: str) -> list[float]:
+    numbers = _numbers(text) or []
+    if len(numbers) != count:
+        raise typer.BadParameter(f"{len(numbers)} numbers, expected {count}", param_hint=option)
+    return numbers
+
+
 def _checked(text: str | None) -> str | None:
     if text is not None and not _numbers(text):
         raise typer.BadParameter(
@@ -156,9 +163,12 @@ def dynamics(
             raise MotionError(f"{arm}: not all joint velocities are finite: {velocities}")
         from engines.mujoco.model.dynamics import dynamics as of
 
-        stand = {"orientation": orientation, "setup_joints": setup_joints}
-        base = {key: _numbers(text) for key, text in stand.items() if text is not None}
-        found = of(name, tool, positions, velocities, own, base={"mounting": mounting, **base})
+        base: dict[str, Any] = {"mounting": mounting}
+        if orientation is not None:
+            base["orientation"] = _row(orientation, 4, "--orientation")
+        if setup_joints is not None:
+            base["setup_joints"] = _row(setup_joints, 6, "--setup-joints")
+        found = of(name, tool, positions, velocities, own, base=base)
     if as_json:
         typer.echo(
             json.dumps(

@@ -194,6 +194,16 @@ def test_urdf_has_the_masses_of_the_model(robot):
     assert masses["PSM1_pitch_link"] == pytest.approx(model.body("PSM1/pitch").mass[0])
 
 
+def test_setup_joints_have_masses_that_move_nothing(robot):
+    model = build(SCENE)
+    held = {joint: float(model.body(f"SUJ/PSM1/{joint}").mass[0]) for joint in setup_joints.JOINT_NAMES}
+    assert list(held.values()) == pytest.approx(setup_joints.MASSES["PSM1"])
+    assert float(model.body("cart").mass[0]) == pytest.approx(setup_joints.CART_MASS)
+    masses = {link.name: link.inertial.mass for link in robot.robot.links if link.inertial is not None}
+    assert masses["SUJ_PSM1_shoulder_link"] == pytest.approx(held["shoulder"])
+    assert not model.body_dofnum[[model.body("cart").id, model.body("SUJ/PSM1/tilt").id]].any()
+
+
 def test_mujoco_reads_the_urdf(folder):
     """MuJoCo rejects moving links without mass, finds meshes beside the file, and makes mimics equalities."""
     model = mujoco.MjModel.from_xml_path(str(folder / "dvrk.urdf"))
@@ -317,6 +327,12 @@ def test_dynamics_for_a_person():
         (("export", "x", "--arms", "PSM7"), "no arm 'PSM7'"),
         (("export", "x", "--arms", ""), "at least one of PSM1, PSM2, PSM3, ECM"),
         (("export", "/dev/null/x"), "Invalid value for PATH: cannot write there"),
+        (("dynamics", "ECM", "--q", "0 0 0.1 0", "--orientation", "1 0 0"), "3 numbers, expected 4"),
+        (
+            ("dynamics", "ECM", "--q", "0 0 0.1 0", "--mounting", "cart", "--orientation", "0 0 0 1"),
+            "for 'mount",
+        ),
+        (("dynamics", "ECM", "--q", "0 0 0.1 0", "--setup-joints", "0 0 0 0 0 0"), "set 'mounting: cart'"),
         (("export", "x", "--instrument", "PSM1=400143"), "snake"),
     ],
 )

@@ -117,6 +117,37 @@ def test_gravity_compensation_holds_the_arm_however_its_base_stands(arm, start, 
     assert np.allclose(run.q, before, atol=1e-6)
 
 
+def test_an_arm_that_is_let_go_stays_where_springs_pull_less_than_friction():
+    run = Run("PSM1", tilted("PSM1", TILTS[0], instrument=NEEDLE_DRIVER))
+    run.mode[:] = [2.0, 2.0]
+    run.steps(100)
+    before = run.q
+    run.steps(1000)
+    assert np.abs(run.q - before).max() < 1e-5
+
+
+def test_an_arm_that_is_let_go_gives_way_to_more_than_its_friction():
+    run = Run("PSM1", tilted("PSM1", TILTS[0], instrument=NEEDLE_DRIVER))
+    run.mode[:] = [2.0, 2.0]
+    run.inputs["PSM1/servo_jf"][:] = [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]
+    run.steps(300)
+    assert run.q[0] > 0.05
+
+
+def test_the_friction_under_the_servo_is_as_soft_as_before():
+    """A session that lets an arm go and takes it again goes on as one that was restored to the same state."""
+    run = Run("PSM1", tilted("PSM1", TILTS[0], instrument=NEEDLE_DRIVER))
+    run.mode[:] = [2.0, 2.0]
+    run.steps(50)
+    run.mode[:] = [1.0, 1.0]
+    run.steps(50)
+    saved = run.engine.save()
+    other = Run("PSM1", tilted("PSM1", TILTS[0], instrument=NEEDLE_DRIVER))
+    other.engine.restore(saved)
+    other.command[:] = run.command
+    assert [part.steps(1).engine.state_hash() for part in (run, other)][0] == other.engine.state_hash()
+
+
 @pytest.mark.parametrize("arm", ["PSM1", "ECM"])
 def test_without_torque_the_arm_sinks_unless_it_has_brakes(arm):
     start = [0.0, 0.3, 0.1, 0.0, 0.0, 0.0] if arm == "PSM1" else [0.0, 0.3, 0.1, 0.0]
