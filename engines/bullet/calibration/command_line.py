@@ -88,7 +88,7 @@ def tissue(
     found = fit(read(data), indenter, two_parameters=two_parameters)
     file = material_file(found, indenter, density, frequency, data.name)
     output.write_text(file.text(), encoding="utf-8")
-    _print(found, two_parameters=two_parameters)
+    _print(found)
     typer.echo(
         f"at {frequency:g} Hz: young_modulus {file.young_modulus / 1e3:.4g} kPa, damping"
         f" {file.damping * 1e3:.3g} ms\nwrote {output}; name it in a scenario:"
@@ -96,11 +96,11 @@ def tissue(
     )
 
 
-def _print(found: Calibration, *, two_parameters: bool) -> None:
+def _print(found: Calibration) -> None:
     relaxation = found.relaxation
     rows = [
         ("young_modulus", "modulus at once, kPa", found.young_modulus, 1e-3),
-        *([("stiffening", "stiffening", found.stiffening, 1.0)] if two_parameters else []),
+        *([] if found.stiffening is None else [("stiffening", "stiffening", found.stiffening, 1.0)]),
         ("surface", "surface at, mm", found.surface, 1e3),
         ("share_1", "relaxes quickly, %", relaxation.shares[0], 1e2),
         ("time_1", "within, s", relaxation.times[0], 1.0),

@@ -33,8 +33,8 @@ class Calibration:
 
     young_modulus: float
     """Pa, instantaneous."""
-    stiffening: float
-    """Of `elastic_force`; 0 where it was not asked for."""
+    stiffening: float | None
+    """Of `elastic_force`; None where it was not asked for."""
     surface: float
     """Depth (m) at which the indenter touches."""
     relaxation: Prony
@@ -106,7 +106,7 @@ def calibrate(measured: Measured, indenter: Indenter, *, two_parameters: bool = 
     values = model.named(x)
     return Calibration(
         young_modulus=float(values[0]),
-        stiffening=float(values[1]),
+        stiffening=float(values[1]) if two_parameters else None,
         surface=float(values[2]),
         relaxation=model.prony(x),
         friction=friction,

@@ -43,11 +43,12 @@ def material_file(
         "thickness": indenter.thickness,
         "frequency": frequency,
         "instantaneous_young_modulus": _value(found, "young_modulus", found.young_modulus),
-        "stiffening": _value(found, "stiffening", found.stiffening),
         "surface": _value(found, "surface", found.surface),
         "relaxation": [quick, slow],
         "relative_residual": round(found.residual, 5),
     }
+    if found.stiffening is not None:
+        fit["stiffening"] = _value(found, "stiffening", found.stiffening)
     if found.friction is not None:
         fit["friction"] = _value(found, "friction", found.friction)
     try:

@@ -106,7 +106,8 @@ def test_what_was_put_in_is_found_within_its_deviations(indenter, stiffening):
             "time_1": (found.relaxation.times[0], 0.4),
             "time_2": (found.relaxation.times[1], 8.0),
         }
-        if stiffening:
+        assert (found.stiffening is None) == (not stiffening)
+        if found.stiffening is not None:
             wanted["stiffening"] = found.stiffening, stiffening
         errors.append([(value - true) / found.deviations[name] for name, (value, true) in wanted.items()])
         assert found.residual < 0.05
