@@ -45,7 +45,7 @@ MASSES: Mapping[CartArm, tuple[float, ...]] = {
     "ECM": (8.190, 4.285, 3.374, 3.459, 0.0, 0.0),
 }
 """kg of the links that these joints move (dvrk_env, CAD, suj_<arm>_L0 to L4; what mounts the manipulator is
-part of the last one). Not measured: 20 to 23 kg an arm, without what balances the lift.
+part of the last one). Not measured: 19 to 23 kg an arm, without what balances the lift.
 """
 
 _LIFT = (-0.3798, 0.8425)
