@@ -136,7 +136,7 @@ def test_every_material_says_where_it_comes_from_and_for_which_loading(name):
         ({"young_modulus": "1 kPa", "poisson_ratio": float("nan")}, "outside 0.01"),
         ({"young_modulus": "1 kPa", "density": "1 kg/m^3"}, "inflated lung"),
         ({"material": "colonn"}, "no material 'colonn'. Did you mean 'colon'"),
-        ({"material": "liver", "young_modulus": "1 kPa"}, "not both"),
+        ({"material": "liver", "young_modulus": "1 kPa"}, "one of them"),
         ({"material": "liver", "density": 1000}, "a material has its own"),
         ({}, "the material is missing"),
     ],
