@@ -61,9 +61,12 @@ def tissue(
             help="Of a layer bonded to something rigid, under a sphere; thick unless given.",
         ),
     ] = None,
-    poisson_ratio: Annotated[float, typer.Option(min=0.01, max=0.495, help="Not told by an indenter.")] = 0.4,
+    poisson_ratio: Annotated[
+        float, typer.Option(min=0.01, max=0.495, help="An indenter cannot measure it.")
+    ] = 0.4,
     density: Annotated[
-        float, typer.Option(parser=_quantity("kg/m^3"), metavar="DENSITY", help="Not told by an indenter.")
+        float,
+        typer.Option(parser=_quantity("kg/m^3"), metavar="DENSITY", help="An indenter cannot measure it."),
     ] = 1000.0,
     two_parameters: Annotated[
         bool, typer.Option("--two-parameters", help="Fit a stiffening beside the neo-Hookean modulus.")
