@@ -23,8 +23,10 @@ _TABOR = 0.2
 """Representative strain over contact radius over sphere radius (Tabor, The Hardness of Metals, 1951)."""
 _NO_DENSITY = 0.0
 """Nothing moves of itself here."""
-_LARGEST_CONTACT = 1.0
-"""Contact radius over thickness up to which the series for a layer is trusted."""
+_LARGEST_CONTACT = 0.5
+"""Contact radius over thickness up to which the force on a layer is within 3 % of finite elements
+(docs/decisions/0073-calibrated-tissue.md).
+"""
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,9 @@ class Indenter:
         contact = np.sqrt(self.radius * max(deepest, 0.0))
         if self.thickness is not None and contact > _LARGEST_CONTACT * self.thickness:
             raise RecordingError(
-                f"the layer of {self.thickness * 1e3:.3g} mm is thinner than the contact's radius,"
-                f" {contact * 1e3:.3g} mm at the deepest: press less deep, or with a smaller sphere"
+                f"the layer of {self.thickness * 1e3:.3g} mm is too thin for a contact of radius"
+                f" {contact * 1e3:.3g} mm, at most {_LARGEST_CONTACT:g} of it is allowed: press less deep, or"
+                " with a smaller sphere"
             )
 
 

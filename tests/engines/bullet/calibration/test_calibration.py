@@ -42,6 +42,24 @@ def test_the_force_grows_with_the_depth(ratio, radius):
     assert deep > shallow >= 0.0
 
 
+@pytest.mark.parametrize(
+    ("nu", "thickness_mm", "more"),
+    [
+        (0.3, 8, [1.320, 1.485, 1.603]),
+        (0.4, 8, [1.363, 1.556, 1.706]),
+        (0.4, 12, [1.217, 1.316, 1.392]),
+        (0.4, 20, [1.117, 1.166, 1.198]),
+        (0.45, 12, [1.234, 1.344, 1.428]),
+    ],
+)
+def test_a_layer_is_stiffer_than_a_half_space_as_finite_elements_say(nu, thickness_mm, more):
+    """A bonded neo-Hookean layer under a sphere of 5 mm, 1, 2 and 3 mm deep: axisymmetric finite elements."""
+    depth = np.array([1e-3, 2e-3, 3e-3])
+    layer, thick = (Indenter("sphere", 5e-3, t, nu) for t in (thickness_mm * 1e-3, None))
+    found = elastic_force(layer, depth, 1e4, 0.0) / elastic_force(thick, depth, 1e4, 0.0)
+    assert np.allclose(found, more, rtol=0.03)
+
+
 @pytest.mark.parametrize(("depth_mm", "converged_n"), [(1, 0.0317), (2, 0.101), (3, 0.192)])
 def test_a_layer_has_the_force_of_converged_finite_elements(depth_mm, converged_n):
     """On a block of 80 x 60 x 20 mm, 10 kPa, whose top its own weight lowers."""
@@ -138,7 +156,7 @@ def test_what_the_data_does_not_tell_has_a_large_deviation():
     ("indenter", "message"),
     [
         (Indenter("sphere", 1.5e-3), "allowed up to 2 radii"),
-        (Indenter("sphere", 8e-3, 4e-3), "thinner than the contact's radius"),
+        (Indenter("sphere", 8e-3, 4e-3), "too thin for a contact"),
         (Indenter("punch", 5e-3, 2e-2), "for a sphere only"),
     ],
 )
