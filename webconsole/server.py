@@ -13,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from hub.recording.recording import Recording
 from schemas.errors import TrocarError
@@ -29,6 +30,14 @@ __all__ = ["Server"]
 _MOST_PAGES = 16
 _MOST_BUCKETS = 4000
 _BINARY = "application/octet-stream"
+
+
+class _WebSocket(WebSocketsSansIOProtocol):
+    """uvicorn's; its `shutdown` (0.54) fails, and the server's with it, while a page is closing itself."""
+
+    def shutdown(self) -> None:
+        if not self.transport.is_closing():
+            super().shutdown()
 
 
 class Server:
@@ -58,7 +67,7 @@ class Server:
                 log_level="warning",
                 access_log=False,
                 lifespan="off",
-                ws="websockets-sansio",
+                ws=_WebSocket,
                 ws_max_size=MOST_BYTES,
                 ws_per_message_deflate=False,
                 ws_ping_interval=5.0,

@@ -1,8 +1,10 @@
 """Where pages are served: the next free port of loopback, and to other machines by TLS alone."""
 
+import base64
 import http.client
 import json
 import logging
+import socket
 import ssl
 
 import pytest
@@ -10,7 +12,7 @@ from typer.testing import CliRunner
 
 from hub.command_line.certs import app as certs
 from schemas.errors import ConnectError, ScenarioError
-from tests.webconsole.conftest import served
+from tests.webconsole.conftest import served, until
 from tests.webconsole.recorded_scene import write_scene
 from tests.webconsole.test_browser import Person
 from tests.webconsole.test_gate import Visitor
@@ -92,6 +94,35 @@ def test_without_tls_or_with_another_authority_there_is_no_answer(visitor, tmp_p
     other = made_by_command(tmp_path / "other", "127.0.0.1")
     with pytest.raises(ssl.SSLCertVerificationError):
         Visitor(visitor.server, ssl.create_default_context(cafile=other / "ca.pem")).get()
+
+
+def connects(port):
+    try:
+        socket.create_connection(("127.0.0.1", port), timeout=10).close()
+    except ConnectionRefusedError:
+        return False
+    return True
+
+
+def test_it_ends_while_a_page_is_closing(certificates, recording):
+    """The page has said that it closes, and its TLS is not yet closed."""
+    listening = with_tls("tls/0.0.0.0:0", certificates)
+    with served(Recorded(recording), listening=listening) as server:
+        visitor = Visitor(server, ssl.create_default_context(cafile=certificates / "ca.pem")).admit()
+        plain = socket.create_connection(("127.0.0.1", server.port), timeout=10)
+        page = visitor.tls.wrap_socket(plain, server_hostname="127.0.0.1")
+        head = {"Host": visitor.host, "Origin": f"https://{visitor.host}", "Cookie": visitor.cookie}
+        head |= {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}
+        head["Sec-WebSocket-Key"] = base64.b64encode(bytes(16)).decode()
+        lines = ["GET /page HTTP/1.1", *(f"{name}: {value}" for name, value in head.items()), "", ""]
+        page.sendall("\r\n".join(lines).encode())
+        assert page.recv(64).startswith(b"HTTP/1.1 101")
+        page.sendall(bytes((0x88, 0x80, 0, 0, 0, 0)))  # a masked close frame
+        while page.recv(4096):  # until the server has answered and closes
+            pass
+        server.stop()
+        until(lambda: not connects(server.port))
+        page.close()
 
 
 @pytest.mark.parametrize(
