@@ -18,8 +18,8 @@ from bench.indentation import places
 from engines.bullet.elasticity.stable_step import face_loss, highest_frequency
 from engines.bullet.params import BulletParams
 from schemas.vectors import Vector
+from tests.engines.bullet import rig
 from tests.engines.bullet.finite_elements import Body
-from tests.engines.bullet.rig import Rig
 
 PHASES = (1.2, 1.6, 2.0, 2.5, 3.0, 3.5, 3.9)
 RADII_M = (2e-3, 5e-3)
@@ -30,9 +30,7 @@ STEP_S = 1e-3
 def params(young_modulus: float, radius: float) -> BulletParams:
     """Return the block of this modulus (Pa) and its probe of `radius` (m)."""
     organ = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": young_modulus, "nodes": 250}
-    return BulletParams.model_validate(
-        {"organs": {"block": organ}, "probes": {"probe": {"radius": radius}}, "timestep": STEP_S}
-    )
+    return rig.params(organ, {"radius": radius}, timestep=STEP_S)
 
 
 def modulus(phase: float) -> float:
@@ -47,12 +45,12 @@ def errors(phase: float, radius: float, place: str) -> list[float]:
     model = params(modulus(phase), radius)
     at, body = places(model)[place], Body(model.organs["block"])
     found: list[float] = []
-    with Rig(model, start=(*at, radius + 1e-3)) as rig:
+    with rig.Rig(model, start=(*at, radius + 1e-3)) as probe:
         for depth in DEPTHS_M:
-            rig.move((*at, radius - depth), 0.06)
-            rig.hold(0.2)
+            probe.move((*at, radius - depth), 0.06)
+            probe.hold(0.2)
             true = body.press([[*at, radius - depth]], [radius])[0, 2]
-            found.append(float(rig.force[2] / true - 1.0))
+            found.append(float(probe.force[2] / true - 1.0))
     return found
 
 
