@@ -17,6 +17,7 @@ from engines.bullet.probes.contact_gain import CONTACT_PERIOD_NS, Contacts, Tiss
 from engines.bullet.probes.grasp import Grasp, grasp_ports, nothing_held
 from engines.bullet.probes.params import Coupling, ProbeParams
 from engines.bullet.probes.probe import Probe
+from engines.bullet.probes.sub_grid import SubGrid, Surface, has_sub_grid
 from engines.bullet.world import connect, disconnect
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError
@@ -61,6 +62,7 @@ class BulletEngine(Stepped):
         self._organs: list[Organ] = []
         self._probes: list[Probe] = []
         self._grasps: list[Grasp] = []
+        self._sub_grids: list[tuple[Probe, SubGrid]] = []
         self._unused: dict[str, Value] = {}
         """Outputs of the probes that might grasp, but are not bonded."""
 
@@ -110,9 +112,10 @@ class BulletEngine(Stepped):
             if plan := setup.bonds.get(bond.name):
                 probe = self.params.probes[bond.name]
                 self._probes.append(
-                    Probe(probe, self._coupling(probe), bond, plan, self.params.gravity, client)
+                    Probe(probe, self._coupling(bond.name), bond, plan, self.params.gravity, client)
                 )
         self._read_nodes(0)
+        self._add_sub_grid()
         self._contacts = Contacts([self._tissue(organ) for organ in self._organs])
         outputs = self._nodes(0)
         self._unused = {
@@ -146,6 +149,8 @@ class BulletEngine(Stepped):
             self._read_nodes(end)
         if touch:
             self._contacts.update(self._probes)
+            for probe, sub_grid in self._sub_grids:
+                sub_grid.update(probe.positions[0], probe.velocities[0], probe.forces[0])
         outputs = (self._nodes(end) if due else {}) | self._unused
         for probe in probes:
             outputs.update(probe.result(end, seconds))
@@ -177,6 +182,7 @@ class BulletEngine(Stepped):
         self._organs.clear()
         self._probes.clear()
         self._grasps.clear()
+        self._sub_grids.clear()
 
     @property
     def _no_state(self) -> str:
@@ -184,6 +190,16 @@ class BulletEngine(Stepped):
             f"participant '{self.name}': Bullet saves neither positions nor velocities of soft bodies."
             " Re-simulate from the recorded grants instead"
         )
+
+    def _add_sub_grid(self) -> None:
+        """Give probes of one sphere the spring in series, where all organs are anchored and small enough."""
+        single = [probe for probe in self._probes if has_sub_grid(self.params, probe.name)]
+        if not single:
+            return
+        surfaces = [Surface(organ, self.params.organs[organ.name].elastic) for organ in self._organs]
+        for probe in single:
+            probe.sub_grid = SubGrid(float(probe.radii[0]), self._coupling(probe.name), surfaces)
+            self._sub_grids.append((probe, probe.sub_grid))
 
     def _tissue(self, organ: Organ) -> Tissue:
         return Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity)
@@ -196,12 +212,17 @@ class BulletEngine(Stepped):
             for radius in probe.radii.tolist()
         )
 
-    def _coupling(self, probe: ProbeParams) -> Coupling:
-        damping = min(organ.elastic.damping for organ in self.params.organs.values())
-        return probe.coupling(self._contact_stiffness(probe), damping, self.params.timestep * 1e-9)
+    def _coupling(self, probe: str) -> Coupling:
+        params, timestep = self.params.probes[probe], self.params.timestep * 1e-9
+        organs = [organ.elastic for organ in self.params.organs.values()]
+        damping = min(material.damping for material in organs)
+        if has_sub_grid(self.params, probe):
+            stiffest = max(material.contact_stiffness(float(params.radii[0])) for material in organs)
+            return params.coupling(stiffest, damping, timestep, sub_grid=True)
+        return params.coupling(self._contact_stiffness(params), damping, timestep)
 
     def _bond(self, name: str, probe: ProbeParams) -> BondSide:
-        coupling = self._coupling(probe)
+        coupling = self._coupling(name)
         return BondSide(
             name=name,
             side="force",
@@ -258,8 +279,8 @@ class BulletEngine(Stepped):
             raise ScenarioError(
                 f"{where}: node_period {params.node_period} ns is no multiple of the period {period_ns} ns"
             )
-        for name, probe in params.probes.items():
-            longest = self._coupling(probe).longest_step * 1e9
+        for name in params.probes:
+            longest = self._coupling(name).longest_step * 1e9
             if params.timestep > longest * (1.0 + 1e-9):
                 raise ScenarioError(
                     f"{where}, probe '{name}': timestep {params.timestep} ns is above 0.5 sqrt(mass /"

@@ -35,6 +35,13 @@ class BulletParams(Params):
     gravity: Acceleration = Field(
         default=9.80665, ge=0, description="along -z of `world`; default: standard gravity"
     )
+    sub_grid: bool = Field(
+        default=True,
+        description=(
+            "whether a probe of one sphere feels the force of the tissue rather than of its coarse mesh, on"
+            " anchored organs of at most 1200 nodes"
+        ),
+    )
 
     @model_validator(mode="after")
     def _known_parts(self) -> Self:

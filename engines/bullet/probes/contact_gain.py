@@ -23,12 +23,12 @@ from engines.bullet.organs.organ import Organ
 from engines.bullet.probes.probe import Probe
 from schemas.vectors import Vector
 
-__all__ = ["CONTACT_PERIOD_NS", "Contacts", "Tissue", "closest_points", "touched_faces"]
+__all__ = ["BAND_M", "CONTACT_PERIOD_NS", "Contacts", "Tissue", "closest_points", "touched_faces"]
 
 CONTACT_PERIOD_NS = 8_000_000
 """How often the nodes are read to find where probes touch and what force they receive."""
 
-_BAND_M = 6e-4
+BAND_M = 6e-4
 """Faces nearer to the sphere than this may share its force; the first guess is that the nearest bears most.
 """
 
@@ -162,7 +162,7 @@ def touched_faces(
 
 def _touches(tissue: Tissue, probe: Probe, loose: Indices) -> dict[int, _Touch]:
     """Return by number, of the spheres `loose`, those that touch the tissue."""
-    reach = probe.radii[loose] + _BAND_M
+    reach = probe.radii[loose] + BAND_M
     organ = tissue.organ
     pairs, faces, weights, distances = touched_faces(
         probe.positions[loose], reach, organ.nodes, organ.touchable

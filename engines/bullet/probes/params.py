@@ -19,6 +19,11 @@ _STIFFNESS_RATIO = 20.0
 nothing, see `Coupling.reset_time`.
 """
 
+_SUB_GRID_RATIO = 12.0
+"""The same where the mesh's lacking compliance is in series (`sub_grid`): its law counts the coupling's own
+yield. Stiffer, and so heavier, proxies bounce off soft contacts; softer ones follow a quick press worse.
+"""
+
 _STEP_SHARE = 0.5
 """Sub-step times sqrt(k / m): keeps the explicit spring and damper of a proxy well inside stability (explicit
 limit with critical damping: 2 (sqrt(2) - 1)).
@@ -138,17 +143,24 @@ class ProbeParams(BaseModel):
         """Radius (m) of every sphere, shape (n,)."""
         return np.full(self.spheres or 1, self.radius, dtype=np.float64)
 
-    def coupling(self, contact_stiffness: float, contact_damping: float, timestep: float) -> Coupling:
+    def coupling(
+        self, contact_stiffness: float, contact_damping: float, timestep: float, *, sub_grid: bool = False
+    ) -> Coupling:
         """Return what is stated, and the rest by rule from the tissue and the sub-step (s).
 
         contact_stiffness: k_c of the tissue, N/m. contact_damping: its ratio d of damping to stiffness, s. A
         spring with reset gives back more than it took, in cycles of frequency w at most the share w T k_c /
-        k; the tissue's damping takes up w d. So there is a reset where T <= 0.5 d k / k_c.
+        k; the tissue's damping takes up w d. So there is a reset where T <= 0.5 d k / k_c. None with
+        `sub_grid`, whose law counts what the spring yields.
         """
-        stiffness = self.stiffness or _STIFFNESS_RATIO * contact_stiffness
+        ratio = _SUB_GRID_RATIO if sub_grid else _STIFFNESS_RATIO
+        stiffness = self.stiffness or ratio * contact_stiffness
         mass = self.mass or stiffness * (timestep / _STEP_SHARE) ** 2
         reset = _RESET_SHARE * sqrt(mass / stiffness)
         passive = reset <= _PASSIVE_SHARE * contact_damping * stiffness / contact_stiffness
         return Coupling(
-            stiffness, mass, self.damping or 2.0 * sqrt(stiffness * mass), reset if passive else None
+            stiffness,
+            mass,
+            self.damping or 2.0 * sqrt(stiffness * mass),
+            reset if passive and not sub_grid else None,
         )

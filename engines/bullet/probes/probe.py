@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from engines.bullet.probes.params import Coupling, ProbeParams
@@ -10,6 +12,9 @@ from hub.participant import BondPlan, ForceSide, Inputs
 from schemas.errors import SessionError
 from schemas.ports import BondSide
 from schemas.vectors import Vector
+
+if TYPE_CHECKING:
+    from engines.bullet.probes.sub_grid import SubGrid
 
 __all__ = ["Probe"]
 
@@ -79,6 +84,8 @@ class Probe:
         self._dt, self._velocities_before = 1.0, self.velocities  # of and before the last sub-step
         self._reset = np.zeros((n, 3))  # force of the spring when the proxy is at its target
         self._reset_rate = 1.0 / coupling.reset_time if coupling.reset_time else 0.0
+        self.sub_grid: SubGrid | None = None
+        """What the only sphere's mesh lacks in compliance; with it the coupling needs no reset."""
         self._placed = False
         self._client = client
         self.bodies: list[int] = [self._sphere(radius) for radius in self.radii.tolist()]
@@ -114,8 +121,10 @@ class Probe:
     def push(self, tau: float, dt: float) -> None:
         """Apply the coupling forces of the sub-step of `dt` seconds around `tau`, taken at its middle."""
         self._stretch(tau, 0.5 * dt)
+        if self.sub_grid is not None:
+            self.sub_grid.give_way(self._springs[0], self._dampers[0], dt, keep=True)
         self._side.add(self._spring, self._damper, tau, dt)
-        if self._reset_rate:
+        if self._reset_rate and self.sub_grid is None:
             self._reset += self._reset_rate * dt * (self._springs - self._reset)
         self._applied = self.gains[:, None] * (self._springs + self._dampers)
         apply, frame, client = self._apply, self._frame, self._client
@@ -143,6 +152,8 @@ class Probe:
         turned.
         """
         self._stretch(h, 0.0)
+        if self.sub_grid is not None:
+            self.sub_grid.give_way(self._springs[0], self._dampers[0], 0.5 * self._dt, keep=False)
         if not np.isfinite(self._spring).all():
             sphere = int(np.flatnonzero(~np.isfinite(self._springs).all(axis=1))[0])
             raise SessionError(
@@ -159,8 +170,9 @@ class Probe:
 
     @property
     def state(self) -> tuple[Vector, ...]:
-        """Positions, velocities, gains and the state of the bond."""
-        return self.positions, self.velocities, self.gains, self.corrections, self._reset, self._side.state
+        """Positions, velocities, gains, the state of the bond, and of the spring in series."""
+        own = self.positions, self.velocities, self.gains, self.corrections, self._reset, self._side.state
+        return own if self.sub_grid is None else (*own, self.sub_grid.state)
 
     def _stretch(self, tau: float, ahead: float) -> None:
         """Set spring and damper `tau` seconds into the step.

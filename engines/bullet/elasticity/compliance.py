@@ -1,0 +1,123 @@
+"""How far the surface of an anchored mesh gives way under a force: that of the mesh, and that of its body.
+
+A coarse mesh gives way too little under a small sphere, and rightly where its whole body bends. So the body is
+taken as a half-space at the place of the force plus what its other boundaries change, and that is smooth
+enough for the coarse mesh: Boussinesq's field is cancelled at the free faces and at the anchored nodes (the
+method of superposition, as for image forces).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.bullet.elasticity.half_space import point_displacement, point_stress
+from engines.bullet.elasticity.material import Material
+from engines.bullet.meshing.tet_mesh import Indices, TetMesh
+from schemas.vectors import Vector
+
+__all__ = ["MOST_NODES", "SurfaceCompliance"]
+
+MOST_NODES = 1200
+"""The compliance of all nodes is a dense matrix: of so many it has 100 MB and takes some seconds."""
+
+_DIGITS = 6
+"""Significant digits that are kept, so that the rounding of a sum in another order does not matter."""
+
+_POINTS: Vector = np.array([[2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]])
+"""Barycentric coordinates of the points, of equal weight, that integrate a quadratic function over a face
+(Strang and Fix, An Analysis of the Finite Element Method, 1973).
+"""
+
+
+class SurfaceCompliance:
+    """Of the surface of an anchored mesh, linear, about its resting shape."""
+
+    def __init__(self, mesh: TetMesh, anchored: NDArray[np.bool_], faces: Indices, material: Material) -> None:
+        """Take the mesh, which nodes are anchored, shape (n,), and the faces that are free, shape (f, 3).
+
+        At most `MOST_NODES` nodes, of which some are anchored.
+        """
+        stiffness = _stiffness(mesh, material)
+        free, fixed = (np.flatnonzero(np.repeat(which, 3)) for which in (~anchored, anchored))
+        inverse: Vector = np.zeros_like(stiffness)
+        inverse[np.ix_(free, free)] = np.linalg.inv(stiffness[np.ix_(free, free)])
+        self._surface = surface = np.unique(faces)
+        self._place = np.zeros(len(mesh.nodes), dtype=np.int64)
+        self._place[surface] = np.arange(len(surface))
+        blocks = inverse.reshape(len(mesh.nodes), 3, len(mesh.nodes), 3)
+        self._between = _rounded(blocks[np.ix_(surface, range(3), surface, range(3))].transpose(0, 2, 1, 3))
+        tied = stiffness[:, fixed]
+        self._body = np.zeros(len(surface))
+        for i, (node, inward) in enumerate(zip(surface, -_normals(mesh, faces, surface), strict=True)):
+            if anchored[node]:
+                continue
+            held = -point_displacement(mesh.nodes[anchored] - mesh.nodes[node], inward, material).ravel()
+            load = _cancelling(mesh.nodes, faces, int(node), inward, material).ravel() - tied @ held
+            self._body[i] = inward @ blocks[node].reshape(3, -1) @ load
+        self._body = _rounded(self._body)
+
+    def of_mesh(self, nodes: Indices, inward: Vector) -> Vector:
+        """Return how far 1 N on one of the surface's `nodes`, shape (k,), moves another one, in m, shape (k, k).
+
+        Force and motion are those along `inward`, shape (3,).
+        """
+        at = self._place[nodes]
+        between = self._between[np.ix_(at, at)].reshape(-1, 9) @ np.outer(inward, inward).ravel()
+        return between.reshape(len(at), len(at))
+
+    def of_body(self, nodes: Indices, parts: Vector) -> float:
+        """Return how much farther than a half-space the body gives way under a force of 1 N, in m.
+
+        The force is perpendicular to the surface, near `nodes`, shape (k,), as the `parts` say. Below 0 where
+        the body is anchored close behind.
+        """
+        return float(parts @ self._body[self._place[nodes]])
+
+
+def _rounded(values: Vector) -> Vector:
+    """Return values rounded to `_DIGITS` of the largest one."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return values if largest == 0.0 else np.round(values / largest, _DIGITS) * largest
+
+
+def _stiffness(mesh: TetMesh, material: Material) -> Vector:
+    """Return the stiffness (N/m) of linear tetrahedra at rest, shape (3 n, 3 n)."""
+    tetrahedra, size = mesh.tetrahedra, 3 * len(mesh.nodes)
+    edges = mesh.nodes[tetrahedra[:, 1:]] - mesh.nodes[tetrahedra[:, :1]]
+    inverse = np.linalg.inv(edges)
+    gradients = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2).transpose(0, 2, 1)
+    mu, lambda_ = material.lame
+    dyads = np.einsum("mai,mbj->maibj", gradients, gradients)
+    blocks = lambda_ * dyads + mu * dyads.transpose(0, 1, 4, 3, 2)
+    blocks += mu * np.einsum("maibi,jk->majbk", dyads, np.eye(3))
+    blocks *= (np.linalg.det(edges) / 6.0)[:, None, None, None, None]
+    places = (3 * tetrahedra[:, :, None] + np.arange(3)).reshape(-1, 12)
+    cells = (places[:, :, None] * size + places[:, None, :]).ravel()
+    return np.bincount(cells, blocks.ravel(), size * size).reshape(size, size)
+
+
+def _normals(mesh: TetMesh, faces: Indices, surface: Indices) -> Vector:
+    """Return the outward normals at the nodes `surface`, by the areas of their faces, shape (k, 3)."""
+    corners = mesh.nodes[faces]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = np.stack(
+        [np.bincount(faces.ravel(), np.repeat(areas[:, i], 3), len(mesh.nodes)) for i in range(3)], axis=1
+    )[surface]
+    return sums / np.linalg.norm(sums, axis=1)[:, None]
+
+
+def _cancelling(nodes: Vector, faces: Indices, node: int, inward: Vector, material: Material) -> Vector:
+    """Return the forces (N) that free the faces of the stress of 1 N along `inward` on a node, shape (n, 3).
+
+    Those of the faces around the node itself are left out: they are the surface of the half-space.
+    """
+    others = faces[(faces != node).all(axis=1)]
+    corners = nodes[others]
+    areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    points = np.einsum("qa,fai->fqi", _POINTS, corners)
+    stress = point_stress((points - nodes[node]).reshape(-1, 3), inward, material).reshape(*points.shape, 3)
+    forces = -np.einsum("fqij,fj,qa->fai", stress, areas, _POINTS) / len(_POINTS)
+    return np.stack(
+        [np.bincount(others.ravel(), forces[:, :, i].ravel(), len(nodes)) for i in range(3)], axis=1
+    )

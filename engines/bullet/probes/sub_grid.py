@@ -1,0 +1,212 @@
+"""A spring in series with the virtual coupling: the compliance that a coarse mesh lacks under a small sphere.
+
+Where a sphere of a few millimetres presses a mesh with edges of as many, the mesh cannot form the dent, and
+its force is a multiple of the tissue's. The missing yield is known: the tissue's at a force is that of a
+half-space (`elasticity/half_space.py`) and of what the other boundaries of the body change
+(`elasticity/compliance.py`); the mesh's own is that of its linear compliance at the place, times a ratio that
+is measured while it is pressed. Their difference is a nonlinear spring along the normal of the surface, in
+series with spring and damper of the coupling. See docs/decisions/0086-force-of-tissue.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from engines.bullet.elasticity.compliance import MOST_NODES, SurfaceCompliance
+from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
+from engines.bullet.elasticity.material import Material
+from engines.bullet.meshing.tet_mesh import Indices
+from engines.bullet.organs.organ import Organ
+from engines.bullet.params import BulletParams
+from engines.bullet.probes.contact_gain import BAND_M, CONTACT_PERIOD_NS, closest_points, touched_faces
+from engines.bullet.probes.params import Coupling
+from schemas.vectors import Vector
+
+__all__ = ["SubGrid", "Surface", "has_sub_grid"]
+
+_GRID = 160
+"""Points of the spring's law; they are close together at small forces, where it is steep."""
+
+_GRID_DEPTH = 2.0 * DEEPEST
+"""Depth in radii up to which the law goes on; beyond `DEEPEST` with the last share of Hertz's force."""
+
+_NEAR_M = 1e-3
+"""How far before the surface the spring is ready, beside the way of two readings."""
+
+_FILTER = 0.2
+"""Share of the way to the measured ratio gone at each reading: a time constant of 36 ms."""
+
+_LEAST_FORCE_N = 5e-3
+"""Below this the inertia of the touched nodes counts in what the mesh yields."""
+
+_SPREAD_POWER = 2.0 / 3.0
+_MOST_SPREAD = 2.0
+_RATIOS = (0.2, 2.0)
+"""Limits of the ratio."""
+
+
+def has_sub_grid(params: BulletParams, probe: str) -> bool:
+    """Return whether a probe gets the spring: it is one sphere, and every organ is one that it can press."""
+    given = params.probes[probe]
+    return (
+        params.sub_grid
+        and given.spheres in (None, 1)
+        and given.grasp is None
+        and all(
+            len(organ.rest.nodes) <= MOST_NODES and any(which.any() for which in organ.anchored_nodes.values())
+            for organ in params.organs.values()
+        )
+    )
+
+
+class Surface:
+    """The surface of an anchored organ at rest under its weight, and its compliance."""
+
+    def __init__(self, organ: Organ, material: Material) -> None:
+        """Take an organ that has settled."""
+        self.organ, self.material = organ, material
+        self.settled = organ.nodes
+        self.compliance = SurfaceCompliance(organ.mesh, organ.anchored, organ.touchable, material)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a sphere touches a surface, or is about to."""
+
+    surface: Surface
+    nodes: Indices
+    """Of the faces, shape (k,)."""
+    parts: Vector
+    """Of the force that fall to each, shape (k,); they sum to 1."""
+    first_parts: Vector
+    """The same where the force begins: the sphere has not sunk in and touches one face, shape (k,)."""
+    point: Vector
+    """Of the settled surface, m, shape (3,)."""
+    inward: Vector
+    """Its normal into the tissue, shape (3,)."""
+    distance: float
+    """Of the sphere's centre from the nearest face, m."""
+
+
+class SubGrid:
+    """The spring of one sphere: how far it has yielded, and its law where the sphere is."""
+
+    def __init__(self, radius: float, coupling: Coupling, surfaces: Sequence[Surface]) -> None:
+        self._radius, self._coupling, self._surfaces = radius, coupling, surfaces
+        depths = np.linspace(0.0, 1.0, _GRID) ** 2 * _GRID_DEPTH * radius
+        self._depths = depths
+        self._half_space = {
+            id(surface): sphere_force(depths, radius, surface.material) for surface in surfaces
+        }
+        self.yielded = 0.0
+        """How far the spring is compressed, m."""
+        self.inward = np.zeros(3)
+        """Its direction, in `world`, shape (3,); zeros: it is rigid, as nothing is near."""
+        self.ratio = 1.0
+        """What the mesh yields, over its linear compliance times the force."""
+        self._forces = self._yields = np.zeros(1)
+        self._speed = 0.0
+        self._is_new = False
+
+    @property
+    def state(self) -> Vector:
+        """Yield, direction, ratio, and the law's last point, shape (7,)."""
+        last = [self._forces[-1], self._yields[-1]]
+        return np.array([self.yielded, *self.inward, self.ratio, *last])
+
+    def give_way(self, spring: Vector, damper: Vector, since: float, *, keep: bool) -> None:
+        """Take from the forces (N, shape (3,)) of a rigid coupling what the spring in series spares them.
+
+        since: s since its yield was last kept. The yield s follows from S(s) = k (e - s) + b (e' - s'), with
+        the law S, the stretch e along the normal, and s' = (s - s_before) / since.
+        """
+        coupling, inward = self._coupling, self.inward
+        rate = 0.0 if self._is_new else coupling.damping / since
+        known = rate * self.yielded if rate else -coupling.damping * self._speed
+        pressed = float(inward @ spring + inward @ damper) + known
+        stiff = coupling.stiffness + rate
+        yielded = float(np.interp(pressed, stiff * self._yields + self._forces, self._yields))
+        speed = (yielded - self.yielded) / since if rate else self._speed
+        spring -= coupling.stiffness * yielded * inward
+        damper -= coupling.damping * speed * inward
+        if keep:
+            self.yielded, self._speed, self._is_new = yielded, speed, False
+
+    def update(self, centre: Vector, velocity: Vector, force: Vector) -> None:
+        """Take the law of the place where the sphere is; the organs' nodes have just been read.
+
+        Args:
+            centre: of the sphere, m, in `world`, shape (3,).
+            velocity: m/s, shape (3,).
+            force: of the coupling on it, N, shape (3,).
+        """
+        reach = self._radius + _NEAR_M + 2e-9 * CONTACT_PERIOD_NS * float(np.sqrt(velocity @ velocity))
+        places = [place for one in self._surfaces if (place := self._place(one, centre, reach)) is not None]
+        if not places:
+            self.yielded, self.inward, self.ratio, self._speed = 0.0, np.zeros(3), 1.0, 0.0
+            self._forces = self._yields = np.zeros(1)
+            return
+        place = min(places, key=lambda one: one.distance)
+        touches = place.distance < self._radius + BAND_M
+        if touches and self.inward.any():
+            mixed = self.inward + _FILTER * (place.inward - self.inward)
+            self.inward = mixed / np.sqrt(mixed @ mixed)
+        else:
+            self.inward, self.ratio = place.inward, 1.0
+        between = place.surface.compliance.of_mesh(place.nodes, self.inward)
+        pressed = max(float(force @ self.inward), _LEAST_FORCE_N)
+        if touches and pressed > _LEAST_FORCE_N:
+            depth = self._radius + float((centre - place.point) @ self.inward)
+            own = float(place.parts @ between @ place.parts)
+            measured = min(max(depth / (own * pressed), _RATIOS[0]), _RATIOS[1])
+            self.ratio += _FILTER * (measured - self.ratio)
+        self._take_law(place, between, pressed)
+
+    def _take_law(self, place: _Place, between: Vector, pressed: float) -> None:
+        """Set yields and forces: the body's depth at a force, less what mesh and coupling yield.
+
+        `between`: compliance of the nodes (m/N). `pressed`: the force (N) at which the parts are those of now.
+        """
+        self._is_new = True
+        self._forces = forces = self._half_space[id(place.surface)]
+        spread = np.minimum(forces / pressed, _MOST_SPREAD) ** _SPREAD_POWER
+        more = place.parts - place.first_parts
+        mesh = place.first_parts @ between @ place.first_parts + spread * (
+            2.0 * float(place.first_parts @ between @ more) + spread * float(more @ between @ more)
+        )
+        body = place.surface.compliance.of_body(place.nodes, place.parts)
+        missing = self._depths + (body - self.ratio * mesh - 1.0 / self._coupling.stiffness) * forces
+        self._yields = np.maximum.accumulate(np.maximum(missing, 0.0))
+
+    def _place(self, surface: Surface, centre: Vector, reach: float) -> _Place | None:
+        _, faces, weights, distances = touched_faces(
+            centre[None], np.array([reach]), surface.organ.nodes, surface.organ.touchable
+        )
+        if not len(faces):
+            return None
+        nearest = float(distances.min())
+        share = np.maximum(self._radius + BAND_M - distances, 0.0)
+        if not share.any():
+            share[distances.argmin()] = 1.0
+        share /= share.sum()
+        corners = surface.settled[faces]
+        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal = share @ (areas / np.sqrt((areas * areas).sum(axis=1))[:, None])
+        nodes, place = np.unique(faces, return_inverse=True)
+        place = place.reshape(-1, 3)
+        weighted = share[:, None] * weights
+        point = np.einsum("fa,fai->i", weighted, corners)
+        at, away = closest_points(point, corners)
+        first = int(away.argmin())
+        return _Place(
+            surface,
+            nodes,
+            np.bincount(place.ravel(), weighted.ravel(), len(nodes)),
+            np.bincount(place[first], at[first], len(nodes)),
+            point,
+            -normal / np.sqrt(normal @ normal),
+            nearest,
+        )
