@@ -55,6 +55,7 @@ def params(nodes: int, radius: float) -> BulletParams:
         {
             "organs": {"block": organ},
             "probes": {"probe": {"radius": radius}},
+            "sub_grid": False,
             "timestep": TIMESTEP_S.get(nodes, 0.5e-3),
         }
     )

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from engines.bullet.elasticity.half_space import DEEPEST
 from engines.bullet.elasticity.stable_step import ACCURATE_PHASE, face_loss, longest_step
 from engines.bullet.organs.anchors import add_rigid
 from engines.bullet.organs.organ import Organ
@@ -17,7 +18,7 @@ from engines.bullet.probes.contact_gain import CONTACT_PERIOD_NS, Contacts, Tiss
 from engines.bullet.probes.grasp import Grasp, grasp_ports, nothing_held
 from engines.bullet.probes.params import Coupling, ProbeParams
 from engines.bullet.probes.probe import Probe
-from engines.bullet.probes.sub_grid import SubGrid, Surface, has_sub_grid
+from engines.bullet.probes.sub_grid import SubGrid, Surface
 from engines.bullet.world import connect, disconnect
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError
@@ -150,7 +151,7 @@ class BulletEngine(Stepped):
         if touch:
             self._contacts.update(self._probes)
             for probe, sub_grid in self._sub_grids:
-                sub_grid.update(probe.positions[0], probe.velocities[0], probe.forces[0])
+                self._follow(probe, sub_grid)
         outputs = (self._nodes(end) if due else {}) | self._unused
         for probe in probes:
             outputs.update(probe.result(end, seconds))
@@ -193,13 +194,22 @@ class BulletEngine(Stepped):
 
     def _add_sub_grid(self) -> None:
         """Give probes of one sphere the spring in series, where all organs are anchored and small enough."""
-        single = [probe for probe in self._probes if has_sub_grid(self.params, probe.name)]
+        single = [probe for probe in self._probes if self.params.has_sub_grid(probe.name)]
         if not single:
             return
         surfaces = [Surface(organ, self.params.organs[organ.name].elastic) for organ in self._organs]
         for probe in single:
             probe.sub_grid = SubGrid(float(probe.radii[0]), self._coupling(probe.name), surfaces)
             self._sub_grids.append((probe, probe.sub_grid))
+
+    def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:
+        sub_grid.update(probe.positions[0], probe.velocities[0], probe.forces[0])
+        if sub_grid.is_beyond:
+            _warn_once(
+                f"participant '{self.name}', probe '{probe.name}': it pressed deeper than {DEEPEST:g} radii,"
+                f" {DEEPEST * float(probe.radii[0]) * 1e3:.3g} mm, up to which the force of tissue is known;"
+                " beyond, it is extrapolated. Press less deep, or with a larger sphere"
+            )
 
     def _tissue(self, organ: Organ) -> Tissue:
         return Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity)
@@ -216,7 +226,7 @@ class BulletEngine(Stepped):
         params, timestep = self.params.probes[probe], self.params.timestep * 1e-9
         organs = [organ.elastic for organ in self.params.organs.values()]
         damping = min(material.damping for material in organs)
-        if has_sub_grid(self.params, probe):
+        if self.params.has_sub_grid(probe):
             stiffest = max(material.contact_stiffness(float(params.radii[0])) for material in organs)
             return params.coupling(stiffest, damping, timestep, sub_grid=True)
         return params.coupling(self._contact_stiffness(params), damping, timestep)
@@ -233,7 +243,9 @@ class BulletEngine(Stepped):
             damping=coupling.damping,
             proxy_mass=coupling.mass,
             proxy_step=self.params.timestep * 1e-9,
-            contact_stiffness=self._contact_stiffness(probe),
+            contact_stiffness=(
+                coupling.stiffness if self.params.has_sub_grid(name) else self._contact_stiffness(probe)
+            ),
         )
 
     def _nodes(self, t: int) -> dict[str, Value]:

@@ -6,6 +6,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
+from engines.bullet.elasticity.compliance import MOST_NODES
 from engines.bullet.organs.anchors import WORLD, RigidParams
 from engines.bullet.organs.params import OrganParams
 from engines.bullet.probes.params import ProbeParams
@@ -42,6 +43,20 @@ class BulletParams(Params):
             " anchored organs of at most 1200 nodes"
         ),
     )
+
+    def has_sub_grid(self, probe: str) -> bool:
+        """Return whether a probe feels the tissue's force: it is one sphere, and may press every organ so."""
+        given = self.probes[probe]
+        return (
+            self.sub_grid
+            and given.spheres in (None, 1)
+            and given.grasp is None
+            and all(
+                len(organ.rest.nodes) <= MOST_NODES
+                and any(tied.any() for tied in organ.anchored_nodes.values())
+                for organ in self.organs.values()
+            )
+        )
 
     @model_validator(mode="after")
     def _known_parts(self) -> Self:

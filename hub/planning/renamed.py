@@ -1,4 +1,7 @@
-"""Old names, from version 0.1.0: scenarios may use them in this release, recordings at any time."""
+"""Old names and defaults, from version 0.1.0: names may be used in scenarios of this release.
+
+Recordings are read with both at any time.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,8 @@ _KINDS = {"console": "dvrk-console", "paper": "vrep"}
 _PARTICIPANT_KEYS = {"link": "network_link"}
 _PARAMETER_VALUES = {"profile": {"paper": "vrep"}}
 """By parameter: the old value and the new one, for every kind that accepts only the new one."""
+_EARLIER_DEFAULTS = {"0.1.0": {"bullet": {"sub_grid": False}}}
+"""By version and kind: what a parameter that came later is to be, so that a recording is verified."""
 _EVENT_PORTS = {"mirror": ("distance", "lag")}
 """By kind: the last parts of the names of ports that were signals, and whose values are events now."""
 
@@ -72,9 +77,13 @@ def _warn(source: Source, path: Location, renamed: str, warned: set[str], *, key
         log.warning(source.line(path, f"{renamed}; this release still accepts the old name", key=key))
 
 
-def current_names(scenario: dict[str, Any]) -> dict[str, Any]:
-    """Return a recorded scenario in the names of this version."""
-    participants = {name: _current_participant(spec) for name, spec in scenario["participants"].items()}
+def current_names(scenario: dict[str, Any], version: str = "") -> dict[str, Any]:
+    """Return a scenario that Trocar of `version` recorded, in the names of this version."""
+    defaults = _EARLIER_DEFAULTS.get(version, {})
+    participants = {
+        name: defaults.get(spec["kind"], {}) | _current_participant(spec)
+        for name, spec in scenario["participants"].items()
+    }
     return scenario | {"participants": participants}
 
 

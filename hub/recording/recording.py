@@ -133,7 +133,8 @@ class Recording(Bag):
             raise RecordingError(f"'{self.file}' holds no scenario: it was not recorded by `trocar run`")
         cannot = f"'{self.file}': this version cannot read the scenario in it"
         try:
-            return Scenario.model_validate(current_names(json.loads(self.attachments["scenario.json"])))
+            recorded = json.loads(self.attachments["scenario.json"])
+            return Scenario.model_validate(current_names(recorded, self.versions().get("trocar", "")))
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             path = ".".join(str(part) for part in first["loc"])

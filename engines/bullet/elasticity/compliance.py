@@ -1,7 +1,7 @@
 """How far the surface of an anchored mesh gives way under a force: that of the mesh, and that of its body.
 
-A coarse mesh gives way too little under a small sphere, and rightly where its whole body bends. So the body is
-taken as a half-space at the place of the force plus what its other boundaries change, and that is smooth
+A coarse mesh gives way too little under a small sphere, and rightly where its whole body bends. So the body
+is taken as a half-space at the place of the force plus what its other boundaries change, and that is smooth
 enough for the coarse mesh: Boussinesq's field is cancelled at the free faces and at the anchored nodes (the
 method of superposition, as for image forces).
 """
@@ -33,7 +33,9 @@ _POINTS: Vector = np.array([[2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6
 class SurfaceCompliance:
     """Of the surface of an anchored mesh, linear, about its resting shape."""
 
-    def __init__(self, mesh: TetMesh, anchored: NDArray[np.bool_], faces: Indices, material: Material) -> None:
+    def __init__(
+        self, mesh: TetMesh, anchored: NDArray[np.bool_], faces: Indices, material: Material
+    ) -> None:
         """Take the mesh, which nodes are anchored, shape (n,), and the faces that are free, shape (f, 3).
 
         At most `MOST_NODES` nodes, of which some are anchored.
@@ -46,7 +48,7 @@ class SurfaceCompliance:
         self._place = np.zeros(len(mesh.nodes), dtype=np.int64)
         self._place[surface] = np.arange(len(surface))
         blocks = inverse.reshape(len(mesh.nodes), 3, len(mesh.nodes), 3)
-        self._between = _rounded(blocks[np.ix_(surface, range(3), surface, range(3))].transpose(0, 2, 1, 3))
+        self._between = _rounded(blocks[surface][:, :, surface].transpose(0, 2, 1, 3))
         tied = stiffness[:, fixed]
         self._body = np.zeros(len(surface))
         for i, (node, inward) in enumerate(zip(surface, -_normals(mesh, faces, surface), strict=True)):
@@ -58,9 +60,9 @@ class SurfaceCompliance:
         self._body = _rounded(self._body)
 
     def of_mesh(self, nodes: Indices, inward: Vector) -> Vector:
-        """Return how far 1 N on one of the surface's `nodes`, shape (k,), moves another one, in m, shape (k, k).
+        """Return how far (m) 1 N on one of the surface's `nodes`, shape (k,), moves another one.
 
-        Force and motion are those along `inward`, shape (3,).
+        Force and motion are those along `inward`, shape (3,). The result has the shape (k, k).
         """
         at = self._place[nodes]
         between = self._between[np.ix_(at, at)].reshape(-1, 9) @ np.outer(inward, inward).ravel()
@@ -94,7 +96,7 @@ def _stiffness(mesh: TetMesh, material: Material) -> Vector:
     blocks *= (np.linalg.det(edges) / 6.0)[:, None, None, None, None]
     places = (3 * tetrahedra[:, :, None] + np.arange(3)).reshape(-1, 12)
     cells = (places[:, :, None] * size + places[:, None, :]).ravel()
-    return np.bincount(cells, blocks.ravel(), size * size).reshape(size, size)
+    return np.bincount(cells, blocks.ravel(), size * size).astype(np.float64).reshape(size, size)
 
 
 def _normals(mesh: TetMesh, faces: Indices, surface: Indices) -> Vector:
@@ -118,6 +120,6 @@ def _cancelling(nodes: Vector, faces: Indices, node: int, inward: Vector, materi
     points = np.einsum("qa,fai->fqi", _POINTS, corners)
     stress = point_stress((points - nodes[node]).reshape(-1, 3), inward, material).reshape(*points.shape, 3)
     forces = -np.einsum("fqij,fj,qa->fai", stress, areas, _POINTS) / len(_POINTS)
-    return np.stack(
-        [np.bincount(others.ravel(), forces[:, :, i].ravel(), len(nodes)) for i in range(3)], axis=1
-    )
+    total = np.zeros_like(nodes)
+    np.add.at(total, others, forces)
+    return total

@@ -15,17 +15,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engines.bullet.elasticity.compliance import MOST_NODES, SurfaceCompliance
+from engines.bullet.elasticity.compliance import SurfaceCompliance
 from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
 from engines.bullet.elasticity.material import Material
 from engines.bullet.meshing.tet_mesh import Indices
 from engines.bullet.organs.organ import Organ
-from engines.bullet.params import BulletParams
 from engines.bullet.probes.contact_gain import BAND_M, CONTACT_PERIOD_NS, closest_points, touched_faces
 from engines.bullet.probes.params import Coupling
 from schemas.vectors import Vector
 
-__all__ = ["SubGrid", "Surface", "has_sub_grid"]
+__all__ = ["SubGrid", "Surface"]
 
 _GRID = 160
 """Points of the spring's law; they are close together at small forces, where it is steep."""
@@ -37,29 +36,18 @@ _NEAR_M = 1e-3
 """How far before the surface the spring is ready, beside the way of two readings."""
 
 _FILTER = 0.2
-"""Share of the way to the measured ratio gone at each reading: a time constant of 36 ms."""
+"""Share of the way to a measured value gone at each reading: a time constant of 36 ms."""
 
 _LEAST_FORCE_N = 5e-3
 """Below this the inertia of the touched nodes counts in what the mesh yields."""
 
-_SPREAD_POWER = 2.0 / 3.0
-_MOST_SPREAD = 2.0
+_SPREAD_POWER, _MOST_SPREAD = 2.0 / 3.0, 2.0
+"""How the force spreads from the face that is touched first to those around it: with this power of the force,
+as a contact of Hertz's grows, up to this multiple of the force at which the parts are known.
+"""
+
 _RATIOS = (0.2, 2.0)
 """Limits of the ratio."""
-
-
-def has_sub_grid(params: BulletParams, probe: str) -> bool:
-    """Return whether a probe gets the spring: it is one sphere, and every organ is one that it can press."""
-    given = params.probes[probe]
-    return (
-        params.sub_grid
-        and given.spheres in (None, 1)
-        and given.grasp is None
-        and all(
-            len(organ.rest.nodes) <= MOST_NODES and any(which.any() for which in organ.anchored_nodes.values())
-            for organ in params.organs.values()
-        )
-    )
 
 
 class Surface:
@@ -69,6 +57,7 @@ class Surface:
         """Take an organ that has settled."""
         self.organ, self.material = organ, material
         self.settled = organ.nodes
+        """m, shape (n, 3)."""
         self.compliance = SurfaceCompliance(organ.mesh, organ.anchored, organ.touchable, material)
 
 
@@ -96,40 +85,40 @@ class SubGrid:
 
     def __init__(self, radius: float, coupling: Coupling, surfaces: Sequence[Surface]) -> None:
         self._radius, self._coupling, self._surfaces = radius, coupling, surfaces
-        depths = np.linspace(0.0, 1.0, _GRID) ** 2 * _GRID_DEPTH * radius
-        self._depths = depths
-        self._half_space = {
-            id(surface): sphere_force(depths, radius, surface.material) for surface in surfaces
-        }
+        self._depths: Vector = np.linspace(0.0, 1.0, _GRID) ** 2 * _GRID_DEPTH * radius
+        self._half_spaces = [sphere_force(self._depths, radius, one.material) for one in surfaces]
         self.yielded = 0.0
         """How far the spring is compressed, m."""
         self.inward = np.zeros(3)
         """Its direction, in `world`, shape (3,); zeros: it is rigid, as nothing is near."""
         self.ratio = 1.0
         """What the mesh yields, over its linear compliance times the force."""
+        self.is_beyond = False
+        """Whether the sphere has been deeper than `DEEPEST` radii: there the law is extrapolated."""
+        self._speed: float = 0.0  # of the yield, m/s
+        self._is_new = False  # the law
         self._forces = self._yields = np.zeros(1)
-        self._speed = 0.0
-        self._is_new = False
 
     @property
     def state(self) -> Vector:
-        """Yield, direction, ratio, and the law's last point, shape (7,)."""
-        last = [self._forces[-1], self._yields[-1]]
-        return np.array([self.yielded, *self.inward, self.ratio, *last])
+        """Yield and its speed, direction, ratio, and the last point of the law, shape (8,)."""
+        last = self._forces[-1], self._yields[-1]
+        return np.array([self.yielded, self._speed, *self.inward, self.ratio, *last])
 
     def give_way(self, spring: Vector, damper: Vector, since: float, *, keep: bool) -> None:
         """Take from the forces (N, shape (3,)) of a rigid coupling what the spring in series spares them.
 
         since: s since its yield was last kept. The yield s follows from S(s) = k (e - s) + b (e' - s'), with
-        the law S, the stretch e along the normal, and s' = (s - s_before) / since.
+        the law S, the stretch e along the normal, and s' = (s - s_before) / since. A law that has just been
+        taken keeps s': if it kept s, its force would leap.
         """
         coupling, inward = self._coupling, self.inward
         rate = 0.0 if self._is_new else coupling.damping / since
-        known = rate * self.yielded if rate else -coupling.damping * self._speed
+        known = -coupling.damping * self._speed if self._is_new else rate * self.yielded
         pressed = float(inward @ spring + inward @ damper) + known
         stiff = coupling.stiffness + rate
         yielded = float(np.interp(pressed, stiff * self._yields + self._forces, self._yields))
-        speed = (yielded - self.yielded) / since if rate else self._speed
+        speed = self._speed if self._is_new else (yielded - self.yielded) / since
         spring -= coupling.stiffness * yielded * inward
         damper -= coupling.damping * speed * inward
         if keep:
@@ -144,12 +133,23 @@ class SubGrid:
             force: of the coupling on it, N, shape (3,).
         """
         reach = self._radius + _NEAR_M + 2e-9 * CONTACT_PERIOD_NS * float(np.sqrt(velocity @ velocity))
-        places = [place for one in self._surfaces if (place := self._place(one, centre, reach)) is not None]
+        found = ((self._place(one, centre, reach), forces) for one, forces in self._laws)
+        places = [(place, forces) for place, forces in found if place is not None]
         if not places:
-            self.yielded, self.inward, self.ratio, self._speed = 0.0, np.zeros(3), 1.0, 0.0
+            self.yielded, self._speed, self.inward, self.ratio = 0.0, 0.0, np.zeros(3), 1.0
             self._forces = self._yields = np.zeros(1)
             return
-        place = min(places, key=lambda one: one.distance)
+        place, self._forces = min(places, key=lambda one: one[0].distance)
+        between = self._measure(place, centre, force)
+        self._yields = self._missing(place, between, max(float(force @ self.inward), _LEAST_FORCE_N))
+        self._is_new = True
+
+    @property
+    def _laws(self) -> Sequence[tuple[Surface, Vector]]:
+        return list(zip(self._surfaces, self._half_spaces, strict=True))
+
+    def _measure(self, place: _Place, centre: Vector, force: Vector) -> Vector:
+        """Set direction and ratio, and return the compliance between the nodes (m/N), shape (k, k)."""
         touches = place.distance < self._radius + BAND_M
         if touches and self.inward.any():
             mixed = self.inward + _FILTER * (place.inward - self.inward)
@@ -157,56 +157,60 @@ class SubGrid:
         else:
             self.inward, self.ratio = place.inward, 1.0
         between = place.surface.compliance.of_mesh(place.nodes, self.inward)
-        pressed = max(float(force @ self.inward), _LEAST_FORCE_N)
+        pressed = float(force @ self.inward)
         if touches and pressed > _LEAST_FORCE_N:
             depth = self._radius + float((centre - place.point) @ self.inward)
-            own = float(place.parts @ between @ place.parts)
-            measured = min(max(depth / (own * pressed), _RATIOS[0]), _RATIOS[1])
-            self.ratio += _FILTER * (measured - self.ratio)
-        self._take_law(place, between, pressed)
+            measured = depth / (float(place.parts @ between @ place.parts) * pressed)
+            self.ratio += _FILTER * (min(max(measured, _RATIOS[0]), _RATIOS[1]) - self.ratio)
+            self.is_beyond |= bool(np.interp(pressed, self._forces, self._depths) > DEEPEST * self._radius)
+        return between
 
-    def _take_law(self, place: _Place, between: Vector, pressed: float) -> None:
-        """Set yields and forces: the body's depth at a force, less what mesh and coupling yield.
+    def _missing(self, place: _Place, between: Vector, pressed: float) -> Vector:
+        """Return by force the body's depth less what mesh and coupling yield, m, shape (`_GRID`,).
 
-        `between`: compliance of the nodes (m/N). `pressed`: the force (N) at which the parts are those of now.
+        `pressed`: the force (N) at which the parts are those of now.
         """
-        self._is_new = True
-        self._forces = forces = self._half_space[id(place.surface)]
+        forces, first, more = self._forces, place.first_parts, place.parts - place.first_parts
         spread = np.minimum(forces / pressed, _MOST_SPREAD) ** _SPREAD_POWER
-        more = place.parts - place.first_parts
-        mesh = place.first_parts @ between @ place.first_parts + spread * (
-            2.0 * float(place.first_parts @ between @ more) + spread * float(more @ between @ more)
+        mesh = first @ between @ first + spread * (
+            2.0 * float(first @ between @ more) + spread * float(more @ between @ more)
         )
         body = place.surface.compliance.of_body(place.nodes, place.parts)
         missing = self._depths + (body - self.ratio * mesh - 1.0 / self._coupling.stiffness) * forces
-        self._yields = np.maximum.accumulate(np.maximum(missing, 0.0))
+        return np.maximum.accumulate(np.maximum(missing, 0.0))
 
     def _place(self, surface: Surface, centre: Vector, reach: float) -> _Place | None:
+        """Return where the sphere is, if a face is nearer to its centre than `reach` (m)."""
         _, faces, weights, distances = touched_faces(
             centre[None], np.array([reach]), surface.organ.nodes, surface.organ.touchable
         )
         if not len(faces):
             return None
-        nearest = float(distances.min())
         share = np.maximum(self._radius + BAND_M - distances, 0.0)
         if not share.any():
             share[distances.argmin()] = 1.0
-        share /= share.sum()
+        weighted = (share / share.sum())[:, None] * weights
         corners = surface.settled[faces]
         areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal = share @ (areas / np.sqrt((areas * areas).sum(axis=1))[:, None])
-        nodes, place = np.unique(faces, return_inverse=True)
-        place = place.reshape(-1, 3)
-        weighted = share[:, None] * weights
         point = np.einsum("fa,fai->i", weighted, corners)
         at, away = closest_points(point, corners)
         first = int(away.argmin())
+        nodes, numbers = np.unique(faces, return_inverse=True)
+        numbers: Indices = numbers.reshape(-1, 3)
         return _Place(
             surface,
             nodes,
-            np.bincount(place.ravel(), weighted.ravel(), len(nodes)),
-            np.bincount(place[first], at[first], len(nodes)),
+            _summed(numbers, weighted, len(nodes)),
+            _summed(numbers[first], at[first], len(nodes)),
             point,
             -normal / np.sqrt(normal @ normal),
-            nearest,
+            float(distances.min()),
         )
+
+
+def _summed(numbers: Indices, parts: Vector, count: int) -> Vector:
+    """Return the sum of the parts of each number below `count`, shape (count,)."""
+    sums = np.zeros(count)
+    np.add.at(sums, numbers, parts)
+    return sums

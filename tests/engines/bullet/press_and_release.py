@@ -87,6 +87,7 @@ def cycle(mass, step_ms, algorithm, **tissue):
         "organs": {"block": organ},
         "probes": {"tip": {"spheres": 1, "radius": RADIUS}},
         "node_period": f"{step_ms * 4} ms",
+        "sub_grid": False,
         **tissue,
     }
     engine = Tissue("tissue", BulletParams.model_validate(params))

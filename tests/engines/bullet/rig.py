@@ -17,7 +17,9 @@ IMPULSE = BondPlan(prediction="velocity", mean=True)
 
 
 def params(block=BLOCK, probe=None, **rest):
-    return BulletParams.model_validate({"organs": {"block": block}, "probes": {"probe": probe or {}}, **rest})
+    """Return a block and a probe that feels the force of its mesh."""
+    given = {"organs": {"block": block}, "probes": {"probe": probe or {}}, "sub_grid": False}
+    return BulletParams.model_validate(given | rest)
 
 
 class Rig:

@@ -22,6 +22,15 @@ def test_next_to_no_energy_is_made(mass, algorithm, step_ms):
 
 
 @pytest.mark.parametrize(
+    ("mass", "algorithm", "step_ms"), [(0.4, "impulse", 1), (0.05, "impulse-linearised", 1)]
+)
+def test_nor_by_the_spring_in_series(mass, algorithm, step_ms):
+    made, exchanged = cycle(mass, step_ms, algorithm, sub_grid=True)
+    assert exchanged > 3e-4
+    assert made < 0.01 * exchanged
+
+
+@pytest.mark.parametrize(
     ("mass", "algorithm", "step_ms", "rule"),
     [
         (0.02, "impulse", 1, "H <= 0.5 m/b of 'impulse'"),
