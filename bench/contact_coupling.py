@@ -228,6 +228,7 @@ def simulate(case: Case, coupling: Mapping[str, Any], step_ms: float) -> Log:
                 "block": {"size": [0.08, 0.06, 0.02], "young_modulus": case.young_modulus, "nodes": 75}
             },
             "probes": {"probe": {"radius": RADIUS_M, "mass": 0.02, "stiffness": case.probe_stiffness}},
+            "sub_grid": False,
             "timestep": min(5e-4, step_s),
             "node_period": 16 * step_s,
         }

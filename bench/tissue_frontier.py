@@ -51,7 +51,7 @@ def model(organ: dict[str, object], nodes: int) -> BulletParams:
     """Return the organ of about so many nodes, with its probe and the sub-step that suits it."""
     part = {**organ, "nodes": nodes}
     params = BulletParams.model_validate(
-        {"organs": {"organ": part}, "probes": {"probe": {"radius": RADIUS_M}}}
+        {"organs": {"organ": part}, "probes": {"probe": {"radius": RADIUS_M}}, "sub_grid": False}
     )
     there = params.organs["organ"]
     tied = np.any(list(there.anchored_nodes.values()), axis=0)

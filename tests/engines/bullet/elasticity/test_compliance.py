@@ -48,8 +48,8 @@ def test_a_force_moves_nodes_as_the_stiffness_of_the_elements_says():
 
 @pytest.mark.parametrize("nodes", [250, 600])
 def test_a_block_is_stiffer_than_a_half_space_as_a_bonded_layer_is(nodes):
-    # Dimitriadis et al., Biophys. J. 82 (2002), 2798: F = F_Hertz (1 - 2 a/pi chi + ...), chi = contact radius
-    # over thickness; at a given force the first term is a yield of a / (pi E* thickness) (1 N).
+    # Dimitriadis et al., Biophys. J. 82 (2002), 2798: F = F_Hertz (1 - 2 a/pi chi + ...), chi = contact
+    # radius over thickness; at a given force the first term is a yield of a / (pi E* thickness) (1 N).
     organ, _, compliance = surface({**BLOCK, "nodes": nodes})
     nu, thickness = organ.elastic.poisson_ratio, 20e-3
     a = -(1.2876 - 1.4678 * nu + 1.3442 * nu**2) / (1 - nu)
