@@ -108,6 +108,7 @@ def _quantity(unit: str, example: str) -> Any:
         "anyOf": [{"type": "number"}, {"type": "string"}],
         "description": f"a number in {unit}, or a text with its unit",
         "examples": [example],
+        "unit": unit,
     }
     return BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(schema)
 
@@ -141,6 +142,7 @@ Duration = Annotated[
             "anyOf": [{"type": "number"}, {"type": "string"}],
             "description": "seconds, or a text with its unit",
             "examples": ["1 ms"],
+            "unit": "s",
         }
     ),
 ]

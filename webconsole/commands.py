@@ -19,6 +19,7 @@ __all__ = [
     "Lead",
     "Leave",
     "Show",
+    "Start",
     "Watch",
     "command",
 ]
@@ -75,20 +76,32 @@ class Invite(_Command):
     role: Literal["viewer", "operator"]
 
 
-class Fork(_Command):
-    """Go on from an instant of the recording, in a session of its own."""
+class _Begun(_Command):
+    """A session in a process of its own."""
 
-    do: Literal["fork"]
-    time: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=1e6)]
-    """Simulated time, s."""
     changes: Annotated[list[Annotated[str, Field(min_length=1, max_length=400)]], Field(max_length=50)] = []
     """`a.b.c=value`, as on the command line."""
     lead: Annotated[list[Name], Field(max_length=8)] = []
     """Devices that pages lead from then on."""
-    duration: Annotated[float, Field(allow_inf_nan=False, gt=0.0, le=1e6)] | None = None
-    """Simulated time at which it ends, s; None: as in the recording."""
     pace: Literal["fast", "realtime"] | None = None
     record: bool = True
+
+
+class Start(_Begun):
+    """Start an installed scenario."""
+
+    do: Literal["start"]
+    scenario: Name
+
+
+class Fork(_Begun):
+    """Go on from an instant of the recording."""
+
+    do: Literal["fork"]
+    time: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=1e6)]
+    """Simulated time, s."""
+    duration: Annotated[float, Field(allow_inf_nan=False, gt=0.0, le=1e6)] | None = None
+    """Simulated time at which it ends, s; None: as in the recording."""
 
 
 class End(_Command):
@@ -137,7 +150,7 @@ class Hand(_Command):
 
 
 Command = Annotated[
-    Show | At | Control | Watch | Invite | Fork | End | Lead | Leave | Hand, Field(discriminator="do")
+    Show | At | Control | Watch | Invite | Start | Fork | End | Lead | Leave | Hand, Field(discriminator="do")
 ]
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Command)
 

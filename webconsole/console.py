@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 from hub.transport.control_messages import Empty, StepRequest
-from schemas.errors import MessageError
-from webconsole.commands import Control, Fork
+from schemas.errors import MessageError, ScenarioError
+from webconsole.commands import Control, Fork, Start
 from webconsole.fork import fork_arguments
 from webconsole.frame import Section, SectionKind
 from webconsole.live import Live
@@ -16,6 +17,7 @@ from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
 from webconsole.source import Value
 from webconsole.stage import Stage
+from webconsole.start import start_arguments, wrong_fields
 from webconsole.started import Started
 
 __all__ = ["Console"]
@@ -29,6 +31,8 @@ class Console:
     def __init__(self, source: Live | Recorded, pilots: Pilots) -> None:
         self.source, self.pilots = source, pilots
         self.started = Started()
+        if isinstance(source, Live):
+            source.left_out = self.started.pids
         self._stage: Stage | None = None
         self._generation = -1
         self._making = asyncio.Lock()
@@ -84,6 +88,19 @@ class Console:
         arguments = await asyncio.to_thread(fork_arguments, recording, order)
         title = f"fork of {recording.file.parent.name} at {order.time:g} s"
         return (await asyncio.to_thread(self.started.start, title, arguments, order.time)).number
+
+    async def start(self, order: Start) -> dict[str, Any]:
+        """Start an installed scenario and return its number, or what is wrong by field.
+
+        Raises MessageError or ScenarioError if it is not a field that is wrong.
+        """
+        try:
+            arguments = await asyncio.to_thread(start_arguments, order, Path.cwd())
+        except ScenarioError as error:
+            if wrong := wrong_fields(error, order.changes):
+                return {"wrong": wrong}
+            raise
+        return {"number": (await asyncio.to_thread(self.started.start, order.scenario, arguments)).number}
 
     def live(self) -> Live:
         """Return the running session's source; raises MessageError if this is a recording."""

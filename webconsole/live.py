@@ -70,6 +70,8 @@ class Live:
         self.card: Value | None = None
         self.joined: Callable[[str, Plan], None] = lambda _endpoint, _plan: None
         """Is called with endpoint and plan of each session that is reached."""
+        self.left_out: Callable[[], set[int]] = set
+        """Returns the processes of hubs that have pages of their own."""
         self._status: SessionStatus | None = None
         self._trouble = "looking for a session"
         self._values: dict[str, Value] = {}
@@ -203,7 +205,10 @@ class Live:
     def _endpoints(self) -> list[str]:
         if self._endpoint is not None:
             return [self._endpoint]
-        return [hub.endpoint for hub in running_hubs() if self._pid in (None, hub.pid)]
+        left_out = self.left_out()
+        return [
+            hub.endpoint for hub in running_hubs() if self._pid in (None, hub.pid) and hub.pid not in left_out
+        ]
 
     def _begin(self, session: zenoh.Session, keys: Keys, described: DescribeReply) -> None:
         self._values, self._firsts = {}, {}

@@ -24,6 +24,7 @@ from webconsole.commands import (
     Lead,
     Leave,
     Show,
+    Start,
     Watch,
     command,
 )
@@ -151,6 +152,8 @@ class Page:
                 return {}
             case Fork():
                 return {"number": await self._console.fork(order)}
+            case Start():
+                return await self._console.start(order)
             case End():
                 self._console.started.end(order.number)
                 return {}

@@ -15,6 +15,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+from hub.planning.scenario_file import installed_scenarios
 from hub.recording.recording import Recording
 from schemas.errors import TrocarError
 from webconsole.assets import asset, compressed
@@ -24,6 +25,7 @@ from webconsole.fork import fork_form, tree_of
 from webconsole.gate import Gate
 from webconsole.listening import Listening
 from webconsole.page import Page
+from webconsole.start import start_form
 
 __all__ = ["Server"]
 
@@ -55,6 +57,7 @@ class Server:
                 Route("/series", self._series),
                 Route("/events", self._events),
                 Route("/sessions", self._sessions),
+                Route("/start", self._start),
                 Route("/fork", self._fork),
                 Route("/forks", self._forks),
                 WebSocketRoute("/page", self._page),
@@ -140,6 +143,18 @@ class Server:
         try:
             live = self._console.live()
             return JSONResponse(await asyncio.to_thread(live.sessions))
+        except TrocarError as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)
+
+    async def _start(self, request: Request) -> Response:
+        """Answer an operator with the installed scenarios, or with the form of one."""
+        if request.state.role != "operator":
+            return PlainTextResponse("a viewer starts no session\n", status_code=403)
+        name = request.query_params.get("scenario")
+        try:
+            if name is None:
+                return JSONResponse([*installed_scenarios()])
+            return JSONResponse(await asyncio.to_thread(start_form, name))
         except TrocarError as error:
             return PlainTextResponse(f"{error}\n", status_code=400)
 

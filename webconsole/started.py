@@ -17,8 +17,9 @@ from typing import IO, Any
 from hub.remote.live_sessions import live_sessions
 from hub.transport.hub_files import running_hubs
 from schemas.errors import MessageError
+from schemas.scenario import Scenario
 
-__all__ = ["Started", "StartedSession"]
+__all__ = ["Started", "StartedSession", "page_devices", "recorded_in"]
 
 log = logging.getLogger(__name__)
 
@@ -28,6 +29,7 @@ _MOST = 4
 _LOOK_S = 0.25
 _PATIENCE_S = 5.0
 _MOST_SAID = 4000
+_PAGE_DEVICE = "{kind: browser, host: remote}"
 _LINK = re.compile(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+")
 
 
@@ -52,6 +54,11 @@ class StartedSession:
             self._hub = _process(arguments, said)
         self._thread = threading.Thread(target=self._follow, name=f"session {number}", daemon=True)
         self._thread.start()
+
+    @property
+    def pid(self) -> int:
+        """The hub's process."""
+        return self._hub.pid
 
     @property
     def ended(self) -> bool:
@@ -136,6 +143,10 @@ class Started:
             raise MessageError(f"no session {number} was started here")
         self._sessions[number - 1].end()
 
+    def pids(self) -> set[int]:
+        """Return the processes of the hubs."""
+        return {one.pid for one in self._sessions}
+
     def as_json(self) -> list[dict[str, Any]]:
         """Return all of them, ready for JSON."""
         return [one.as_json() for one in self._sessions]
@@ -146,6 +157,19 @@ class Started:
             one.end()
         for one in self._sessions:
             one.close()
+
+
+def page_devices(scenario: Scenario, names: Sequence[str]) -> list[str]:
+    """Return the changes that have pages lead these devices; raises MessageError if one is not there."""
+    if unknown := set(names) - set(scenario.participants):
+        raise MessageError(f"there is no device '{min(unknown)}' in scenario '{scenario.name}'")
+    return [f"participants.{name}={_PAGE_DEVICE}" for name in names]
+
+
+def recorded_in(parent: Path, stem: str) -> Path:
+    """Return a directory for a recording that is not there yet: the stem, or the stem and a number."""
+    names = (stem, *(f"{stem}-{number}" for number in range(2, 1000)))
+    return next(place for name in names if not (place := parent / name).exists())
 
 
 def _process(arguments: Sequence[str], said: IO[bytes]) -> subprocess.Popen[bytes]:

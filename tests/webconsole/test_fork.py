@@ -90,13 +90,13 @@ def test_a_page_forks_and_follows(table):
             order = {"do": "fork", "time": 0.02, "changes": changes, "duration": 600.0, "pace": "realtime"}
             await socket.send(json.dumps(order))
         assert [(await answer(socket, to="fork"))["number"] for _ in range(2)] == [1, 2]
-        failed, going = await _until(socket, ["failed", "live"])
+        failed, going = await until_states(socket, ["failed", "live"])
         assert "Did you mean 'scale'?" in failed["error"]
         assert going["link"].startswith("http://127.0.0.1:")
         await socket.send('{"do": "end", "number": 3}')
         assert "no session 3" in (await answer(socket, to="end"))["error"]
         await socket.send('{"do": "end", "number": 2}')
-        await _until(socket, ["failed", "ended"])
+        await until_states(socket, ["failed", "ended"])
 
     with served(Recorded(table)) as server:
         run(body, server)
@@ -107,7 +107,7 @@ def test_a_page_forks_and_follows(table):
     assert [(one["depth"], one["at"], one["shown"]) for one in tree] == [(0, None, True), (1, 0.02, False)]
 
 
-async def _until(socket, states):
+async def until_states(socket, states):
     async with asyncio.timeout(60):
         while True:
             started = (await answer(socket, **{"is": "state"}))["started"]

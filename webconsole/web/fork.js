@@ -1,21 +1,14 @@
 // Forks: the form at an instant of a recording, the sessions that were started from it, and the tree.
 
+import { make } from "./started.js"
+
 const $ = (id) => document.getElementById(id)
 const SVG = "http://www.w3.org/2000/svg"
 const ROW = 34, LEFT = 8, WIDTH = 560, LETTER = 6.3
 
-function make(name, properties = {}, ...children) {
-  const element = document.createElement(name)
-  Object.assign(element, properties)
-  element.append(...children)
-  return element
-}
-
 export class Forks {
-  constructor(link, timeline) {
-    Object.assign(this, { link, timeline })
-    this.asked = null // the number of the fork that this page has asked for, and will follow
-    this.shown = ""
+  constructor(link, timeline, started) {
+    Object.assign(this, { link, timeline, started })
     $("fork-here").onclick = () => this.open()
     $("fork-form").onsubmit = (event) => { event.preventDefault(); this.send() }
     $("fork-close").onclick = () => $("fork").close()
@@ -69,33 +62,13 @@ export class Forks {
 
   answered({ to, error, number }) {
     if (to !== "fork") return
-    if (error) { this.error(error); $("fork-go").disabled = false } else this.asked = number
+    if (error) this.failed(error)
+    else this.started.follow(number, (text) => this.failed(text))
   }
 
-  // `started`: the sessions that pages of this server have started.
-  show(started = []) {
-    const mine = started.find(({ number }) => number === this.asked)
-    if (mine?.state === "live") { location.assign(mine.link); return }
-    if (mine?.state === "failed") this.error(mine.error)
-    if (mine && mine.state !== "starting") { this.asked = null; $("fork-go").disabled = false }
-    const text = JSON.stringify(started)
-    if (text === this.shown) return
-    this.shown = text
-    $("fork-started").replaceChildren(...started.map((one) => this.line(one)))
-  }
-
-  line({ number, title, state, share, link }) {
-    const line = make("li", {}, `${title}: `)
-    if (state === "starting") {
-      const done = make("progress", { max: 1, value: share })
-      done.setAttribute("aria-label", "Part of the past that is simulated again")
-      line.append(done, ` ${Math.round(100 * share)} % of the past `)
-    } else if (link) line.append(make("a", { href: link, textContent: "live" }), " ")
-    else line.append(state)
-    if (["starting", "live"].includes(state)) {
-      line.append(make("button", { type: "button", textContent: "End", onclick: () => this.link.send({ do: "end", number }) }))
-    }
-    return line
+  failed(text) {
+    this.error(text)
+    $("fork-go").disabled = false
   }
 
   error(text) {

@@ -12,6 +12,8 @@ import { Pilot } from "./pilot.js"
 import { Timeline } from "./timeline.js"
 import { showCard } from "./card.js"
 import { Forks } from "./fork.js"
+import { Start } from "./start.js"
+import { Started } from "./started.js"
 
 const $ = (id) => document.getElementById(id)
 const REFRESH_MS = 100, STILL_MS = 400
@@ -35,7 +37,7 @@ const link = new Link({
     showCard($("card"), state.card)
     headset.show(state.pilots, session?.role)
     pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one), session?.role)
-    forks.show(state.started)
+    started.show(state.started)
     if (session?.kind === "recording") timeline.begin(state.start, state.end)
   },
   answer(answer) {
@@ -43,6 +45,7 @@ const link = new Link({
     else if (answer.path) share(answer)
     if (!headset.owns(answer.device)) pilot.answered(answer)
     forks.answered(answer)
+    start.answered(answer)
   },
   trouble({ text }) { log.add([{ time: lastTime, level: "warn", source: "page", text }]) },
 })
@@ -57,7 +60,8 @@ const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
   () => log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]))
 const notices = new Notices($("notice"))
 const timeline = new Timeline((time) => { lastTime = time; link.send({ do: "at", time }); plots.at(time); dirty = true })
-const forks = new Forks(link, timeline)
+const started = new Started(link, [...document.querySelectorAll(".started")])
+const forks = new Forks(link, timeline, started), start = new Start(link, started)
 timeline.found = (events) => log.add(events, true)
 const plots = new Plots($("plot-list"), $("add"), $("ports"), ask)
 $("pictures").onchange = ask
@@ -72,6 +76,7 @@ async function begin(described) {
   session = described
   head.begin(described)
   forks.begin(described)
+  start.begin(described)
   log.clear()
   for (const text of described.notes ?? []) log.add([{ time: 0, level: "warn", source: "scene", text }])
   if (!described.numbers) return
