@@ -18,6 +18,7 @@ __all__ = [
     "Invite",
     "Lead",
     "Leave",
+    "Network",
     "Show",
     "Start",
     "Watch",
@@ -60,6 +61,19 @@ class Control(_Command):
 
     do: Literal["pause", "resume", "step", "stop"]
     steps: Annotated[int, Field(ge=1, le=1_000_000)] = 1
+
+
+class Network(_Command):
+    """Change the emulated network between a device and the hub."""
+
+    do: Literal["network"]
+    device: Name
+    delay: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=10.0)] | None = None
+    """In each direction, s; None, as of the others: as it is."""
+    jitter: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=10.0)] | None = None
+    """The most that a message takes longer, s."""
+    loss: Annotated[float, Field(allow_inf_nan=False, ge=0.0, lt=1.0)] | None = None
+    """Share of the messages."""
 
 
 class Watch(_Command):
@@ -150,7 +164,8 @@ class Hand(_Command):
 
 
 Command = Annotated[
-    Show | At | Control | Watch | Invite | Start | Fork | End | Lead | Leave | Hand, Field(discriminator="do")
+    Show | At | Control | Network | Watch | Invite | Start | Fork | End | Lead | Leave | Hand,
+    Field(discriminator="do"),
 ]
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Command)
 

@@ -6,9 +6,10 @@ import asyncio
 from pathlib import Path
 from typing import Any
 
+from hub.devices.network_link_control import NetworkLinkRequest
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError, ScenarioError
-from webconsole.commands import Control, Fork, Start
+from webconsole.commands import Control, Fork, Network, Start
 from webconsole.fork import fork_arguments
 from webconsole.frame import Section, SectionKind
 from webconsole.live import Live
@@ -81,6 +82,14 @@ class Console:
         live = self.live()
         request = StepRequest(steps=order.steps) if order.do == "step" else Empty()
         await asyncio.to_thread(live.ask, _VERBS[order.do], request, Empty)
+
+    async def network(self, order: Network) -> None:
+        """Change a device's network link; raises MessageError or ConnectError."""
+        live = self.live()
+        given: dict[str, Any] = order.model_dump(exclude={"do"}, exclude_none=True)
+        whole_ns = {key: f"{given[key] * 1e9:.0f} ns" for key in ("delay", "jitter") if key in given}
+        request = NetworkLinkRequest.model_validate(given | whole_ns)
+        await asyncio.to_thread(live.change_link, request)
 
     async def fork(self, order: Fork) -> int:
         """Start a fork of the recording and return its number; raises MessageError or ScenarioError."""

@@ -18,6 +18,8 @@ import zenoh
 from pydantic import BaseModel
 from zenoh.handlers import Callback
 
+from hub.devices.network_link import in_words
+from hub.devices.network_link_control import NetworkLinkReply, NetworkLinkRequest
 from hub.planning.plan import Plan
 from hub.remote.hub_connection import reach
 from hub.remote.live_sessions import live_sessions
@@ -30,6 +32,7 @@ from hub.transport.hub_files import running_hubs
 from schemas.codec import decode
 from schemas.errors import ConnectError, MessageError
 from schemas.keys import Keys
+from schemas.network_link import NetworkLinkSpec
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import ScoreCard, SessionStatus
 from webconsole.log import LOGGED, Entry, entries_of
@@ -65,6 +68,7 @@ class Live:
         self.scenario: Scenario | None = None
         self.outlets: Sequence[Outlet] = ()
         self.recording = ""
+        self._links: dict[str, NetworkLinkSpec] = {}
         self._entries: deque[tuple[int, Entry]] = deque(maxlen=_ENTRIES_KEPT)
         self._numbered = 0
         self.card: Value | None = None
@@ -113,7 +117,16 @@ class Live:
                 {"way": one.way, "stream": one.stream, "p50": one.p50_s, "p99": one.p99_s}
                 for one in status.latencies
             ],
-            "links": {one.device: one.link for one in status.devices},
+            "links": [
+                {
+                    "device": name,
+                    "delay": link.delay_ns / 1e9,
+                    "jitter": link.jitter / 1e9,
+                    "loss": link.loss,
+                    "text": in_words(link),
+                }
+                for name, link in self._links.items()
+            ],
         }
 
     def want(self, names: frozenset[str]) -> None:
@@ -136,6 +149,14 @@ class Live:
         if session is None:
             raise ConnectError("no session is running")
         return ask(session, self._keys.control(verb), request, model)
+
+    def change_link(self, request: NetworkLinkRequest) -> None:
+        """Change the network link of a device; raises ConnectError or MessageError."""
+        reply = self.ask("link", request, NetworkLinkReply)
+        self._links[reply.device] = reply.link
+        status = self._status
+        at = 0.0 if status is None else status.sim_time_ns / 1e9
+        self._note(Entry(at, "info", reply.device, f"network link: {reply.description or 'none'}"))
 
     def entries_after(self, number: int) -> tuple[int, list[Entry]]:
         """Return the lines of the log after the one with this number, and the number of the last."""
@@ -224,6 +245,10 @@ class Live:
         self._by_name = {one.name: one for one in self.outlets}
         self._device_keys = {
             planned.name for planned in described.plan.participants.values() if planned.role == "device"
+        }
+        self._links = {
+            name: described.plan.participants[name].network_link or NetworkLinkSpec()
+            for name in sorted(self._device_keys)
         }
         self._session = session
         self._trouble = f"session '{described.session}' gives no status yet"

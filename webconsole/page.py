@@ -23,6 +23,7 @@ from webconsole.commands import (
     Invite,
     Lead,
     Leave,
+    Network,
     Show,
     Start,
     Watch,
@@ -149,6 +150,9 @@ class Page:
                 self._console.pilots.leave(self)
             case Control():
                 await self._console.control(order)
+                return {}
+            case Network():
+                await self._console.network(order)
                 return {}
             case Fork():
                 return {"number": await self._console.fork(order)}

@@ -357,6 +357,20 @@ def test_a_browser_that_stands_still_or_is_killed_lets_the_arm_hold(browser, ses
     assert run.poll() is None
 
 
+def test_sliders_change_the_network_of_a_device(browser, session):
+    _, invite = session
+    one = Person(browser, invite("operator"))
+    one.page.get_by_text("Network of the devices").click()
+    delay = one.page.get_by_role("slider", name="delay of hand, ms")
+    delay.fill("100")
+    one.page.locator("#links").get_by_text("100 ms each way").wait_for()
+    assert "network link: 100 ms each way" in one.page.locator("#lines").inner_text()
+    delay.fill("0")
+    one.page.get_by_text("no emulated network").wait_for()
+    assert one.errors == []
+    one.context.close()
+
+
 def still(person):
     """Wait until the arm stands still, and return where."""
     place = [None]

@@ -1,5 +1,6 @@
 """A running session as pages see it: what arrives, what it costs the session, and what is asked of it."""
 
+import asyncio
 import subprocess
 import sys
 import threading
@@ -9,18 +10,23 @@ import pytest
 import zenoh
 
 from hub.planning.scenario_file import load
+from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.transport.control_messages import Empty
 from hub.transport.envelope import Tag
 from hub.transport.page_feed import PageFeed
 from hub.transport.port_codec import PortCodec
 from hub.transport.zenoh_session import open_session
-from schemas.errors import ConnectError
+from hub.verify import verify
+from schemas.errors import ConnectError, MessageError
 from schemas.ports import Port
 from schemas.ros import Joy
 from schemas.trocar_msgs import SoftBodyState
 from tests.webconsole.conftest import until
+from webconsole.commands import Network
+from webconsole.console import Console
 from webconsole.live import Live
+from webconsole.pilot import Pilots
 from webconsole.stage import Stage
 
 SCENARIO = """\
@@ -75,6 +81,43 @@ def test_a_session_that_is_seen_has_the_same_state_hash(scenario):
     assert summary.state_hash == alone.state_hash
     assert seen["poses"].shape == (len(seen["bodies"]), 7)
     assert np.allclose(np.linalg.norm(seen["poses"][:, 3:], axis=1), 1.0, atol=1e-5)
+
+
+def test_a_network_link_is_changed_and_the_session_can_be_verified(tmp_path):
+    """The samples that arrived are in the grants, so what the link did to them is as well."""
+    file = load("table", ["duration=0.3 s", "participants.robot.looks=false"])
+    session = launch(file, record=tmp_path / "table", one_host=True)
+    failed = []
+
+    def change():
+        live = Live(session.endpoint, "table")
+        try:
+            live.start()
+            until(lambda: live.state.get("links"))
+            console = Console(live, Pilots())
+            order = Network(do="network", device="stylus", delay=0.035, loss=0.25)
+            asyncio.run(console.network(order))
+            (link,) = live.state["links"]
+            assert (link["delay"], link["jitter"], link["loss"]) == (0.035, 0.0, 0.25)
+            assert "35 ms each way, 25 % lost" in live.entries_after(0)[1][-1].text
+            with pytest.raises(MessageError, match="no device 'stylo'"):
+                asyncio.run(console.network(Network(do="network", device="stylo", loss=0.5)))
+            live.ask("resume", Empty(), Empty)
+        except Exception as error:  # noqa: BLE001  # it is raised below, in the thread of the test
+            failed.append(error)
+            session.state.shutdown()
+        finally:
+            live.close()
+
+    session.state.pause()
+    changing = threading.Thread(target=change)
+    changing.start()
+    summary = session.run()
+    changing.join()
+    assert failed == []
+    recording = Recording(tmp_path / "table")
+    assert summary.state_hash != launch(file, one_host=True).run().state_hash
+    assert verify(recording).same
 
 
 def test_without_a_session_it_says_so_and_goes_on():

@@ -6,6 +6,7 @@ import { Feel } from "./feel.js"
 import { Head } from "./head.js"
 import { Headset } from "./headset.js"
 import { Log } from "./log.js"
+import { Network } from "./network.js"
 import { Notices, markersOf } from "./notices.js"
 import { Plots } from "./plots.js"
 import { Pilot } from "./pilot.js"
@@ -37,6 +38,7 @@ const link = new Link({
     showCard($("card"), state.card)
     headset.show(state.pilots, session?.role)
     pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one), session?.role)
+    network.show(state.links, session?.role)
     started.show(state.started)
     if (session?.kind === "recording") timeline.begin(state.start, state.end)
   },
@@ -58,6 +60,7 @@ const headset = new Headset($("headset"), link, feel, { scene: () => scene, eyes
 const log = new Log($("lines"), $("worst"), (time) => { timeline.pause(); timeline.go(time) })
 const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
   () => log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]))
+const network = new Network($("network"), $("links"), link)
 const notices = new Notices($("notice"))
 const timeline = new Timeline((time) => { lastTime = time; link.send({ do: "at", time }); plots.at(time); dirty = true })
 const started = new Started(link, [...document.querySelectorAll(".started")])
