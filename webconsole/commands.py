@@ -49,11 +49,11 @@ class Show(_Command):
 
 
 class At(_Command):
-    """The instant of a recording to show."""
+    """The instant of a recording, or of the running session's past, to show."""
 
     do: Literal["at"]
-    time: Finite
-    """Simulated time, s."""
+    time: Finite | None
+    """Simulated time, s; None: what runs now."""
 
 
 class Control(_Command):

@@ -11,6 +11,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from time import monotonic
 from typing import Any, TypeVar
 
@@ -27,15 +28,17 @@ from hub.security.credentials import OBSERVER
 from hub.transport.cells import INITIAL
 from hub.transport.control_client import ask
 from hub.transport.control_messages import DescribeReply, Empty
+from hub.transport.endpoints import is_loopback
 from hub.transport.envelope import Tag
 from hub.transport.hub_files import running_hubs
 from schemas.codec import decode
 from schemas.errors import ConnectError, MessageError
-from schemas.keys import Keys
+from schemas.keys import Keys, topic
 from schemas.network_link import NetworkLinkSpec
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import ScoreCard, SessionStatus
 from webconsole.log import LOGGED, Entry, entries_of
+from webconsole.past import Past
 from webconsole.source import Outlet, Value
 
 __all__ = ["Live"]
@@ -68,6 +71,8 @@ class Live:
         self.scenario: Scenario | None = None
         self.outlets: Sequence[Outlet] = ()
         self.recording = ""
+        self.past: Past | None = None
+        """None if the session is not recorded on this machine."""
         self._links: dict[str, NetworkLinkSpec] = {}
         self._entries: deque[tuple[int, Entry]] = deque(maxlen=_ENTRIES_KEPT)
         self._numbered = 0
@@ -102,7 +107,7 @@ class Live:
         status = self._status
         if self._session is None or status is None:
             ended = {} if status is None else {"session": status.session, "time": status.sim_time_ns / 1e9}
-            return {"state": "away", "detail": self._trouble, **ended}
+            return {"state": "away", "detail": self._trouble, **ended, **self._span()}
         return {
             "session": status.session,
             "state": status.state,
@@ -113,6 +118,7 @@ class Live:
             "dropped": status.dropped_messages,
             "detail": status.detail,
             "recording": self.recording,
+            **self._span(),
             "latencies": [
                 {"way": one.way, "stream": one.stream, "p50": one.p50_s, "p99": one.p99_s}
                 for one in status.latencies
@@ -129,15 +135,25 @@ class Live:
             ],
         }
 
+    def _span(self) -> dict[str, float]:
+        """Return between which simulated times (s) the past can be shown."""
+        span_ns = None if self.past is None else self.past.span_ns
+        return {} if span_ns is None else {"start": span_ns[0] / 1e9, "end": span_ns[1] / 1e9}
+
     def want(self, names: frozenset[str]) -> None:
         """Subscribe to these outlets, and to no others."""
         with self._lock:
             self._wanted = names
             self._subscribe()
 
-    def newest(self, name: str, time_ns: int | None) -> Value | None:  # noqa: ARG002
-        """Return the newest value that has arrived."""
-        return self._values.get(name)
+    def newest(self, name: str, time_ns: int | None) -> Value | None:
+        """Return the newest value that has arrived; at a simulated time, the one that is recorded."""
+        if time_ns is None:
+            return self._values.get(name)
+        outlet = self._by_name.get(name)
+        if self.past is None or outlet is None:
+            return None
+        return self.past.newest(topic(self._output_key(outlet)), time_ns)
 
     def first(self, name: str) -> Value | None:
         """Return the value at time 0 of a surface, which is sent to each subscriber that is new."""
@@ -190,6 +206,11 @@ class Live:
             except (ConnectError, MessageError, zenoh.ZError) as error:
                 self._trouble = str(error)
             self._ending.wait(_RETRY_S)
+            self._look_back()
+
+    def _look_back(self) -> None:
+        if self.past is not None:
+            self.past.look()
 
     def _look(self) -> None:
         """Show one session until it is gone; raises ConnectError if there is none."""
@@ -198,7 +219,7 @@ class Live:
             keys = Keys(name)
             described = ask(session, keys.control("describe"), Empty(), DescribeReply)
             with self._lock:
-                self._begin(session, keys, described)
+                self._begin(session, keys, described, here=is_loopback(endpoint))
             self.joined(endpoint, described.plan)
             status = session.declare_subscriber(keys.status, Callback(self._take_status, indirect=False))
             alive = session.liveliness().declare_subscriber(
@@ -207,6 +228,7 @@ class Live:
             try:
                 while not self._gone.wait(1.0):
                     self._ask_status(session, keys)
+                    self._look_back()
             finally:
                 with self._lock:
                     self._session = None
@@ -231,11 +253,12 @@ class Live:
             hub.endpoint for hub in running_hubs() if self._pid in (None, hub.pid) and hub.pid not in left_out
         ]
 
-    def _begin(self, session: zenoh.Session, keys: Keys, described: DescribeReply) -> None:
+    def _begin(self, session: zenoh.Session, keys: Keys, described: DescribeReply, *, here: bool) -> None:
         self._values, self._firsts = {}, {}
         self._status, self.card, self._late = None, None, 0
         self._run, self._keys = described.run, keys
         self.scenario, self.recording = described.scenario, described.recording
+        self.past = Past(Path(described.recording)) if described.recording and here else None
         self.outlets = tuple(
             Outlet(planned.name, port, live=planned.role != "device" or not planned.simulated_time)
             for planned in described.plan.participants.values()
@@ -269,12 +292,16 @@ class Live:
         for name in names - self._subscribers.keys():
             outlet = self._by_name[name]
             key = (
-                self._keys.output("device", outlet.participant, outlet.port.name)
+                self._output_key(outlet)
                 if outlet.participant in self._device_keys
                 else self._keys.view(outlet.participant, outlet.port.name)
             )
             take = Callback(partial(self._take, outlet), indirect=False)
             self._subscribers[name] = session.declare_subscriber(key, take)
+
+    def _output_key(self, outlet: Outlet) -> str:
+        role = "device" if outlet.participant in self._device_keys else "engine"
+        return self._keys.output(role, outlet.participant, outlet.port.name)
 
     def _drop(self) -> None:
         for subscriber in self._subscribers.values():

@@ -138,13 +138,13 @@ class Page:
                     self._sent, self._surfaces = {}, set()
                 self._want()
             case At():
-                self._console.recorded()
-                self._at_ns = round(order.time * 1e9)
+                self._at_ns = None if order.time is None else self._past_ns(order.time)
             case Hand():
                 self._console.pilots.take(self, order)
                 return None
             case Lead():
                 self._console.pilots.lead(self, order.device, beside=order.beside)
+                self._return()
                 return {"device": order.device}
             case Leave():
                 self._console.pilots.leave(self)
@@ -167,6 +167,21 @@ class Page:
                 return {"path": self._gate.invite(order.role), "role": order.role}
         self._changed.set()
         return None
+
+    def _return(self) -> None:
+        """Show what runs now."""
+        self._at_ns = None
+        self._changed.set()
+
+    def _past_ns(self, time_s: float) -> int:
+        """Return an instant that can be shown, ns; raises MessageError if there is no past."""
+        source = self._console.source
+        if isinstance(source, Live):
+            if source.past is None:
+                raise MessageError("this session is not recorded on this machine: it has no past to show")
+            if self._console.pilots.leads(self):
+                raise MessageError("who leads a device sees what runs now: leave it first")
+        return round(time_s * 1e9)
 
     async def _refuse(self, asked: str, why: str) -> None:
         self._refused += 1
@@ -206,6 +221,8 @@ class Page:
         stage = await self._console.stage()
         self._generation = generation
         self._sent, self._surfaces, self._stage = {}, set(), stage
+        if self._console.source.kind == "live":
+            self._return()
         described = {} if stage is None else stage.describe()
         await self._tell(
             {
@@ -228,7 +245,7 @@ class Page:
     async def _frames(self) -> None:
         live = self._console.source.kind == "live"
         while True:
-            if live:
+            if live and self._at_ns is None:
                 await asyncio.sleep(_FRAME_S)
             else:
                 await self._changed.wait()

@@ -71,6 +71,10 @@ class Pilots:
         self._devices[device](hand)
         self._numbers[device], self._heard_s[device] = hand.number, monotonic()
 
+    def leads(self, page: object) -> bool:
+        """Return whether `page` leads a device."""
+        return page in self._pages.values()
+
     def state(self, page: object) -> list[dict[str, Any]]:
         """Return each device and who leads it, as `page` sees it, ready for JSON."""
         self._expire()

@@ -232,8 +232,9 @@ def inviter(link):
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     """A running session that a page can lead, and what makes links to its page."""
-    command = [sys.executable, "-P", "-m", "trocar", "run", "browser", "--open", "--set", "step=5 ms"]
     hub = tmp_path_factory.mktemp("hub")
+    command = [sys.executable, "-P", "-m", "trocar", "run", "browser", "--open", "--set", "step=5 ms"]
+    command += ["--record", str(hub / "recorded")]
     said = hub / "said.txt"
     with (
         said.open("w") as out,
@@ -367,6 +368,30 @@ def test_sliders_change_the_network_of_a_device(browser, session):
     assert "network link: 100 ms each way" in one.page.locator("#lines").inner_text()
     delay.fill("0")
     one.page.get_by_text("no emulated network").wait_for()
+    assert one.errors == []
+    one.context.close()
+
+
+def test_the_past_of_the_running_session_is_shown_until_live_is_chosen(browser, session):
+    _, invite = session
+    one = Person(browser, invite("viewer"))
+    one.sees("Boolean(trocar.scene?.placed)")
+    slider = one.page.get_by_role("slider", name="Instant")
+    one.sees("Number(document.querySelector('#scrub').max) > 1.5")
+    slider.fill("0.5")
+    one.sees("trocar.time === 0.5")
+    one.page.get_by_text("past: 0.500 s").wait_for()
+    place = still(one)
+    one.page.get_by_role("button", name="Play").click()
+    one.sees("trocar.time > 0.7")
+    one.page.get_by_role("button", name="Pause", exact=True).click()
+    slider.fill("0.5")
+    one.sees("trocar.time === 0.5")
+    assert still(one) == place, "each instant is shown exactly again"
+    one.page.get_by_role("button", name="Live").click()
+    one.sees("trocar.time > 2 && !document.body.classList.contains('past')")
+    time = one.page.evaluate("trocar.time")
+    one.sees(f"trocar.time > {time} + 0.5")
     assert one.errors == []
     one.context.close()
 

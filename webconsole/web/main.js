@@ -41,6 +41,7 @@ const link = new Link({
     network.show(state.links, session?.role)
     started.show(state.started)
     if (session?.kind === "recording") timeline.begin(state.start, state.end)
+    else if (session) timeline.grow(state, pilot.leading || headset.worn)
   },
   answer(answer) {
     if (answer.error) log.add([{ time: lastTime, level: "warn", source: `page: ${answer.to || "message"}`, text: answer.error }])
@@ -62,7 +63,14 @@ const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
   () => log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]))
 const network = new Network($("network"), $("links"), link)
 const notices = new Notices($("notice"))
-const timeline = new Timeline((time) => { lastTime = time; link.send({ do: "at", time }); plots.at(time); dirty = true })
+let past = false // no samples for the plots: an instant of a recording, or of the running session's past
+const timeline = new Timeline((time) => {
+  if (time != null) lastTime = time
+  if (past !== (time != null)) { past = time != null; ask() }
+  link.send({ do: "at", time })
+  plots.at(time)
+  dirty = true
+})
 const started = new Started(link, [...document.querySelectorAll(".started")])
 const forks = new Forks(link, timeline, started), start = new Start(link, started)
 timeline.found = (events) => log.add(events, true)
@@ -71,13 +79,14 @@ $("pictures").onchange = ask
 $("frames").onchange = () => scene?.frames($("frames").checked)
 
 function ask(again = false) {
-  const recorded = session?.kind === "recording"
-  link.send({ do: "show", numbers: recorded ? [] : plots.names, pictures: $("pictures").checked, again: again === true })
+  link.send({ do: "show", numbers: past ? [] : plots.names, pictures: $("pictures").checked, again: again === true })
 }
 
 async function begin(described) {
   session = described
   head.begin(described)
+  past = described.kind === "recording"
+  if (!past) timeline.reset()
   forks.begin(described)
   start.begin(described)
   log.clear()
@@ -88,7 +97,7 @@ async function begin(described) {
   plots.begin(described.numbers, described.kind === "recording")
   await stage(described)
   ask(true)
-  if (timeline.begun) timeline.go(timeline.time)
+  if (timeline.begun && !timeline.live) timeline.go(timeline.time)
 }
 
 async function stage(described) {

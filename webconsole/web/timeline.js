@@ -1,10 +1,15 @@
-// The timeline of a recording: the instant that is shown, playing, events, and the instant in the URL.
+// The timeline of a recording, or of a running session that is recorded: the instant that is shown, playing,
+// events, and of a recording the instant in the URL.
 
 const $ = (id) => document.getElementById(id)
 
+const MOST_EVENTS = 500
+
 export class Timeline {
   constructor(show) {
-    this.show = show // (time) => asks for it
+    this.show = show // (time) => asks for it; null: what runs now
+    this.live = false
+    this.past = true // an instant is shown, and not what runs now
     this.time = this.start = this.end = 0
     this.events = []
     this.playing = false
@@ -13,6 +18,7 @@ export class Timeline {
     $("play").onclick = () => this.toggle()
     $("previous").onclick = () => this.jump(-1)
     $("next").onclick = () => this.jump(1)
+    $("now").onclick = () => this.now()
     addEventListener("hashchange", () => this.fromUrl())
     addEventListener("keydown", (event) => this.key(event))
     new ResizeObserver(() => this.marks()).observe($("marks"))
@@ -31,7 +37,48 @@ export class Timeline {
     this.marks()
   }
 
+  // Another session runs, and nothing of its past is known yet.
+  reset() {
+    Object.assign(this, { live: true, past: false, begun: false, playing: false, time: null, events: [] })
+    $("timeline").hidden = true
+    this.say()
+  }
+
+  // What is recorded of the running session by now. Who leads a device sees what runs now.
+  grow({ start, end, log }, leading) {
+    this.events.push(...log ?? [])
+    this.events.splice(0, this.events.length - MOST_EVENTS)
+    this.leading = leading
+    if (start == null || end <= start) return
+    Object.assign(this, { start, end, begun: true })
+    $("timeline").hidden = $("now").hidden = false
+    this.scrub.min = start; this.scrub.max = end
+    for (const id of ["scrub", "play", "previous", "next"]) $(id).disabled = leading
+    if (leading && this.past) this.now()
+    if (this.past) this.scrub.value = this.time
+    else this.scrub.value = end
+    this.say()
+    this.marks()
+  }
+
+  now() {
+    Object.assign(this, { past: false, playing: false, time: null })
+    $("play").textContent = "Play"
+    this.scrub.value = this.end
+    this.say()
+    this.show(null)
+  }
+
+  say() {
+    const text = this.past ? `${this.time.toFixed(3)} s` : "now"
+    $("instant").textContent = this.live && this.past ? `past: ${text}` : text
+    $("now").disabled = !this.past
+    document.body.classList.toggle("past", this.live && this.past)
+    this.scrub.setAttribute("aria-valuetext", this.past ? `${this.time.toFixed(3)} seconds` : "now")
+  }
+
   fromUrl() {
+    if (this.live) return false
     const given = Number(new URLSearchParams(location.hash.slice(1)).get("t") ?? NaN)
     if (!this.begun || Number.isNaN(given) || Math.abs(given - this.time) < 5e-4) return !Number.isNaN(given)
     this.go(given)
@@ -40,12 +87,12 @@ export class Timeline {
 
   go(time) {
     this.time = Math.min(Math.max(time, this.start), this.end)
+    this.past = true
     this.scrub.value = this.time
-    $("instant").textContent = `${this.time.toFixed(3)} s`
-    this.scrub.setAttribute("aria-valuetext", `${this.time.toFixed(3)} seconds`)
+    this.say()
     this.show(this.time)
     clearTimeout(this.naming)
-    if (!this.playing) this.naming = setTimeout(() => this.name(), 150)
+    if (!this.playing && !this.live) this.naming = setTimeout(() => this.name(), 150)
   }
 
   name() {
@@ -57,7 +104,7 @@ export class Timeline {
   toggle() { if (this.playing) this.pause(); else this.play() }
 
   play() {
-    if (this.time >= this.end) this.go(this.start)
+    if (!this.past || this.time >= this.end) this.go(this.start)
     this.playing = true
     this.last = performance.now()
     $("play").textContent = "Pause"
@@ -66,7 +113,7 @@ export class Timeline {
   pause() {
     this.playing = false
     $("play").textContent = "Play"
-    this.name()
+    if (!this.live) this.name()
   }
 
   // Called at each drawing.
@@ -75,18 +122,18 @@ export class Timeline {
     const time = this.time + ((now - this.last) / 1000) * Number($("speed").value)
     this.last = now
     this.go(time)
-    if (this.time >= this.end) this.pause()
+    if (this.time >= this.end) { if (this.live) this.now(); else this.pause() }
   }
 
   jump(way) {
     this.pause()
-    const times = this.events.map(({ time }) => time)
-    const found = way > 0 ? times.find((t) => t > this.time + 1e-6) : times.findLast((t) => t < this.time - 1e-6)
+    const times = this.events.map(({ time }) => time).sort((a, b) => a - b), from = this.past ? this.time : Infinity
+    const found = way > 0 ? times.find((t) => t > from + 1e-6) : times.findLast((t) => t < from - 1e-6)
     if (found != null) this.go(found)
   }
 
   key(event) {
-    if (!this.begun || event.target.closest("input:not([type=range]), select, button")) return
+    if (!this.begun || this.leading || event.target.closest("input:not([type=range]), select, button")) return
     const act = { " ": () => this.toggle(), "[": () => this.jump(-1), "]": () => this.jump(1) }[event.key]
     if (!act) return
     event.preventDefault()
