@@ -2,7 +2,7 @@
 
 import uPlot from "./vendor/uPlot.esm.js"
 
-const LAST_S = 20, KEPT = 2400, HEIGHT = 120, MOST = 24
+const LAST_S = 20, KEPT = 2400, HEIGHT = 120, MOST = 24, SHORTEST_S = 1e-5
 // A force and joints or a pose: of each row the first that there is.
 const LIKELY = [
   [/\.probe\/wrench$/, /tip_wrench$/, /forceps\/force$/, /contact\/force$/, /wrench$/, /\/force$/, /pull$/],
@@ -79,11 +79,19 @@ export class Plots {
   rebuild() { for (const plot of this.plots) plot.build(this.list.clientWidth) }
 }
 
-// A value that never changes is drawn amid its own scale, not at the foot of one that ends at 100.
+// A value that never changes, or by rounding alone, is drawn amid its own scale, not at the foot of one that ends
+// at 100. uPlot counts from one mark of an axis to the next, for ever where a mark is less than a value's last digit.
 function spread(_, low, high) {
   if (low === null) return [-1, 1]
-  return low === high ? [low - 1, high + 1] : uPlot.rangeNum(low, high, 0.1, true)
+  const size = Math.max(Math.abs(low), Math.abs(high))
+  if (high - low > 1e-9 * size) return uPlot.rangeNum(low, high, 0.1, true)
+  return [low - Math.max(1, size / 1000), high + Math.max(1, size / 1000)]
 }
+
+function widened(_, from, to) { return from == null || to - from >= SHORTEST_S ? [from, to] : [to - SHORTEST_S, to] }
+
+// What cannot be drawn is a gap: no number, infinite, or so large that a span of two of them is.
+function drawable(value) { return Math.abs(value) < 1e30 ? value : null }
 
 class Plot {
   constructor(label, entry, recorded, removed) {
@@ -117,7 +125,7 @@ class Plot {
       font: "11px system-ui" }
     this.chart = new uPlot({
       width: Math.max(width, 100), height: HEIGHT, legend: { show: false }, cursor: { drag: { x: this.recorded, y: false } },
-      scales: { x: { time: false }, y: { range: spread } },
+      scales: { x: { time: false, range: widened }, y: { range: spread } },
       axes: [{ ...axis, size: 24 }, { ...axis, size: 52, values: (_, ticks) => ticks.map(short) }],
       series: [{}, ...this.columns.map((_, i) => ({ stroke: colour(`--s${i}`), width: 1.25, points: { show: false } }))],
       hooks: { draw: [(chart) => this.mark(chart, colour("--accent"))], setCursor: [(chart) => this.read(chart.cursor.idx)] },
@@ -144,7 +152,7 @@ class Plot {
       for (const column of this.data) column.length = 0 // another session
     }
     times.push(row[0])
-    this.columns.forEach(({ at }, i) => this.data[i + 1].push(row[at + 1]))
+    this.columns.forEach(({ at }, i) => this.data[i + 1].push(drawable(row[at + 1])))
     const old = times.findIndex((time) => time >= row[0] - LAST_S)
     const drop = Math.max(old, times.length - KEPT)
     if (drop > 0) for (const column of this.data) column.splice(0, drop)
@@ -158,7 +166,7 @@ class Plot {
     const width = Number(answer.headers.get("X-Width")), rows = new Float64Array(await answer.arrayBuffer())
     const count = rows.length / width
     const column = (at) => Array.from({ length: count }, (_, i) => rows[i * width + at])
-    this.data = [column(0), ...this.columns.map(({ at }) => column(at + 1))]
+    this.data = [column(0), ...this.columns.map(({ at }) => column(at + 1).map(drawable))]
     this.chart?.setData(this.data)
     this.at(this.instant)
   }
