@@ -1,0 +1,182 @@
+"""How fast a page's keys reach a session, and how soon a fork from a page is live.
+
+python -m bench.webconsole_session [lead] [fork] [--seconds 10] [--output FILE]
+
+`lead`: `browser` in real time with a page's server and a page without a browser, which presses and releases
+the dead-man at random times; from sending it to the communication point at which it enters a grant, that is
+until the sample is at the hub's machine plus the `age_ns` that the hub has recorded for it. `fork`:
+`palpation` recorded for `--seconds`, verified, and forked at its end as a page does it; from the order to the
+page that is live, beside the time that the past takes at the speed of `verify`. The load stands beside.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import http.client
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import monotonic_ns, perf_counter, sleep
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import zenoh
+from websockets.asyncio.client import ClientConnection, connect
+from zenoh.handlers import Callback
+
+from hub.recording.recording import Recording
+from hub.remote.hub_connection import reach
+from hub.security.credentials import OBSERVER
+from hub.transport.hub_files import running_hubs
+from schemas.keys import Keys
+from webconsole.commands import Fork
+from webconsole.fork import fork_arguments
+from webconsole.started import Started
+
+PRESSES = 200
+
+
+def bench_lead(_seconds: float) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as place:
+        recording, said = Path(place, "recorded"), Path(place, "said")
+        command = [
+            sys.executable,
+            "-P",
+            "-m",
+            "trocar",
+            "run",
+            "browser",
+            "--open",
+            "--record",
+            str(recording),
+        ]
+        with said.open("w") as out:
+            run = subprocess.Popen(command, stdout=out, stderr=out, env=os.environ | {"BROWSER": "true"})
+        try:
+            while not (link := re.search(r"http://127\S+", said.read_text())):
+                sleep(0.1)
+            endpoint = next(one.endpoint for one in running_hubs() if one.pid == run.pid)
+            arrived: list[int] = []
+            with reach(endpoint, OBSERVER) as session:
+                key = Keys("browser").output("device", "hand", "buttons")
+
+                def take(_sample: zenoh.Sample, arrived: list[int] = arrived) -> None:
+                    arrived.append(monotonic_ns())
+
+                subscriber = session.declare_subscriber(key, Callback(take, indirect=False))
+                sent = asyncio.run(_press(link[0]))
+                sleep(0.5)
+                subscriber.undeclare()
+        finally:
+            run.send_signal(signal.SIGINT)
+            run.wait()
+        ages = [
+            sample.age_ns
+            for grant in Recording(recording).grants()
+            for sample in grant.inlets
+            if (sample.participant, sample.port) == ("hand", "buttons") and sample.payload.size
+        ]
+    if not len(sent) == len(arrived) == len(ages):
+        return {"sent": len(sent), "arrived": len(arrived), "granted": len(ages), "trouble": "some were lost"}
+    took_ms = (np.array(arrived) - np.array(sent) + np.array(ages)) / 1e6
+    return {
+        "presses": len(sent),
+        "p50_ms": round(float(np.percentile(took_ms, 50)), 2),
+        "p95_ms": round(float(np.percentile(took_ms, 95)), 2),
+        "largest_ms": round(float(took_ms.max()), 2),
+        "of_it_waiting_for_the_grant_p50_ms": round(float(np.percentile(ages, 50)) / 1e6, 2),
+    }
+
+
+async def _press(link: str) -> list[int]:
+    """Lead the hand; return when each press and release was sent, ns."""
+    url, draw = urlsplit(link), np.random.default_rng(0)
+    connection = http.client.HTTPConnection(url.netloc)
+    connection.request("GET", f"{url.path}?{url.query}")
+    cookie = (connection.getresponse().getheader("Set-Cookie") or "").partition(";")[0]
+    headers = {"Cookie": cookie, "Origin": f"http://{url.netloc}"}
+    sent: list[int] = []
+    async with connect(f"ws://{url.netloc}/page", additional_headers=headers, origin=None) as socket:
+        await _led(socket)
+        reading = asyncio.create_task(_read(socket))
+        for number in range(PRESSES):
+            await asyncio.sleep(draw.uniform(0.03, 0.06))  # less than the silence that lets go
+            sent.append(monotonic_ns())
+            await socket.send(json.dumps({"do": "hand", "number": number, "dead_man": number % 2 == 0}))
+        reading.cancel()
+    return sent
+
+
+async def _led(socket: ClientConnection) -> None:
+    """Become the pilot, once the hand is offered."""
+    while True:
+        await socket.send(json.dumps({"do": "lead", "device": "hand"}))
+        async for message in socket:
+            answer: dict[str, Any] = json.loads(message) if isinstance(message, str) else {}
+            if answer.get("to") == "lead":
+                if "error" not in answer:
+                    return
+                await asyncio.sleep(0.2)
+                break
+
+
+async def _read(socket: ClientConnection) -> None:
+    async for _ in socket:
+        pass
+
+
+def _trocar(*arguments: str) -> None:
+    subprocess.run([sys.executable, "-P", "-m", "trocar", *arguments], check=True, stdout=subprocess.DEVNULL)
+
+
+def bench_fork(seconds: float) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as place:
+        directory = Path(place, "palpation")
+        _trocar("run", "palpation", "--set", f"duration={seconds} s", "--record", str(directory))
+        recording = Recording(directory)
+        begun = perf_counter()
+        _trocar("verify", str(directory))
+        verify_s = perf_counter() - begun
+        order = Fork(do="fork", time=seconds, duration=seconds + 600.0, pace="realtime", record=False)
+        started = Started()
+        begun = perf_counter()
+        one = started.start("fork", fork_arguments(recording, order), seconds)
+        while one.as_json()["state"] == "starting":
+            sleep(0.01)
+        live_s, state = perf_counter() - begun, one.as_json()
+        started.close()
+    return {
+        "past_s": seconds,
+        "verify_s": round(verify_s, 2),
+        "state": state["state"],
+        "error": state["error"],
+        "live_after_s": round(live_s, 2),
+        "to_reach_s": round(verify_s + 1.0, 2),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", default=["lead", "fork"])
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--output", type=Path)
+    options = parser.parse_args()
+    result: dict[str, Any] = {"cores": os.cpu_count(), "load_before": os.getloadavg()}
+    for part in options.parts:
+        result[part] = {"lead": bench_lead, "fork": bench_fork}[part](options.seconds)
+    result["load_after"] = os.getloadavg()
+    text = json.dumps(result, indent=2)
+    print(text)
+    if options.output is not None:
+        options.output.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
