@@ -38,9 +38,12 @@ class Readings:
         data: mujoco.MjData,
         arms: Mapping[CartArm, MountedPsm | MountedEcm],
         servos: Servos,
+        positions: Vector | None = None,
     ) -> None:
-        """Report on `arms`."""
-        self._sensors, self._qpos = data.sensordata, np.empty(model.nq)
+        """Report on `arms`; `positions` is the matrix to those of the whole model where this one is lean."""
+        self._whole = positions
+        self._sensors = data.sensordata
+        self._qpos = np.empty(model.nq if positions is None else len(positions))
         self._positions = data.qpos
         self._jaws: list[tuple[Vector, Vector, Vector]] = []
         poses: list[NDArray[np.intp]] = []
@@ -78,4 +81,7 @@ class Readings:
     def refresh(self) -> None:
         """Update what is published less often: the tips' poses and the model's positions."""
         self._sensors.take(self._where, None, self._poses, "clip")  # three times as fast as the default mode
-        self._qpos[:] = self._positions
+        if self._whole is None:
+            self._qpos[:] = self._positions
+        else:
+            self._whole.dot(self._positions, self._qpos)
