@@ -176,3 +176,11 @@ class TableParams(Params):
             " that lies on it well inside its fingers"
         ),
     )
+    friction: float | None = Field(
+        default=None,
+        gt=0.0,
+        description=(
+            "coefficient with which things slide on it; by default their own: at 1, like that of fingers, one"
+            " finger can jam a wire against the table and throw it (docs/decisions/0090)"
+        ),
+    )
