@@ -35,7 +35,9 @@ def lean(spec: mujoco.MjSpec, scene: SceneParams) -> tuple[mujoco.MjModel, Vecto
         if link.follow is not None
     }
     for name in follows:
-        spec.delete(spec.equality(name))
+        tie = spec.equality(name)
+        assert tie is not None
+        spec.delete(tie)
         spec.delete(spec.joint(name))
     for geom in list(spec.geoms):
         is_cover = geom.type == mujoco.mjtGeom.mjGEOM_MESH and not geom.contype
@@ -76,7 +78,7 @@ def _positions(whole: mujoco.MjModel, model: mujoco.MjModel, follows: Mapping[st
     """Return the matrix from the positions of `model` to those of `whole`, shape (whole.nq, model.nq)."""
     matrix = np.zeros((whole.nq, model.nq))
     for i in range(whole.njnt):
-        joint = whole.joint(i)
+        joint = whole.joint(i)  # its size is that of `qpos0`: 7 of a free one
         follow = follows.get(joint.name, Follow(joint.name, 1.0))
         leader = model.joint(follow.joint)
         for k in range(len(joint.qpos0)):
