@@ -180,7 +180,7 @@ class TableParams(Params):
         default=None,
         gt=0.0,
         description=(
-            "coefficient with which things slide on it; by default their own: at 1, like that of fingers, one"
-            " finger can jam a wire against the table and throw it (docs/decisions/0090)"
+            "coefficient with which things slide on it; without twisting friction; by default their own,"
+            " with which a closing jaw sometimes throws a needle (docs/decisions/0090)"
         ),
     )
