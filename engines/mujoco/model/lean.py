@@ -1,9 +1,9 @@
 """Less of a model, for learning: arms without their linkage's own joints and without their covers' contacts.
 
 The links of a parallelogram follow the joint that leads them, each by a tie that costs the solver a row and a
-degree of freedom. Here they stand still, and the leading joint has what they add to its inertia as rotor
-inertia. That is exact: each of them turns by a fixed share of the joint, or moves along a circle, so what
-they add depends on no position. Left out is how they change the inertia about the joints above as they move.
+degree of freedom. Here they stand still, and the leading joint has what they add to its inertia, where the
+arm starts, as rotor inertia. Turning the leading joint does not change that; the counterweight does, which
+slides as the instrument is inserted. Left out is how the links change the inertia about yaw as they move.
 """
 
 from __future__ import annotations
