@@ -122,7 +122,8 @@ class Rod:
         around = nodes.copy()
         around[at] = 0.0
         sunk = nodes[at] - [0.0, 0.0, dt * self._thread.sinking]
-        weights = np.linalg.inv(np.eye(len(at)) + dt * self._bending[at[0] : at[-1] + 1, at[0] : at[-1] + 1])
+        system = np.eye(len(at)) + dt * self._bending[np.ix_(at, at)]
+        weights = np.linalg.inv(system).astype(np.float64)
         nodes[at] = weights @ (sunk - dt * self._bending[at] @ around)
         nodes[at] = _kept(span, ways, nodes[at], weights)
 
