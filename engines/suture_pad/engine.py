@@ -64,6 +64,7 @@ class SuturePad(Stepped):
         self._shape = needle.shape
         self._channel = Channel(self._shape, params.tissue)
         self._frame_of = ThreePoints(self._shape.bonded)
+        self._tip_in_needle = self._shape.marks[2]
         self._state = PadState()
         self._side: ForceSide | None = None
         self._thread = None
@@ -154,7 +155,7 @@ class SuturePad(Stepped):
         rotation, shift = self._world_in_pad[:3, :3], self._world_in_pad[:3, 3]
         points = position.reshape(3, 3) @ rotation.T + shift
         turned, origin = self._frame_of.frame(points)
-        self._tip = turned @ self._shape.marks[2] + origin
+        self._tip = turned @ self._tip_in_needle + origin
         over = bool((np.abs(self._tip[:2]) < self._half).all())
         force, moment = self._channel.advance(turned, origin, over_pad=over)
         self._size = float(np.sqrt(force @ force))
