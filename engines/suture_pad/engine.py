@@ -9,7 +9,7 @@ import numpy as np
 from engines.suture_pad.channel import Channel, Phase
 from engines.suture_pad.drawn_thread import DrawnThread
 from engines.suture_pad.params import SuturePadParams
-from engines.suture_pad.ports import BOND, SKIN, THREAD, THREAD_NUMBERS, bond_side, pad_ports
+from engines.suture_pad.ports import BOND, SKIN, THREAD_NUMBERS, bond_side, pad_ports
 from engines.suture_pad.skin import Skin
 from engines.suture_pad.three_points import ThreePoints, cross
 from hub.participant import (
@@ -26,6 +26,7 @@ from hub.participant import (
     state_hash,
 )
 from robots.dvrk.cart import inverse_pose
+from robots.training.threads import THREAD
 from schemas.errors import ScenarioError
 from schemas.ports import BondSide, Port
 from schemas.ros import Header, Time

@@ -8,7 +8,7 @@ from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message
 from schemas.trocar_msgs import SoftBodyState, TaskEvent
 
-__all__ = ["BOND", "EVENTS", "SKIN", "THREAD", "THREAD_NUMBERS", "bond_side", "pad_ports"]
+__all__ = ["BOND", "EVENTS", "SKIN", "THREAD_NUMBERS", "bond_side", "pad_ports"]
 
 BOND = "needle"
 SKIN = "skin"

@@ -86,15 +86,17 @@ class Rod:
             state.nodes[:] = base - self._ways[:, None] * forward
             np.maximum(state.nodes[:, 2], 0.0, out=state.nodes[:, 2])
         state.nodes[0] = base
+        held = np.zeros(len(self._ways), np.bool_)
         for passage in passages:
             ways = passage.through - self._ways
             beside = _BESIDE * thread.segment
             inside = (ways >= -beside) & (ways <= passage.length + beside)
             inside[0] = False
             state.nodes[inside] = passage.at(ways[inside])
+            held |= inside
         nodes = np.concatenate([[base + thread.segment * forward], state.nodes])
         for span in self._spans(base, passages):
-            self._take(span, nodes, dt)
+            self._take(span, held, nodes, dt)
         state.nodes[:] = nodes[1:]
 
     def _spans(self, base: Vector, passages: Sequence[Passage]) -> list[Span]:
@@ -106,8 +108,11 @@ class Rod:
             start, place = passage.through, passage.points[0]
         return [*spans, Span(start, self._thread.length, place, None)]
 
-    def _take(self, span: Span, nodes: Vector, dt: float) -> None:
-        """Move the free nodes of a span; `nodes` has the one ahead of the base before all others."""
+    def _take(self, span: Span, held: NDArray[np.bool_], nodes: Vector, dt: float) -> None:
+        """Move the nodes of a span that passages have not `held`.
+
+        `nodes` has the one ahead of the base before all others.
+        """
         within = np.flatnonzero((self._ways > span.start) & (self._ways <= span.end))
         if span.end_place is not None:
             way, length = span.end_place - span.place, span.end - span.start
@@ -115,29 +120,28 @@ class Rod:
                 shares = (self._ways[within] - span.start) / max(length, 1e-12)
                 nodes[within + 1] = span.place + shares[:, None] * way
                 return
-        span, free = self._between_held(span, within, nodes)
+        span, free = self._between_held(span, within, held, nodes)
         if not len(free):
             return
         ways, at = self._ways[free], free + 1
         around = nodes.copy()
         around[at] = 0.0
-        sunk = nodes[at] - [0.0, 0.0, dt * self._thread.sinking]
+        sunk = nodes[at]
+        sunk[:, 2] = np.maximum(sunk[:, 2] - dt * self._thread.sinking, np.minimum(sunk[:, 2], 0.0))
         system = np.eye(len(at)) + dt * self._bending[np.ix_(at, at)]
         weights = np.linalg.inv(system).astype(np.float64)
         nodes[at] = weights @ (sunk - dt * self._bending[at] @ around)
         nodes[at] = _kept(span, ways, nodes[at], weights)
 
     def _between_held(
-        self, span: Span, within: NDArray[np.int64], nodes: Vector
+        self, span: Span, within: NDArray[np.int64], held: NDArray[np.bool_], nodes: Vector
     ) -> tuple[Span, NDArray[np.int64]]:
         """Return the span between nodes that its passages hold just outside of them, and its free nodes."""
-        beside = _BESIDE * self._thread.segment
-        ways = self._ways[within]
-        if len(within) and ways[0] <= span.start + beside:
-            span = span._replace(start=float(ways[0]), place=nodes[within[0] + 1])
-            within, ways = within[1:], ways[1:]
-        if len(within) and span.end_place is not None and ways[-1] >= span.end - beside:
-            span = span._replace(end=float(ways[-1]), end_place=nodes[within[-1] + 1])
+        if len(within) and held[within[0]]:
+            span = span._replace(start=float(self._ways[within[0]]), place=nodes[within[0] + 1])
+            within = within[1:]
+        if len(within) and held[within[-1]]:
+            span = span._replace(end=float(self._ways[within[-1]]), end_place=nodes[within[-1] + 1])
             within = within[:-1]
         return span, within
 
