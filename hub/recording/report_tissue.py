@@ -12,7 +12,7 @@ from hub.recording.report_canvas import Figure, axes_of, legend, line_of, thin
 __all__ = ["tissue_figures"]
 
 _LINES = 8
-"""Of insertions: more cannot be told apart."""
+"""Of insertions: more would look the same."""
 
 
 def tissue_figures(recording: Recording) -> Iterator[Figure]:
