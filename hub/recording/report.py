@@ -23,6 +23,7 @@ from hub.recording.report_figures import (
     step_time_figures,
 )
 from hub.recording.report_scores import score_figures, score_table, scored
+from hub.recording.report_tissue import tissue_figures
 from hub.recording.report_vision import vision_figures
 from hub.recording.series import Series
 from schemas.errors import RecordingError
@@ -51,7 +52,8 @@ def report(recording: Recording, output: Path) -> None:
         bonds=_section("Coupling", _bond_figures(traces, books)),
         steps=_section("Timing", _step_figures(recording, scenario, statuses)),
         scores=_scores(recording),
-        vision=_vision(recording),
+        vision=_section("Vision", vision_figures(recording)),
+        tissue=_section("Tissue", tissue_figures(recording)),
         profile=_profile(recording),
         ports=_table(("topic", "type", "messages", "per second"), _ports(recording)),
         scenario=escape(recording.attachments.get("scenario.yaml", b"").decode("utf-8", "replace")),
@@ -166,15 +168,6 @@ def _profile(recording: Recording) -> str:
         return ""
     tables = "\n".join(_table(heads, rows) for heads, rows in profile_tables(profile_numbers(profile)))
     return f'<section aria-labelledby="h-profile"><h2 id="h-profile">Processor time</h2>{tables}</section>'
-
-
-def _vision(recording: Recording) -> str:
-    """Return the section about what controllers saw; empty if there was none."""
-    figures = _sections(vision_figures(recording))
-    if not figures:
-        return ""
-    heading = '<h2 id="h-vision">Vision</h2>'
-    return f'<section aria-labelledby="h-vision">{heading}<div class="figures">{figures}</div></section>'
 
 
 def _scores(recording: Recording) -> str:
