@@ -40,6 +40,7 @@ FINE, REACH, GROWTH = 0.3, 0.4, 1.2
 """Edges are 0.3 radii long within 0.4 radii of the place of the press, and 1.2 of what is beyond."""
 SNAPPED_M = 12e-3
 """From that place: how far the surface of an organ is that of its shape."""
+AROUND_M = 3e-3
 ORGANS: dict[str, Any] = {
     "liver-lobe": (liver, "liver", (-0.050, -0.066, -0.030), (0.050, 0.066, 0.030), 0.0185),
     "kidney-with-adrenal": (kidney, "kidney", (-0.055, -0.030, -0.026), (0.085, 0.030, 0.026), 0.0130),
@@ -321,22 +322,33 @@ class Body:
     point: Vector
     """Of the surface at rest, m."""
     inward: Vector
+    """The normal there."""
+    from_rest: bool = True
+    """Whether depths count from the surface at rest, along its normal; else from where it hangs."""
 
-    @property
-    def settled(self) -> Vector:
-        """The point where gravity alone has brought it, m."""
-        nearest = np.linalg.norm(self.solid.rest - self.point, axis=1).argmin()
-        return self.point + self.solid.moved.reshape(self.solid.rest.shape)[nearest]
-
-    def press(self, radius: float, depths: Sequence[float], *, from_rest: bool) -> Iterator[float]:
-        """Yield the force (N) along the normal at every depth (m), below the surface at rest or settled."""
+    def press(self, radius: float, depths: Sequence[float]) -> Iterator[float]:
+        """Yield the force (N) along the normal at every depth (m)."""
         self.solid.settle()
-        start, at = self.point if from_rest else self.settled, 0.0
+        start, inward = (self.point, self.inward) if self.from_rest else self.settled
+        at = 0.0
         for depth in depths:
             while at < depth - 1e-9:
                 at = min(at + (0.25 if at < 1.5 * radius else 0.1) * radius, depth)
-                force = self.solid.press(start + (at - radius) * self.inward, radius)
-            yield -float(force @ self.inward)
+                force = self.solid.press(start + (at - radius) * inward, radius)
+            yield -float(force @ inward)
+
+    @property
+    def settled(self) -> tuple[Vector, Vector]:
+        """The point where gravity alone has brought it, m, and the normal there, once the solid has settled.
+
+        The normal is that of the plane through the nodes of the surface around.
+        """
+        rest, nodes = self.solid.rest, self.solid.rest + self.solid.moved.reshape(self.solid.rest.shape)
+        away = np.linalg.norm(rest - self.point, axis=1)
+        surface = np.unique(self.solid.faces // 3)
+        around = nodes[surface[away[surface] < AROUND_M]]
+        normal = np.linalg.svd(around - around.mean(axis=0))[2][2]
+        return nodes[away.argmin()], normal * np.sign(normal @ self.inward)
 
 
 def middle_of_block(radius: float) -> Body:
@@ -407,7 +419,7 @@ def organ(shape: str, x: float, y: float, radius: float) -> Body:
         these = np.array([tuple(point) in where for point in np.round(nodes, 9).tolist()])
         return np.repeat(these[:, None], 3, axis=1)
 
-    return Body(three_dimensional(formed, np.array(loose), fixed, elastic, STANDARD_GRAVITY), site, inward)
+    return Body(three_dimensional(formed, np.array(loose), fixed, elastic, STANDARD_GRAVITY), site, inward, False)
 
 
 def law(poisson_ratio: float, depths: Sequence[float]) -> Iterator[float]:
