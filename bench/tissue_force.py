@@ -67,7 +67,11 @@ def places(nodes: Vector, faces: Any, point: Vector) -> dict[str, Vector]:
     """Return the node, the middle of an edge and that of a face of the top of a block that are nearest to `point`."""
     faces = faces[(nodes[faces][:, :, 2] > -1e-9).all(axis=1)]
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    found = {"node": nodes[np.unique(faces)], "edge": nodes[edges].mean(axis=1), "face": nodes[faces].mean(axis=1)}
+    found = {
+        "node": nodes[np.unique(faces)],
+        "edge": nodes[edges].mean(axis=1),
+        "face": nodes[faces].mean(axis=1),
+    }
     return {name: these[np.linalg.norm(these - point, axis=1).argmin()] for name, these in found.items()}
 
 
@@ -131,8 +135,12 @@ def picture(path: Path) -> None:
             true = TRUTH[body]["force_n"][radius]
             axis.plot(np.arange(1, len(true) + 1), true, color=colour, label=f"{radius} mm, converged")
             for sub_grid, mark, name in ((True, "o", "now"), (False, "x", "mesh alone")):
-                found = press(body, 250, float(radius) * 1e-3, "face" if body == "middle" else "site", sub_grid=sub_grid).force_n
-                axis.plot(np.arange(1, 7), found, mark, color=colour, markersize=5, label=f"{radius} mm, {name}")
+                found = press(
+                    body, 250, float(radius) * 1e-3, "face" if body == "middle" else "site", sub_grid=sub_grid
+                ).force_n
+                axis.plot(
+                    np.arange(1, 7), found, mark, color=colour, markersize=5, label=f"{radius} mm, {name}"
+                )
         axis.set_title(TRUTH[body]["title"], fontsize=9)
         axis.set_xlabel("depth, mm")
         axis.set_yscale("log")

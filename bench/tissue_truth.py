@@ -48,12 +48,14 @@ ORGANS: dict[str, Any] = {
 """Module, material, box and spacing of some 250 nodes."""
 
 LAW_RADIUS_M = 5e-3
-LAW_DEPTHS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, *np.arange(1.0, 3.01, 0.2).round(1).tolist())
+LAW_DEPTHS: list[float] = np.arange(0.2, 3.01, 0.2).round(1).tolist()
 """In radii."""
 
 PENALTY = 5e9
 """Pressure (Pa) by a metre that the surface is inside the sphere: 1 um at 5 kPa."""
-PERMUTATION = np.array([[[np.linalg.det(np.eye(3)[[i, j, k]]) for k in range(3)] for j in range(3)] for i in range(3)])
+PERMUTATION = np.array(
+    [[[np.linalg.det(np.eye(3)[[i, j, k]]) for k in range(3)] for j in range(3)] for i in range(3)]
+)
 """The permutation symbol."""
 
 
@@ -92,7 +94,10 @@ class Solid:
         self._mu, self._lambda = self.material.bullet_lame
         self._alpha = 1.0 + 0.75 * self._mu / self._lambda
         dofs = self.dofs
-        self._pairs = tuple(np.broadcast_to(x, (*dofs.shape, dofs.shape[1])).ravel() for x in (dofs[:, :, None], dofs[:, None]))
+        self._pairs = tuple(
+            np.broadcast_to(x, (*dofs.shape, dofs.shape[1])).ravel()
+            for x in (dofs[:, :, None], dofs[:, None])
+        )
         self._place = np.full(self.rest.size, -1)
         self._place[self.free] = np.arange(len(self.free))
 
@@ -116,12 +121,20 @@ class Solid:
                 step = -step
             step *= min(1.0, 0.25 * radius / np.abs(step).max())
             length, slope = 1.0, float(step @ residual)
-            while length > 1e-4 and self._energy(self.moved + length * step, centre, radius) > value + 1e-4 * length * slope:
+            while (
+                length > 1e-4
+                and self._energy(self.moved + length * step, centre, radius) > value + 1e-4 * length * slope
+            ):
                 length *= 0.5
             self.moved = self.moved + length * step
             value, residual, matrix = self._state(self.moved, centre, radius)
-            pressed = 1e-3 if centre is None else float(np.abs(self._contact(self.moved, centre, radius)[2]).max())
-            if np.abs(residual[free]).max() < 1e-6 + 1e-4 * pressed and length * np.abs(step).max() < 1e-3 * radius:
+            pressed = (
+                1e-3 if centre is None else float(np.abs(self._contact(self.moved, centre, radius)[2]).max())
+            )
+            if (
+                np.abs(residual[free]).max() < 1e-6 + 1e-4 * pressed
+                and length * np.abs(step).max() < 1e-3 * radius
+            ):
                 return
         raise RuntimeError(f"no equilibrium: {np.abs(residual[free]).max():.3g} N are left")
 
@@ -142,12 +155,16 @@ class Solid:
         """Return energy (J), residual (N) and stiffness of the free unknowns."""
         F, J, trace, cofactor = self._deformation(moved)
         mu, lambda_, alpha = self._mu, self._lambda, self._alpha
-        P = (mu * (1 - 1 / (trace + 1)))[..., None, None] * F + (lambda_ * (J - alpha))[..., None, None] * cofactor
+        P = (mu * (1 - 1 / (trace + 1)))[..., None, None] * F + (lambda_ * (J - alpha))[
+            ..., None, None
+        ] * cofactor
         A = np.einsum("eq,xy->eqxy", mu * (1 - 1 / (trace + 1)), np.eye(9))
         f, g = F.reshape(*J.shape, 9), cofactor.reshape(*J.shape, 9)
         A += (2 * mu / (trace + 1) ** 2)[..., None, None] * f[..., :, None] * f[..., None, :]
         A += lambda_ * g[..., :, None] * g[..., None, :]
-        A += (lambda_ * (J - alpha))[..., None, None] * np.einsum("iko,jlp,eqop->eqijkl", PERMUTATION, PERMUTATION, F, optimize=True).reshape(*J.shape, 9, 9)
+        A += (lambda_ * (J - alpha))[..., None, None] * np.einsum(
+            "iko,jlp,eqop->eqijkl", PERMUTATION, PERMUTATION, F, optimize=True
+        ).reshape(*J.shape, 9, 9)
         B = self.by_unknown
         K = (B.swapaxes(2, 3) @ (self.weights[..., None, None] * A) @ B).sum(axis=1)
         inner = np.einsum("eqxa,eqx->ea", B, self.weights[..., None] * P.reshape(*J.shape, 9))
@@ -166,9 +183,15 @@ class Solid:
         i, j = (self._place[np.concatenate(parts)] for parts in (rows, columns))
         here = (i >= 0) & (j >= 0)
         size = len(self.free)
-        return energy, residual, coo_array((np.concatenate(values)[here], (i[here], j[here])), (size, size)).tocsc()
+        return (
+            energy,
+            residual,
+            coo_array((np.concatenate(values)[here], (i[here], j[here])), (size, size)).tocsc(),
+        )
 
-    def _contact(self, moved: Vector, centre: Vector, radius: float) -> tuple[float, Vector, Vector, Vector, Any]:
+    def _contact(
+        self, moved: Vector, centre: Vector, radius: float
+    ) -> tuple[float, Vector, Vector, Vector, Any]:
         """Return energy, force on the unknowns, on the sphere, and the stiffness of the touched faces."""
         points = np.einsum("fpda,fa->fpd", self.shapes, self.rest.ravel()[self.faces] + moved[self.faces])
         away = points - centre
@@ -200,7 +223,9 @@ def _gradients(basis: Any) -> Vector:
 
 def _values(basis: Any) -> Vector:
     """Return the shape functions on the faces, (f, p, a)."""
-    return np.stack([np.broadcast_to(part[0].value, basis.dx.shape) for part in basis.basis]).transpose(1, 2, 0)
+    return np.stack([np.broadcast_to(part[0].value, basis.dx.shape) for part in basis.basis]).transpose(
+        1, 2, 0
+    )
 
 
 def _mass(basis: Any, around: Vector) -> Vector:
@@ -209,7 +234,9 @@ def _mass(basis: Any, around: Vector) -> Vector:
     return np.bincount(basis.element_dofs.ravel(), parts.ravel(), basis.N)
 
 
-def _solid(basis: Any, sides: Any, by_unknown: Vector, scale: tuple[Vector, Vector], material: Material, **rest: Any) -> Solid:
+def _solid(
+    basis: Any, sides: Any, by_unknown: Vector, scale: tuple[Vector, Vector], material: Material, **rest: Any
+) -> Solid:
     values, d = _values(sides), len(basis.doflocs)
     shapes = np.einsum("fpa,xy->fpxay", values, np.eye(d)).reshape(*values.shape[:2], d, -1)
     fixed = rest.pop("fixed")
@@ -227,7 +254,9 @@ def _solid(basis: Any, sides: Any, by_unknown: Vector, scale: tuple[Vector, Vect
     )
 
 
-def three_dimensional(mesh: MeshTet, top: Any, fixed: Any, material: Material, gravity: float, copies: float = 1.0) -> Solid:
+def three_dimensional(
+    mesh: MeshTet, top: Any, fixed: Any, material: Material, gravity: float, copies: float = 1.0
+) -> Solid:
     """Return a body of quadratic tetrahedra.
 
     Args:
@@ -305,7 +334,8 @@ def refined(mesh: MeshTet, at: Vector, least: float, reach: float) -> MeshTet:
     while True:
         corners = mesh.p[:, mesh.t]
         longest = np.max(
-            [np.linalg.norm(corners[:, i] - corners[:, j], axis=0) for i in range(4) for j in range(i)], axis=0
+            [np.linalg.norm(corners[:, i] - corners[:, j], axis=0) for i in range(4) for j in range(i)],
+            axis=0,
         )
         away = np.linalg.norm(corners - at[:, None, None], axis=0).min(axis=0)
         coarse = np.flatnonzero(longest > np.maximum(least, GROWTH * (away - reach)))
@@ -387,7 +417,9 @@ def organ(shape: str, x: float, y: float, radius: float) -> Body:
     heights = np.linspace(0.0, high[2], 2001)
     column = np.stack([np.full(2001, x), np.full(2001, y), heights], axis=1)
     top = column[np.flatnonzero(module._field(column) > 0.0)[-1]]
-    mesh = refined(MeshTet(thick.nodes.T.copy(), thick.tetrahedra.T.copy()), top, FINE * radius, REACH * radius)
+    mesh = refined(
+        MeshTet(thick.nodes.T.copy(), thick.tetrahedra.T.copy()), top, FINE * radius, REACH * radius
+    )
     points = mesh.p.T.copy()
     near = np.unique(mesh.facets[:, mesh.boundary_facets()])
     near = near[np.linalg.norm(points[near] - top, axis=1) < SNAPPED_M]
@@ -396,7 +428,9 @@ def organ(shape: str, x: float, y: float, radius: float) -> Body:
     site = module._formed(np.stack([top, top + [1e-4, 0, 0], top + [0, 1e-4, 0]]))
     nearest = near[np.linalg.norm(formed.p.T[near] - site[0], axis=1).argmin()]
     site = formed.p.T[nearest]
-    ahead = _onto_surface(module._field, np.stack([points[nearest] + [1e-4, 0, 0], points[nearest] + [0, 1e-4, 0]]))
+    ahead = _onto_surface(
+        module._field, np.stack([points[nearest] + [1e-4, 0, 0], points[nearest] + [0, 1e-4, 0]])
+    )
     edges = module._formed(ahead) - site
     normal = np.cross(edges[0], edges[1])
     inward = -normal / np.linalg.norm(normal)
@@ -419,29 +453,23 @@ def organ(shape: str, x: float, y: float, radius: float) -> Body:
         these = np.array([tuple(point) in where for point in np.round(nodes, 9).tolist()])
         return np.repeat(these[:, None], 3, axis=1)
 
-    return Body(three_dimensional(formed, np.array(loose), fixed, elastic, STANDARD_GRAVITY), site, inward, False)
+    return Body(
+        three_dimensional(formed, np.array(loose), fixed, elastic, STANDARD_GRAVITY), site, inward, False
+    )
 
 
-def law(poisson_ratio: float, depths: Sequence[float]) -> Iterator[float]:
-    """Yield the share of Hertz's force for a half-space at every depth in radii.
-
-    Elements at the surface are 0.02 radii long for depths up to 0.15, 0.1 radii beyond.
-    """
-    for fine, some in ((0.02, [x for x in depths if x <= 0.15]), (0.1, [x for x in depths if x > 0.15])):
-        r = graded(fine, 100.0, 1.35, 15.0 * fine) * LAW_RADIUS_M
-        solid = axisymmetric(MeshTri.init_tensor(r, -r[::-1]), Material(10e3, poisson_ratio, 1000.0, 0.0))
-        at = 0.0
-        for depth in some:
-            while at < depth - 1e-9:
-                at = min(at + 0.1, depth)
-                force = solid.press(np.array([0.0, LAW_RADIUS_M * (1.0 - at)]), LAW_RADIUS_M)
-            hertz = 4.0 / 3.0 * 10e3 / (1.0 - poisson_ratio**2) * LAW_RADIUS_M**2 * depth**1.5
-            yield float(force[1]) / hertz
+def law(poisson_ratio: float) -> Iterator[float]:
+    """Yield the share of Hertz's force for a half-space at every depth of `LAW_DEPTHS`."""
+    r = graded(0.1, 100.0, 1.35, 1.5) * LAW_RADIUS_M
+    solid = axisymmetric(MeshTri.init_tensor(r, -r[::-1]), Material(10e3, poisson_ratio, 1000.0, 0.0))
+    for depth in LAW_DEPTHS:
+        force = float(solid.press(np.array([0.0, LAW_RADIUS_M * (1.0 - depth)]), LAW_RADIUS_M)[1])
+        yield force / (4.0 / 3.0 * 10e3 / (1.0 - poisson_ratio**2) * LAW_RADIUS_M**2 * depth**1.5)
 
 
 def print_law() -> None:
     """Print the table of engines/bullet/elasticity/half_space.py."""
-    shares = [list(law(nu, LAW_DEPTHS)) for nu in POISSON_RATIOS]
+    shares = [list(law(nu)) for nu in POISSON_RATIOS]
     for depth, row in zip(LAW_DEPTHS, zip(*shares, strict=True), strict=True):
         print(f"[{depth:.2f}, {', '.join(f'{share:.4f}' for share in row)}],", flush=True)
 
