@@ -40,7 +40,7 @@ ORGANS: dict[str, dict[str, Any]] = {
     "kidney": {"shape": "kidney-with-adrenal"},
 }
 PLACES = ("node", "edge", "face")
-"""In the middle of the block, where the truth does not depend on the place; elsewhere where that was computed."""
+"""In the middle of the block, where the truth is the same at all; elsewhere at the site of the truth."""
 NEAR_M, AROUND_M = 1e-3, 6e-3
 PAUSE_S = 0.2
 
@@ -64,7 +64,7 @@ class Press:
 
 
 def places(nodes: Vector, faces: Any, point: Vector) -> dict[str, Vector]:
-    """Return the node, the middle of an edge and that of a face of the top of a block that are nearest to `point`."""
+    """Return what is nearest to `point` on a block's top: a node, the middles of an edge and of a face."""
     faces = faces[(nodes[faces][:, :, 2] > -1e-9).all(axis=1)]
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     found = {
@@ -163,7 +163,7 @@ def main() -> None:
             errors = " ".join(f"{100 * error:+6.1f}" for error in row.errors)
             print(
                 f"{row.body:7} {row.nodes:4} nodes {row.radius_m * 1e3:.0f} mm {row.place:5} error, %: {errors:42}"
-                f" times real time on one core {1.0 / row.cost:.2f}",
+                f" {1.0 / row.cost:.2f} times real time",
                 flush=True,
             )
     if args.picture:

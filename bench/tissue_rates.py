@@ -21,8 +21,7 @@ from tests.engines.bullet.rig import RADIUS, SMALL_BLOCK, Rig, params
 
 FREQUENCIES_HZ = (0.1, 1.0, 10.0)
 DAMPINGS_MS = (1, 12)
-"""The default, and what a file of a press of liver-like tissue has (docs/decisions/0073-calibrated-tissue.md).
-"""
+"""The default, and that of the file of a press (docs/decisions/0073-calibrated-tissue.md)."""
 SHARES, TIMES_S = (0.25, 0.30), (0.4, 8.0)
 """Of that press."""
 DEPTH_M, AMPLITUDE_M = 2e-3, 0.2e-3

@@ -1,11 +1,13 @@
-"""The force of tissue, converged: what a sphere or a held patch feels, by finite elements that are not ours.
+"""The force of tissue on a sphere, converged, by finite elements that are not ours.
 
 python bench/tissue_truth.py law        # the share of Hertz's force in engines/bullet/elasticity/half_space.py
+python bench/tissue_truth.py            # bench/tissue_truth.json, half an hour
 
 Quadratic elements of scikit-fem (`pip install scikit-fem`), fine where the sphere touches; Bullet's material;
-no friction; contact by a penalty at the points of integration; Newton's method with a line search. The engine
-has linear elements of its own, so nothing of it is in these figures but the material's energy: Smith, de Goes,
-Kim, Stable Neo-Hookean Flesh Simulation (ACM Trans. Graph. 37, 2018), equation 14.
+no friction; contact by a penalty at the points of integration; Newton's method with a line search. The
+engine has linear elements of its own, so nothing of it is in these figures but the meshes of its shapes and
+the material's energy: Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation (ACM Trans. Graph. 37, 2018),
+equation 14.
 """
 
 from __future__ import annotations
@@ -139,7 +141,7 @@ class Solid:
         raise RuntimeError(f"no equilibrium: {np.abs(residual[free]).max():.3g} N are left")
 
     def _energy(self, moved: Vector, centre: Vector | None, radius: float) -> float:
-        F, J, trace, _ = self._deformation(moved)
+        _, J, trace, _ = self._deformation(moved)
         density = self._mu / 2 * (trace - 3 - np.log(trace + 1)) + self._lambda / 2 * (J - self._alpha) ** 2
         contact = 0.0 if centre is None else self._contact(moved, centre, radius)[0]
         return float((self.weights * density).sum() - self.load @ moved + contact)
@@ -289,7 +291,10 @@ def three_dimensional(
 
 
 def axisymmetric(mesh: MeshTri, material: Material, gravity: float = 0.0) -> Solid:
-    """Return a body of revolution, (r, z) the coordinates of the mesh: held below and outside, pressed above."""
+    """Return a body of revolution, (r, z) the coordinates of the mesh, pressed above.
+
+    It is held below, and without gravity, as a half-space, outside too.
+    """
     basis = Basis(mesh, ElementTriP2(), intorder=4)
     top = mesh.facets_satisfying(lambda x: np.abs(x[1]) < 1e-12)
     sides = FacetBasis(mesh, ElementTriP2(), facets=top, intorder=6)
@@ -425,7 +430,7 @@ def organ(shape: str, x: float, y: float, radius: float) -> Body:
     near = near[np.linalg.norm(points[near] - top, axis=1) < SNAPPED_M]
     points[near] = _onto_surface(module._field, points[near])
     formed = MeshTet(module._formed(points).T.copy(), mesh.t)
-    site = module._formed(np.stack([top, top + [1e-4, 0, 0], top + [0, 1e-4, 0]]))
+    site = module._formed(np.stack(np.array([top])))
     nearest = near[np.linalg.norm(formed.p.T[near] - site[0], axis=1).argmin()]
     site = formed.p.T[nearest]
     ahead = _onto_surface(

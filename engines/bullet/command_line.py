@@ -21,8 +21,8 @@ _LIMITS = (
     " (docs/decisions/0095-converged-truth.md), which also says where it is not.",
     "Probes of several spheres and fingers feel the mesh. Tissue that is held, as by jaws 4 mm wide, is 2 to"
     " 5.5 times too stiff with 250 nodes, 1.3 to 3.4 times with 600.",
-    "Bullet's tissue does not relax. Its damping is in proportion to its stiffness: its loss tangent grows with"
-    " frequency (0.006 at 1 Hz with the default of 1 ms), where that of organs falls.",
+    "Bullet's tissue does not relax. Its damping is in proportion to its stiffness: its loss tangent grows"
+    " with frequency (0.006 at 1 Hz with the default of 1 ms), where that of organs falls.",
 )
 """What holds for all of them."""
 
@@ -70,9 +70,7 @@ def _shapes(nodes: int) -> dict[str, Any]:
 
 
 def _contact(shape: str, nodes: int) -> list[dict[str, Any]]:
-    """Return by radius how much stiffer than its tissue the mesh is under a sphere, and up to which depth
-    (m) a probe of one sphere feels the tissue all the same; empty where nothing mends it.
-    """
+    """Return for spheres of `_RADII_M` how far the mesh is from its tissue; empty where nothing mends it."""
     from engines.bullet.organs.params import OrganParams
     from engines.bullet.probes.band import band
 

@@ -1,4 +1,4 @@
-"""What the report of a session says about its tissue: how far the force of each mesh is that of the tissue."""
+"""What the report of a session says about its tissue: how far a mesh's force is that of the tissue."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ from schemas.scenario import Scenario
 __all__ = ["GROUP", "noted"]
 
 GROUP = "trocar.notes"
-"""Entry points by kind: functions that take the parameters (a mapping, as the scenario states them) and return
-pairs of what is noted and the text.
+"""Entry points by kind: functions that take the parameters (a mapping, as the scenario states them) and
+return pairs of what is noted and the text.
 """
 
 

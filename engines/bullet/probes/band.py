@@ -10,7 +10,6 @@ import numpy as np
 from engines.bullet.elasticity.compliance import MOST_NODES, SurfaceCompliance
 from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
 from engines.bullet.organs.params import OrganParams
-from schemas.vectors import Vector
 
 __all__ = ["Band", "band"]
 
@@ -28,7 +27,7 @@ class Band:
     radius: float
     """m."""
     stiffer: tuple[float, float]
-    """The mesh's force over the tissue's a fifth of a radius deep, at a tenth and nine tenths of the places."""
+    """The mesh's force over the tissue's, `_DEPTH` deep, at a tenth and nine tenths of the places."""
     softer: float
     """Share of the places where the mesh is softer than the tissue: there the spring is rigid."""
     deepest: float

@@ -108,7 +108,7 @@ def test_beyond_the_depths_that_are_known_it_says_so(caplog):
         list(pressed(params(BLOCK, {"radius": radius}, sub_grid=True), PLACES["face"], [2.5e-3], radius))
         assert not caplog.records
         list(pressed(params(BLOCK, {"radius": radius}, sub_grid=True), PLACES["face"], [5e-3], radius))
-    assert "deeper than 2 radii, 3 mm" in caplog.text
+    assert "deeper than 2.5 radii, 3.75 mm" in caplog.text
 
 
 def test_the_same_press_has_the_same_hashes():
