@@ -125,21 +125,27 @@ def study(nodes: int, bodies: list[str]) -> Iterator[Press]:
 
 
 def picture(path: Path) -> None:
-    """Draw force over depth over a face of the coarse meshes: converged, with the spring, and without it."""
+    """Draw force over depth on meshes of 250 nodes: converged, with the spring, and of the mesh alone."""
     from matplotlib.figure import Figure
 
-    figure: Any = Figure(figsize=(10, 3.4), layout="constrained")
-    axes: Any = figure.subplots(1, len(ORGANS))
-    for axis, body in zip(axes, ORGANS, strict=True):
-        for colour, radius in (("C0", "2"), ("C1", "5")):
-            true = TRUTH[body]["force_n"][radius]
+    bodies = [body for body in TRUTH if body != "rim"]
+    figure: Any = Figure(figsize=(10, 3.2), layout="constrained")
+    axes: Any = figure.subplots(1, len(bodies), sharey=True)
+    for axis, body in zip(axes, bodies, strict=True):
+        place = "face" if body == "middle" else "site"
+        for radius, colour in (("2", "C0"), ("5", "C1")):
+            if (true := TRUTH[body]["force_n"].get(radius)) is None:
+                continue
             axis.plot(np.arange(1, len(true) + 1), true, color=colour, label=f"{radius} mm, converged")
-            for sub_grid, mark, name in ((True, "o", "now"), (False, "x", "mesh alone")):
-                found = press(
-                    body, 250, float(radius) * 1e-3, "face" if body == "middle" else "site", sub_grid=sub_grid
-                ).force_n
+            for sub_grid, mark, name in ((True, "o", "as felt"), (False, "x", "mesh alone")):
+                found = press(body, 250, float(radius) * 1e-3, place, sub_grid=sub_grid).force_n[: len(true)]
                 axis.plot(
-                    np.arange(1, 7), found, mark, color=colour, markersize=5, label=f"{radius} mm, {name}"
+                    np.arange(1, len(true) + 1),
+                    found,
+                    mark,
+                    color=colour,
+                    markersize=5,
+                    label=f"{radius} mm, {name}",
                 )
         axis.set_title(TRUTH[body]["title"], fontsize=9)
         axis.set_xlabel("depth, mm")
@@ -155,8 +161,8 @@ def main() -> None:
     """Print the table; draw the picture where asked to."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--picture", type=Path)
-    parser.add_argument("--nodes", type=int, nargs="*", default=list(STEPS))
-    parser.add_argument("--bodies", nargs="*", default=list(ORGANS), choices=list(ORGANS))
+    parser.add_argument("--nodes", type=int, nargs="*", default=[250, 600], choices=list(STEPS))
+    parser.add_argument("--bodies", nargs="*", default=list(TRUTH), choices=list(ORGANS))
     args = parser.parse_args()
     for nodes in args.nodes:
         for row in study(nodes, args.bodies):
