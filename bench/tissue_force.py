@@ -167,11 +167,8 @@ def main() -> None:
     for nodes in args.nodes:
         for row in study(nodes, args.bodies):
             errors = " ".join(f"{100 * error:+6.1f}" for error in row.errors)
-            print(
-                f"{row.body:7} {row.nodes:4} nodes {row.radius_m * 1e3:.0f} mm {row.place:5} error, %: {errors:42}"
-                f" {1.0 / row.cost:.2f} times real time",
-                flush=True,
-            )
+            where = f"{row.body:7} {row.nodes:4} nodes {row.radius_m * 1e3:.0f} mm {row.place:5}"
+            print(f"{where} error, %: {errors:42} {1.0 / row.cost:.2f} times real time", flush=True)
     if args.picture:
         picture(args.picture)
 

@@ -1,7 +1,7 @@
 """The force of tissue on a sphere, converged, by finite elements that are not ours.
 
-python bench/tissue_truth.py law        # the share of Hertz's force in engines/bullet/elasticity/half_space.py
-python bench/tissue_truth.py            # bench/tissue_truth.json, half an hour
+python bench/tissue_truth.py law    # the shares in engines/bullet/elasticity/half_space.py
+python bench/tissue_truth.py        # bench/tissue_truth.json, half an hour of a core
 
 Quadratic elements of scikit-fem (`pip install scikit-fem`), fine where the sphere touches; Bullet's material;
 no friction; contact by a penalty at the points of integration; Newton's method with a line search. The
@@ -12,6 +12,7 @@ equation 14.
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -25,7 +26,7 @@ from skfem import Basis, ElementTetP2, ElementTriP2, FacetBasis, MeshTet, MeshTr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from engines.bullet.elasticity.half_space import POISSON_RATIOS
+from engines.bullet.elasticity.half_space import DEEPEST, POISSON_RATIOS
 from engines.bullet.elasticity.material import Material
 from engines.bullet.meshing.isosurface_stuffing import fill
 from engines.bullet.meshing.smoothing import _onto_surface, smoothed
@@ -38,8 +39,8 @@ __all__ = ["Solid", "axisymmetric", "three_dimensional"]
 
 STANDARD_GRAVITY = 9.80665
 BLOCK = Material(10e3, 0.4, 1000.0, 0.0)
-FINE, REACH, GROWTH = 0.3, 0.4, 1.2
-"""Edges are 0.3 radii long within 0.4 radii of the place of the press, and 1.2 of what is beyond."""
+FINE, REACH, GROWTH = 0.4, 0.4, 1.8
+"""Edges are 0.4 radii long within 0.4 radii of the place of the press, and 1.8 of what is beyond."""
 SNAPPED_M = 12e-3
 """From that place: how far the surface of an organ is that of its shape."""
 AROUND_M = 3e-3
@@ -49,6 +50,7 @@ ORGANS: dict[str, Any] = {
 }
 """Module, material, box and spacing of some 250 nodes."""
 
+DEPTHS_M = (1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3)
 LAW_RADIUS_M = 5e-3
 LAW_DEPTHS: list[float] = np.arange(0.2, 3.01, 0.2).round(1).tolist()
 """In radii."""
@@ -86,8 +88,6 @@ class Solid:
     """N, shape (n d,)."""
     copies: float = 1.0
     """How often the body is there: 2 for half of a symmetric one."""
-    axis: Any = None
-    """Rows of `rest` on a plane or axis of symmetry need no entry: `free` leaves their unknowns out."""
     moved: Vector = field(init=False)
     """Displacements, m, shape (n d,)."""
 
@@ -479,5 +479,28 @@ def print_law() -> None:
         print(f"[{depth:.2f}, {', '.join(f'{share:.4f}' for share in row)}],", flush=True)
 
 
+def study() -> Iterator[tuple[str, str, Body, float]]:
+    """Yield name, title, body and radius (m) of every press."""
+    for radius in (2e-3, 3e-3, 4e-3, 5e-3):
+        yield "middle", "block, middle", middle_of_block(radius), radius
+    yield "side", "block, 8 mm from its side", side_of_block(5e-3, 0.032), 5e-3
+    yield "rim", "block, 3 mm from its side", side_of_block(5e-3, 0.037), 5e-3
+    yield "liver", "liver", organ("liver-lobe", 0.02, 0.0, 5e-3), 5e-3
+    yield "kidney", "kidney", organ("kidney-with-adrenal", 0.0, 0.0, 5e-3), 5e-3
+
+
+def write(path: Path) -> None:
+    """Write the forces of all presses, and print them."""
+    found: dict[str, Any] = {}
+    for name, title, body, radius in study():
+        depths = [depth for depth in DEPTHS_M if depth <= DEEPEST * radius]
+        forces = [round(force, 5) for force in body.press(radius, depths)]
+        print(f"{title}, {radius * 1e3:g} mm: {forces} N", flush=True)
+        point = np.zeros(3) if name == "middle" else body.point
+        row = found.setdefault(name, {"title": title, "point_m": np.round(point, 6).tolist(), "force_n": {}})
+        row["force_n"][f"{radius * 1e3:g}"] = forces
+    path.write_text(json.dumps(found, indent=1) + "\n")
+
+
 if __name__ == "__main__":
-    print_law()
+    print_law() if sys.argv[1:] == ["law"] else write(Path(__file__).parent / "tissue_truth.json")
