@@ -17,8 +17,9 @@ _WIDTH = 120
 _RADII_M = (2e-3, 5e-3)
 """Of the spheres whose contact is shown."""
 _LIMITS = (
-    "What is mended is within 10 percent of converged finite elements for spheres of 2 to 5 mm on blocks, and of"
-    " 5 mm on liver and kidney; nearer than 1.6 radii to a rim it is up to a quarter too stiff (decision 95).",
+    "What is mended is within 10 percent of converged finite elements for spheres of 2 to 5 mm on blocks, and"
+    " of 5 mm on liver and kidney; nearer than 1.6 radii to a rim it is up to a quarter too stiff (decision"
+    " 95).",
     "Probes of several spheres and fingers feel the mesh. Tissue that is held, as by jaws 4 mm wide, is 2 to"
     " 5.5 times too stiff with 250 nodes, 1.3 to 3.4 times with 600.",
     "Bullet's tissue does not relax. Its damping is in proportion to its stiffness: with 1 ms its loss"
