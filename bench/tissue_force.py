@@ -129,7 +129,7 @@ def picture(path: Path) -> None:
     from matplotlib.figure import Figure
 
     bodies = [body for body in TRUTH if body != "rim"]
-    figure: Any = Figure(figsize=(10, 3.2), layout="constrained")
+    figure: Any = Figure(figsize=(10, 3.5), layout="constrained")
     axes: Any = figure.subplots(1, len(bodies), sharey=True)
     for axis, body in zip(axes, bodies, strict=True):
         place = "face" if body == "middle" else "site"
@@ -152,7 +152,7 @@ def picture(path: Path) -> None:
         axis.set_yscale("log")
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("force, N")
-    axes[0].legend(fontsize=7)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=7)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=90)
 
