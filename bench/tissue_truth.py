@@ -107,6 +107,17 @@ class Solid:
         """Let it sag."""
         self._balance(None, 1.0)
 
+    def hold(self, unknowns: Any) -> None:
+        """Fix these unknowns as well; who moves them in `moved` finds their forces in `residual`."""
+        self.free = np.setdiff1d(self.free, unknowns)
+        self._place[:] = -1
+        self._place[self.free] = np.arange(len(self.free))
+
+    @property
+    def residual(self) -> Vector:
+        """What holds the fixed unknowns, N, shape (n d,)."""
+        return self._state(self.moved, None, 1.0)[1]
+
     def press(self, centre: Vector, radius: float) -> Vector:
         """Return the force (N) on a sphere at `centre` (m), both of shape (d,)."""
         self._balance(centre, radius)
