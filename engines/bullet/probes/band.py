@@ -17,7 +17,7 @@ _DEPTH = 0.2
 """Of the press in radii: the contact is smaller than a face, as the compliance of the mesh takes it."""
 
 _TENTHS = (0.1, 0.9)
-"""Of the places, those whose ratios are told."""
+"""Of the places, those whose ratios are reported."""
 
 
 @dataclass(frozen=True)
