@@ -22,6 +22,7 @@ from hub.recording.report_figures import (
     press_figure,
     step_time_figures,
 )
+from hub.recording.report_notes import noted
 from hub.recording.report_scores import score_figures, score_table, scored
 from hub.recording.report_tissue import tissue_figures
 from hub.recording.report_vision import vision_figures
@@ -55,6 +56,7 @@ def report(recording: Recording, output: Path) -> None:
         vision=_section("Vision", vision_figures(recording)),
         tissue=_section("Tissue", tissue_figures(recording)),
         profile=_profile(recording),
+        notes=_notes(scenario),
         ports=_table(("topic", "type", "messages", "per second"), _ports(recording)),
         scenario=escape(recording.attachments.get("scenario.yaml", b"").decode("utf-8", "replace")),
         versions=_table(("package", "version"), sorted(recording.versions().items())),
@@ -168,6 +170,16 @@ def _profile(recording: Recording) -> str:
         return ""
     tables = "\n".join(_table(heads, rows) for heads, rows in profile_tables(profile_numbers(profile)))
     return f'<section aria-labelledby="h-profile"><h2 id="h-profile">Processor time</h2>{tables}</section>'
+
+
+def _notes(scenario: Scenario) -> str:
+    """Return the section about how far what was computed holds; empty if no participant has notes."""
+    rows = list(noted(scenario))
+    if not rows:
+        return ""
+    heading = '<h2 id="h-notes">Validity</h2>'
+    table = _table(("participant", "of", "is"), rows)
+    return f'<section id="notes" aria-labelledby="h-notes">{heading}{table}</section>'
 
 
 def _scores(recording: Recording) -> str:
