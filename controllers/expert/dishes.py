@@ -67,6 +67,6 @@ class PickAndPlace:
         """Return the height over the rim."""
         return self.travel
 
-    def grasps(self, thing: int, pose: Vector, reach: float) -> Iterator[Grasps]:  # noqa: ARG002
+    def grasps(self, thing: int, poses: Vector, reach: float) -> Iterator[Grasps]:
         """Yield its grasps."""
-        yield of_piece(pose, reach)
+        yield of_piece(poses[thing], reach)

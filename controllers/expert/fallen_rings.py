@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.expert.grasps import AJAR, FINGER, FREE, Grasps
+from controllers.expert.grasps import AJAR, FINGER, FREE, ROOMY, Grasps
 from robots.dvrk.instruments import WRIST_RADIUS
 from robots.training.boards import Ring
 from schemas.vectors import Vector
@@ -84,6 +84,7 @@ def of_fallen_ring(ring: Ring, pose: Vector, reach: float, around: Around) -> Gr
         np.full(len(poses), AJAR),
         np.array(outwards).reshape(-1, 2),
         np.array(ups).reshape(-1, 3),
+        np.full(len(poses), ROOMY),
     )
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.expert.grasps import Grasps
+from controllers.expert.grasps import ROOMY, Grasps
 from controllers.expert.hand import Hand, pose_of
 from controllers.expert.reach import margins
 from robots import rotation
@@ -15,9 +15,10 @@ from schemas.vectors import Vector
 
 __all__ = ["Plan", "plan", "plan_leaning", "upright"]
 
-_COMFORT, _PER_TURN, _PER_OPENING, _PER_SIDE = 0.25, 0.02, 0.2, 0.2
+_COMFORT, _PER_TURN, _PER_OPENING, _PER_SIDE, _PER_ROOM = 0.25, 0.02, 0.2, 0.2, 100.0
 """Of a grasp: the joints' margin beyond which more is no better; what a radian of turning and a radian of the
-jaw's opening cost, and what a side that leaves room to the other hand is worth, in margins.
+jaw's opening cost, and what a side that leaves room to the other hand and a metre of room about the fingers
+are worth, in margins.
 """
 _LEAST, _LEAST_LEANING = 0.01, 0.04
 """The least margin of a way that is gone: 1.2 mm of insertion; 5 mm on a way to a thing that leans, where a
@@ -62,7 +63,7 @@ def plan(hand: Hand, found: Grasps, lift: float, way: Vector, away: Vector) -> P
     reached = margins(hand.chain, hand.base, tips)
     score = np.where(reached > _LEAST, np.minimum(reached, _COMFORT), -np.inf)
     score -= _PER_TURN * _turns(hand, found.poses) + _PER_OPENING * found.opening
-    score += _PER_SIDE * found.outwards @ away
+    score += _PER_SIDE * found.outwards @ away + _PER_ROOM * (found.room - ROOMY)
     best = int(score.argmax())
     if score[best] == -np.inf:
         return None
