@@ -77,3 +77,10 @@ class Chore(Protocol):
         Those that come later are for where an arm reaches none of those before.
         """
         ...
+
+    def room(self, points: Vector) -> Vector:
+        """Return the least room of an instrument to what stands around, m, shape (n,), at best `ROOMY`.
+
+        `points` in it, shape (n, points, 3), m, are those of controllers.expert.reach.
+        """
+        ...

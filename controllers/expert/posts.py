@@ -9,9 +9,10 @@ import numpy as np
 
 from controllers.expert.chores import DROP, SLACK
 from controllers.expert.fallen_rings import Around, of_fallen_ring
-from controllers.expert.grasps import UPRIGHT, Grasps, of_ring
+from controllers.expert.grasps import ROOMY, UPRIGHT, Grasps, of_ring
 from controllers.expert.outlines import box_of_ring, gap
 from controllers.expert.outlines import of_ring as of_ring_above
+from controllers.expert.reach import LINK_RADII
 from robots.training.fixtures import BoardParams
 from schemas.vectors import Vector
 
@@ -181,3 +182,16 @@ class PegBoard:
         top = self._top + self._board.post_height
         boxes = (*self._boxes, *(box_of_ring(self._board.ring, other) for other in others))
         return Around(floor, self._posts[:, :2], self._board.post_radius, top, boxes)
+
+    def room(self, points: Vector) -> Vector:
+        """Return the room of wrist and shaft to posts and walls."""
+        room = np.full(points.shape[:2], ROOMY)
+        over = np.maximum(points[..., 2] - self._top - self._board.post_height, 0.0)
+        for x, y, _ in self._posts:
+            off = np.hypot(points[..., 0] - x, points[..., 1] - y)
+            room = np.minimum(room, np.hypot(off, over) - self._board.post_radius - LINK_RADII)
+        for least, greatest in self._boxes:
+            off = np.maximum(np.maximum(least - points, points - greatest), 0.0)
+            room = np.minimum(room, np.linalg.norm(off, axis=-1) - LINK_RADII)
+        least_room: Vector = room.min(axis=1)
+        return least_room

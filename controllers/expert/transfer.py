@@ -402,4 +402,4 @@ class Transfer:
         if role is not Role.ALONE and (other := self.team.other(self)) is not None:
             away = (hand.base - other.hand.base)[:2, 3]
             away /= np.linalg.norm(away)
-        return plan(hand, found, lift, to - middle, away)
+        return plan(hand, found, lift, to - middle, away, self._chore.room)

@@ -5,8 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.expert import outlines
-from controllers.expert.grasps import of_piece, of_ring
+from controllers.expert import outlines, reach
+from controllers.expert.grasps import ROOMY, of_piece, of_ring
+from controllers.expert.posts import PegBoard
+from hub.planning.scenario_file import load
+from robots.dvrk.instruments import instrument
+from robots.dvrk.psm import chain
 from robots.training.boards import BOARDS
 from robots.training.dishes import PIECE
 
@@ -136,3 +140,26 @@ def test_a_leaning_piece_is_taken_along_its_own_axes(angle, lean):
         assert tip[:3, 2] == pytest.approx(-up)
         assert up[2] >= 0.5
         assert np.abs(pose[:3, :3].T @ up).max() == pytest.approx(1.0)
+
+
+@given(st.lists(st.floats(-0.5, 0.5), min_size=5, max_size=5), st.floats(0.1, 0.2))
+def test_the_links_of_an_instrument_go_from_its_wrist_up_through_the_remote_centre(angles, insertion):
+    arm = chain(instrument("400006"))
+    base = turned(0.7)
+    q = np.array([angles[0], angles[1], insertion, *angles[2:]])
+    points = reach.links(arm, base, q[None])[0]
+    tip, centre = base @ arm.forward(q), base[:3, 3]
+    assert points[0] == pytest.approx(tip[:3, 3])  # the wrist yaw axis
+    assert np.linalg.norm(points[4] - points[0]) == pytest.approx(9.1e-3)
+    shaft = points[5:] - centre
+    assert np.linalg.norm(np.cross(shaft, shaft[0]), axis=1) == pytest.approx(0, abs=1e-12)
+    assert np.linalg.norm(shaft[-1]) < np.linalg.norm(shaft[0])
+
+
+def test_a_wrist_has_no_room_where_a_post_stands():
+    params = load("peg-board-surrol", []).params["lead"]
+    board = PegBoard(params.rings, params.board)
+    top = board._posts[0] + np.array([0, 0, 0.005])
+    points = np.tile(top + np.array([[[0.02, 0, 0]], [[0.004, 0, 0]], [[0, 0, 0]]]), (1, 22, 1))
+    free, near, inside = board.room(points)
+    assert inside < near < free <= ROOMY
