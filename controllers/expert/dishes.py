@@ -67,7 +67,13 @@ class PickAndPlace:
         """Return the height over the rim."""
         return self.travel
 
-    def grasps(self, thing: int, poses: Vector, reach: float) -> Iterator[Grasps]:
+    def grasps(
+        self,
+        thing: int,
+        poses: Vector,
+        reach: float,
+        other: Vector | None,  # noqa: ARG002
+    ) -> Iterator[Grasps]:
         """Yield its grasps."""
         yield of_piece(poses[thing], reach)
 

@@ -77,7 +77,7 @@ def of_fallen_ring(ring: Ring, pose: Vector, reach: float, around: Around) -> Gr
                 tip[:3, :3] = np.column_stack([np.cross(way * normal, fingers), way * normal, fingers])
                 tip[:3, 3] = ends - reach * fingers
                 poses.append(tip)
-                outwards.append(away / max(1e-9, sqrt(float(away @ away))))
+                outwards.append(away)
                 ups.append(out)
     return Grasps(
         np.array(poses).reshape(-1, 4, 4),

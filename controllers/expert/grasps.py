@@ -7,7 +7,7 @@ poses in the world.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from itertools import product
 from math import asin, atan2, cos, pi, sin, sqrt, tan
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from robots.training.boards import Ring
 from robots.training.dishes import PIECE
 from schemas.vectors import Vector
 
-__all__ = ["AJAR", "FINGER", "FREE", "ROOMY", "UPRIGHT", "Grasps", "of_piece", "of_ring"]
+__all__ = ["AJAR", "FINGER", "FREE", "ROOMY", "UPRIGHT", "Grasps", "of_piece", "of_ring", "shut_fingers"]
 
 _BITE = 1.0e-3
 """How far from the ends of the fingers the edges of a block touch them, m."""
@@ -55,7 +55,7 @@ class Grasps(NamedTuple):
     opening: Vector
     """Of the jaw before it closes, rad, shape (n,)."""
     outwards: Vector
-    """Horizontal direction from the thing's middle to the grasp, shape (n, 2), of length 1 or, amid it, 0."""
+    """Horizontal way from the thing's middle to the grasp, m, shape (n, 2)."""
     ups: Vector
     """Axis of the thing that is upright, or is to be before it is put down, shape (n, 3), in the world."""
     room: Vector
@@ -94,7 +94,7 @@ def of_ring(
     reach: float,
     post: tuple[Vector, float] | None,
     lean: float = 0.0,
-    others: Iterable[Vector] = (),
+    others: Sequence[Vector] = (),
 ) -> Grasps:
     """Return the grasps of an upright ring with `pose`, shape (4, 4): one finger in the hole, one outside.
 
@@ -107,7 +107,8 @@ def of_ring(
         post: the one it is around, if any: where it stands (x, y), m, and its radius, m.
         lean: of the fingers from the vertical, along the wall and to either side, rad: so a wrist comes
             nearer to its arm by `reach` times the sine.
-        others: outlines of rings beside it, corners (n, 2), m, which the finger outside is not to touch.
+        others: outlines of rings beside it and of another hand's fingers in it, corners (n, 2), m, which the
+            fingers are not to touch.
     """
     poses, outwards, rooms = list[Vector](), list[tuple[float, float]](), list[float]()
     if abs(float(pose[2, 2])) < UPRIGHT:
@@ -123,15 +124,15 @@ def of_ring(
         room = min(ROOMY, finger.to_walls(ring))
         if post is not None:
             room = min(room, finger.to_post(axes @ (post[0] - centre[:2]), post[1]))
-        outer = finger.outer() @ axes + centre[:2]
-        room = min([room, *(gap(outer, other) for other in others)])
+        both = [outline @ axes + centre[:2] for outline in finger.outlines()]
+        room = min([room, *(gap(one, other) for one, other in product(both, others))])
         if room < FREE:
             continue
         away = np.array([middle, aside]) @ axes
         wrist = np.array([middle, aside - reach * sin(leant)]) @ axes
         for way in (0.0, pi):
             poses.append(_downwards(centre + np.append(wrist, 0.0), over, turn + way, leant * cos(way)))
-            outwards.append(tuple(away / sqrt(float(away @ away))))
+            outwards.append(tuple(away))
             rooms.append(room)
     return _grasps(poses, [AJAR] * len(poses), outwards, [up] * len(poses), rooms)
 
@@ -172,11 +173,20 @@ class _Fingers(NamedTuple):
         wide = [(2.0 * ring.inradius + end[0] - FINGER[0] / 2.0) / sqrt(3.0) - abs(end[1]) for end in ends]
         return (min(wide) - FINGER[1] / cos(self.lean)) * sqrt(0.75)
 
-    def outer(self) -> Vector:
-        """Return the outline of the finger outside, at its end, shape (4, 2)."""
-        off, half = self.middle + self.reach * sin(AJAR / 2.0), FINGER[1] / cos(self.lean)
-        near, far = self.aside - half, self.aside + half
-        return np.array([[off, near], [off, far], [off + FINGER[0], far], [off + FINGER[0], near]])
+    def outlines(self) -> tuple[Vector, Vector]:
+        """Return the outlines, shape (4, 2), of the ends of the finger in the ring and of the one outside."""
+        half, thick = FINGER[1] / cos(self.lean), FINGER[0] / 2.0
+        off = self.reach * sin(AJAR / 2.0) + thick
+        corners = np.array([[-thick, -half], [thick, -half], [thick, half], [-thick, half]])
+        inner, outer = (corners + np.array([self.middle + side, self.aside]) for side in (-off, off))
+        return inner, outer
+
+
+def shut_fingers(tip: Vector, reach: float, thickness: float) -> Vector:
+    """Return the outline (4, 2), m, of fingers as long as `reach` at a tip (4, 4) around what is so thick."""
+    ends = tip[:3, 3] + reach * tip[:3, 2]
+    across, along = (FINGER[0] + thickness / 2.0) * tip[:3, 1], FINGER[1] * tip[:3, 0]
+    return np.array([(ends + i * across + j * along)[:2] for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 
 
 def _grasps(

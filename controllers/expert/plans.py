@@ -16,10 +16,10 @@ from schemas.vectors import Vector
 
 __all__ = ["Plan", "plan", "plan_leaning", "upright"]
 
-_COMFORT, _PER_TURN, _PER_OPENING, _PER_SIDE, _PER_ROOM = 0.25, 0.02, 0.2, 0.2, 100.0
+_COMFORT, _PER_TURN, _PER_OPENING, _PER_SIDE, _PER_ROOM = 0.25, 0.02, 0.2, 60.0, 100.0
 """Of a grasp: the joints' margin beyond which more is no better; what a radian of turning and a radian of the
-jaw's opening cost, and what a side that leaves room to the other hand and a metre of room about the fingers
-are worth, in margins.
+jaw's opening cost, and what a metre away from the other hand and a metre of room about the instrument are
+worth, in margins.
 """
 _LEAST, _LEAST_LEANING = 0.01, 0.04
 """The least margin of a way that is gone: 1.2 mm of insertion; 5 mm on a way to a thing that leans, where a

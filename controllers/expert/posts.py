@@ -9,7 +9,7 @@ import numpy as np
 
 from controllers.expert.chores import DROP, SLACK
 from controllers.expert.fallen_rings import Around, of_fallen_ring
-from controllers.expert.grasps import ROOMY, UPRIGHT, Grasps, of_ring
+from controllers.expert.grasps import ROOMY, UPRIGHT, Grasps, of_ring, shut_fingers
 from controllers.expert.outlines import box_of_ring, gap
 from controllers.expert.outlines import of_ring as of_ring_above
 from controllers.expert.reach import LINK_RADII
@@ -149,14 +149,14 @@ class PegBoard:
         """Return the height just over the posts."""
         return self.clear + self._board.ring.height / 2.0 - SLACK / 2.0
 
-    def grasps(self, thing: int, poses: Vector, reach: float) -> Iterator[Grasps]:
+    def grasps(self, thing: int, poses: Vector, reach: float, other: Vector | None) -> Iterator[Grasps]:
         """Yield its grasps, clear of the post that it is around, or of all that is about a fallen one.
 
         From straight above, then from a hand that leans; where nothing else is left, without regard to other
         rings.
         """
         pose, ring = poses[thing], self._board.ring
-        near = [other for other in np.delete(poses, thing, axis=0) if self._is_near(other, pose)]
+        near = [each for each in np.delete(poses, thing, axis=0) if self._is_near(each, pose)]
         if abs(float(pose[2, 2])) < UPRIGHT:
             for others in (near, []) if near else ([],):
                 yield of_fallen_ring(ring, pose, reach, self._surroundings(pose[:3, 3], others))
@@ -165,7 +165,9 @@ class PegBoard:
         nearest = int((off[:, :2] ** 2).sum(axis=1).argmin())
         within = -off[nearest, 2] < self._board.post_height
         post = (self._posts[nearest, :2], self._board.post_radius) if within else None
-        outlines = [of_ring_above(ring, other) for other in near]
+        outlines = [of_ring_above(ring, each) for each in near]
+        if other is not None:
+            outlines.append(shut_fingers(other, reach, ring.thickness))
         for beside in (outlines, []) if outlines else ([],):
             for lean in _LEANS:
                 yield of_ring(ring, pose, reach, post, lean, beside)

@@ -14,7 +14,7 @@ import numpy as np
 
 from controllers.expert.fallen_rings import BESIDE
 from controllers.expert.grasps import AJAR, UPRIGHT, Grasps
-from controllers.expert.hand import Hand, Phase, Role
+from controllers.expert.hand import Hand, Phase, Role, framed
 from controllers.expert.plans import Plan, plan, plan_leaning, upright
 from controllers.expert.team import Refusals, Team
 from robots import rotation
@@ -384,7 +384,9 @@ class Transfer:
 
     def _plan(self, thing: int) -> Plan | None:
         """Return how to take hold of a thing; None: it cannot be taken."""
-        ways = self._chore.grasps(thing, self._seen.poses, self.hand.jaw.length)
+        other = self.team.other(self) if self.state.role is Role.TAKER else None
+        held = None if other is None else framed(other.hand.measured)
+        ways = self._chore.grasps(thing, self._seen.poses, self.hand.jaw.length, held)
         return next((found for found in (self._best(thing, each) for each in ways) if found), None)
 
     def _best(self, thing: int, found: Grasps) -> Plan | None:

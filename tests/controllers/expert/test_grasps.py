@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.expert import outlines, reach
-from controllers.expert.grasps import ROOMY, of_piece, of_ring
+from controllers.expert.grasps import ROOMY, of_piece, of_ring, shut_fingers
 from controllers.expert.posts import PegBoard
 from hub.planning.scenario_file import load
 from robots.dvrk.instruments import instrument
@@ -105,6 +105,19 @@ def test_the_finger_outside_keeps_clear_of_a_ring_beside():
         end = tip[:2, 3] + outwards * (DRIVER * np.sin(0.1) + 0.7e-3)
         finger = end + 0.5e-3 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         assert outlines.gap(beside, finger) > 0.0
+
+
+@given(ANGLES, st.sampled_from(sorted(BOARDS)), st.integers(0, 29))
+def test_a_second_hand_finds_room_beside_the_fingers_of_the_first(angle, name, which):
+    ring, pose = BOARDS[name].ring, turned(angle)
+    ways = of_ring(ring, pose, DRIVER, None).poses
+    first = shut_fingers(ways[which % len(ways)], DRIVER, ring.thickness)
+    found = of_ring(ring, pose, DRIVER, None, others=[first])
+    assert len(found.poses)
+    for tip in found.poses:
+        both = [tip[:2, 3] + side * (DRIVER * np.sin(0.1) + 0.7e-3) * tip[:2, 1] for side in (-1, 1)]
+        square = 0.5e-3 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        assert min(outlines.gap(first, end + square) for end in both) > 0.0
 
 
 def test_the_room_between_outlines():
