@@ -173,6 +173,7 @@ class MountedPsm(PsmTool, MountedArm):
         default=FOLDED,
         description="closings, then spreads, of a hand's fingers at time 0; default: folded",
     )
+
     @property
     def _driven(self) -> list[str]:
         jaw = [] if self.tool.jaw is None else [JAW]

@@ -46,7 +46,7 @@ class IdentifiedArm(NamedTuple):
     discs: tuple[drives.Disc, ...]
     """Published; the shares are of these joints."""
     start: tuple[float, ...]
-    """Where the arm homes, rad and m, shape (n,)."""
+    """Where the arm homes, its jaw half open; rad and m, shape (n,)."""
 
 
 def of_psm(tool: Instrument, *, jaw: bool = False) -> IdentifiedArm:
@@ -54,7 +54,8 @@ def of_psm(tool: Instrument, *, jaw: bool = False) -> IdentifiedArm:
     chain, bodies, driven = psm.chain(tool), inertia.psm(tool), dict(drives.psm(tool))
     joints, discs, start = chain.joints, drives.discs(tool), psm.home(tool)
     if jaw and tool.jaw is not None:
-        joints, start = (*joints, tool.jaw.joint), (*start, max(0.0, tool.jaw.lower))
+        # below 0 the fingers press on each other
+        joints, start = (*joints, replace(tool.jaw.joint, lower=0.0)), (*start, tool.jaw.upper / 2.0)
         # two fingers that turn by half the angle, each with the torque of the whole
         finger = driven[FINGERS[0]]
         driven[JAW] = replace(finger, armature=finger.armature / 2.0, elasticity=finger.elasticity / 2.0)

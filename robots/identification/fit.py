@@ -47,6 +47,8 @@ _SCALE_OF_DISC = 0.1
 """Of the friction of a disc, against that of a joint."""
 _LEAST = 1e-6
 """Of friction, springs and rotors."""
+_FARTHEST = 5.0
+"""Of x in the exp(x) of a body: masses between 1/20000 and 20000 times the published ones."""
 _TRIANGLE = np.tril_indices(4)
 _DIAGONAL = _TRIANGLE[0] == _TRIANGLE[1]
 _UPPER = np.triu_indices(4)
@@ -78,6 +80,8 @@ class Fit(NamedTuple):
     """s, shape (N,); recordings follow one another."""
     predicted: Vector
     """Efforts of the feasible parameters, shape (N, n)."""
+    published: Vector
+    """Efforts of the published parameters, shape (N, n)."""
     measured: Vector
     """Filtered, shape (N, n)."""
     test: slice
@@ -107,7 +111,7 @@ def fit(
     unseen = judged.kept if judged else round((1.0 - _TRAINED) * len(rows.time))
     trained = len(rows.time) - unseen
     seen, test = slice(None, trained), slice(trained, None)
-    published = (rows.regressor[test] @ rows.model.nominal) + rows.carried[test]
+    published = rows.regressor @ rows.model.nominal + rows.carried
     rows = _with_friction(rows, seen)
     model, regressor, carried, measured = rows.model, rows.regressor, rows.carried, rows.measured
     effort = measured - carried
@@ -130,9 +134,10 @@ def fit(
         acts.max(axis=0),
         condition,
         relative_residual(predicted[test], measured[test]),
-        relative_residual(published, measured[test]),
+        relative_residual(published[test], measured[test]),
         rows.time,
         predicted,
+        published,
         measured,
         test,
     )
@@ -165,7 +170,9 @@ class _Rows(NamedTuple):
             time = start + samples.time[inner] - samples.time[0]
             parts.append((time, regressor, carried, samples.effort[inner], *dry))
             start += float(samples.time[-1] - samples.time[0])
-        time, regressor, carried, measured, *dry = (np.concatenate(column) for column in zip(*parts, strict=True))
+        time, regressor, carried, measured, *dry = (
+            np.concatenate(column) for column in zip(*parts, strict=True)
+        )
         shapes = (one.shape for one in candidates(model, recorded[0], stribeck=stribeck))
         return cls(
             model,
@@ -185,7 +192,9 @@ def _with_friction(rows: _Rows, seen: slice) -> _Rows:
     fixed = [column for column in base.columns.tolist() if not coulomb.start <= column < coulomb.stop]
     sigma = _noise(rows.regressor[seen][..., base.columns], effort[seen])[:, None]
     weighted = [Candidate(one.shape, one.columns[seen] / sigma) for one in rows.dry]
-    shape, picks = chosen(model.shares, rows.regressor[seen][..., fixed] / sigma, weighted, effort[seen] / sigma[:, 0])
+    shape, picks = chosen(
+        model.shares, rows.regressor[seen][..., fixed] / sigma, weighted, effort[seen] / sigma[:, 0]
+    )
     columns = picked([one.columns for one in rows.dry], picks)
     regressor = np.concatenate([rows.regressor[..., : coulomb.start], columns], axis=-1)
     return rows._replace(model=LinearModel(model.arm, model.gravity, shape), regressor=regressor)
@@ -258,10 +267,12 @@ def _feasible(model: LinearModel, rows: Vector, goal: Vector) -> Vector:
     def residual(x: Vector) -> Vector:
         return np.concatenate([matrix @ parameters(x) - wanted, _PRIOR * x])
 
-    lower = np.full(len(model.nominal), -np.inf)
+    upper = np.full(len(model.nominal), np.inf)
+    upper[: body.stop] = np.where(np.tile(_DIAGONAL, len(roots)), _FARTHEST, np.inf)
+    lower = -upper
     lower[body.stop :] = (_LEAST - nominal) / scales
     offset = model.parts["offset"]
     lower[offset] = -np.inf
     start = np.maximum(np.zeros(len(lower)), lower + 1e-6)
-    found = least_squares(residual, start, bounds=(lower, np.inf), x_scale="jac", max_nfev=60)
+    found = least_squares(residual, start, bounds=(lower, upper), x_scale="jac", max_nfev=60)
     return parameters(found.x)

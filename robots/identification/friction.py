@@ -76,7 +76,9 @@ def chosen(
 
     def explained(picks: list[int]) -> float:
         columns = list(range(fixed.shape[-1]))
-        columns += [int(first[pick]) + kind * rubbing + i for i, pick in enumerate(picks) for kind in range(kinds)]
+        columns += [
+            int(first[pick]) + kind * rubbing + i for i, pick in enumerate(picks) for kind in range(kinds)
+        ]
         values, vectors = np.linalg.eigh(normal[np.ix_(columns, columns)])
         known = values > _SMALL * values[-1]
         return float(np.sum((vectors.T @ goal[columns])[known] ** 2 / values[known]))

@@ -43,7 +43,9 @@ def own_dynamics(found: Fit, cutoff: float, recordings: Sequence[str]) -> OwnDyn
 def _friction(model: LinearModel, values: Mapping[str, list[float]]) -> dict[str, DiscLosses]:
     """Return the friction of what rubs, by name."""
     static = values.get("static", [0.0] * len(model.rubbing))
-    velocities = [None] * len(model.rubbing) if model.shape.stribeck is None else model.shape.stribeck.tolist()
+    velocities = (
+        [None] * len(model.rubbing) if model.shape.stribeck is None else model.shape.stribeck.tolist()
+    )
     columns = (values["viscous"], values["coulomb"], model.shape.smoothing.tolist(), static, velocities)
     names = ("viscous", "coulomb", "smoothing", "static", "stribeck")
     return {
