@@ -4,9 +4,9 @@
     python bench/identification.py --train one_results.csv --test two_results.csv
 
 Without files: an arm unlike the published one (bodies changed at random by a tenth, losses by factors of 0.5
-to 2), its efforts with noise of 5 percent, and the simulated arm in `configs/identify.yaml`. With two files of
-WPI-AIM/dvrk_dynamics_identification (data/psm*/measured_trajectory, no licence stated, so none is here) or two
-CSV files as `trocar identify` reads them: fitted on one and judged on the other.
+to 2), its efforts with noise of 5 percent; and the simulated arm in `configs/identify.yaml`. With two files
+of WPI-AIM/dvrk_dynamics_identification (data/psm_simplified/measured_trajectory; no licence is stated, so
+none is here), or two CSV files as `trocar identify` reads them: fitted on one and judged on the other.
 
 Results: docs/decisions/0094-excitation.md. Only the times depend on the machine.
 """
@@ -116,7 +116,7 @@ def synthetic(noise: float) -> dict[str, Any]:
 
 
 def simulated() -> dict[str, Any]:
-    """Identify the simulated arm from a recording of `configs/identify.yaml`, and hold it against its model."""
+    """Identify the simulated arm from a recording of `configs/identify.yaml`; its truth is the model."""
     arm = of_psm(TOOL, jaw=True)
     joints = [joint.name for joint in arm.joints]
     with TemporaryDirectory() as directory:

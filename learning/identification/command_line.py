@@ -65,7 +65,7 @@ def identify(
         str | None,
         typer.Option(
             metavar="X,Y,Z",
-            help="Where up is in the frame of a base that is not upright, as `trocar model dynamics` prints it.",
+            help="Where up is in the frame of a turned base, as `trocar model dynamics` prints it.",
         ),
     ] = None,
     excite: Annotated[
@@ -144,7 +144,7 @@ def _gravity(up: str | None) -> Vector | None:
         raise typer.BadParameter(
             f"'{up}' is no direction: three numbers, such as 0,0.5,0.87", param_hint="--up"
         )
-    return -STANDARD_GRAVITY / length * direction
+    return np.asarray(-STANDARD_GRAVITY / length * direction, np.float64)
 
 
 def _print(found: Fit, joints: list[str]) -> None:

@@ -2,8 +2,8 @@
 
 Each period is q(t) = start + sum_k a_k sin(k w t) + b_k (cos(k w t) - 1) in every joint (Swevers et al.,
 "Optimal robot excitation and identification", IEEE Transactions on Robotics and Automation 13(5), 1997), with
-sum k a_k = 0 and sum k^2 b_k = 0: it starts and ends at rest at `start`. The coefficients are scaled such that
-position, velocity or acceleration just stays within the limits. The condition number is that of the base
+sum k a_k = 0 and sum k^2 b_k = 0: it starts and ends at rest at `start`. The coefficients are scaled such
+that position, velocity or acceleration just stays within the limits. The condition number is that of the base
 regressor, columns of length 1, of this period and those before it, so that each period adds what the others
 leave out. The search starts from the best of some random motions, with a fixed seed: the same call gives the
 same motion.
@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import null_space
 from scipy.optimize import minimize
 
 from robots.dvrk.cannula import Cannula
@@ -57,8 +56,9 @@ class _Series:
     """Fourier series of n joints with J free numbers each, which start and end at rest at `start`."""
 
     def __init__(self, arm: IdentifiedArm) -> None:
-        k = np.arange(1, _HARMONICS + 1)
-        self._sines, self._cosines = null_space(k[None, :]), null_space(k[None, :] ** 2)  # (K, K - 1)
+        k = np.arange(1.0, _HARMONICS + 1.0)
+        self._sines = _null_space(k)  # (K, K - 1)
+        self._cosines = _null_space(k**2)
         self._frequencies = 2.0 * np.pi / PERIOD * k
         self.start = np.array(arm.start)
         lower = np.array([joint.lower for joint in arm.joints])
@@ -104,7 +104,8 @@ def excitation(arm: IdentifiedArm, periods: int, rate: float, seed: int = 0) -> 
     columns = base_parameters(model).columns
     weights = 1.0 / np.array([joint.effort for joint in arm.joints])
     coarse = np.arange(0.0, PERIOD, PERIOD / _STATES)
-    before, condition = np.zeros((0, len(columns))), np.inf
+    before: Vector = np.zeros((0, len(columns)))
+    condition = np.inf
     found: list[Vector] = []
 
     def rows(free: Vector) -> Vector:
@@ -117,22 +118,20 @@ def excitation(arm: IdentifiedArm, periods: int, rate: float, seed: int = 0) -> 
     for _ in range(periods):
         tries = random.normal(size=(_TRIES, series.size))
         best = min(tries, key=cost)
-        result = minimize(cost, best, method="L-BFGS-B", options={"maxiter": _ITERATIONS})
-        found.append(result.x)
-        before = np.linalg.qr(rows(result.x), mode="r")
+        least = minimize(cost, best, method="L-BFGS-B", options={"maxiter": _ITERATIONS}).x
+        found.append(least)
+        before = np.asarray(np.linalg.qr(rows(least), mode="r"), np.float64)
         condition = _condition(before)
     time = np.arange(0.0, PERIOD - 0.5 / rate, 1.0 / rate)
-    parts = zip(*(series.states(free, time) for free in found), strict=True)
-    q, dq, ddq = (np.concatenate(part) for part in parts)
-    q, dq, ddq = (
-        np.vstack([part, last]) for part, last in zip((q, dq, ddq), _rest(series, found[-1]), strict=True)
-    )
+    states = [series.states(free, time) for free in found]
+    states.append(series.states(found[-1], np.array([PERIOD])))  # at rest
+    q, dq, ddq = (np.concatenate(part) for part in zip(*states, strict=True))
     return Excitation(np.arange(len(q)) / rate, q, dq, ddq, condition)
 
 
-def _rest(series: _Series, free: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the state at the end of the last period."""
-    return series.states(free, np.array([PERIOD]))
+def _null_space(row: Vector) -> Vector:
+    """Return an orthonormal basis of what is orthogonal to `row`, shape (K, K - 1)."""
+    return np.linalg.svd(row[None, :])[2][1:].T
 
 
 def _condition(rows: Vector) -> float:

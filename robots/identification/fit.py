@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 
 from robots.identification.arms import IdentifiedArm
 from robots.identification.base_parameters import BaseParameters, base_parameters
-from robots.identification.friction import Candidate, candidates, chosen, picked
+from robots.identification.friction import Candidate, chosen, grid, picked
 from robots.identification.linear_model import BODY_SIZE, LinearModel, pseudo_inertias
 from robots.identification.signals import Samples
 from schemas.errors import RecordingError
@@ -67,8 +67,8 @@ class Fit(NamedTuple):
     base_deviations: Vector
     """Standard deviations of these, shape (B,)."""
     base_shares: Vector
-    """Root mean square of what each of these does to the effort, over that of the measured effort, of the joint
-    where it does most, shape (B,).
+    """Root mean square of what each of these does to the effort, over that of the measured effort, at the
+    joint where it does most, shape (B,).
     """
     condition: float
     """Of the base regressor, columns scaled to length 1."""
@@ -161,26 +161,25 @@ class _Rows(NamedTuple):
     @classmethod
     def of(cls, model: LinearModel, recorded: Sequence[Samples], *, stribeck: bool) -> _Rows:
         parts: list[tuple[Vector, ...]] = []
+        shapes = grid(model, stribeck=stribeck)
         start = 0.0
         for samples in recorded:
             inner = samples.inner
             filtered = map(samples.low_passed, model.regressor(samples.q, samples.dq, samples.ddq))
             regressor, carried = (values[inner] for values in filtered)
-            dry = (one.columns for one in candidates(model, samples, stribeck=stribeck))
+            dry = (samples.low_passed(model.dry(samples.dq, shape))[inner] for shape in shapes)
             time = start + samples.time[inner] - samples.time[0]
             parts.append((time, regressor, carried, samples.effort[inner], *dry))
             start += float(samples.time[-1] - samples.time[0])
-        time, regressor, carried, measured, *dry = (
-            np.concatenate(column) for column in zip(*parts, strict=True)
-        )
-        shapes = (one.shape for one in candidates(model, recorded[0], stribeck=stribeck))
+        columns = zip(*parts, strict=True)
+        time, regressor, carried, measured, *dry = (np.concatenate(column) for column in columns)
         return cls(
             model,
             time,
             regressor,
             carried,
             measured,
-            [Candidate(shape, columns) for shape, columns in zip(shapes, dry, strict=True)],
+            [Candidate(*pair) for pair in zip(shapes, dry, strict=True)],
         )
 
 

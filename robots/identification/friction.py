@@ -8,7 +8,7 @@ which makes a trial a small solve.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -16,10 +16,9 @@ import numpy as np
 
 from robots.dvrk.drives import SMOOTHING
 from robots.identification.linear_model import FrictionShape, LinearModel
-from robots.identification.signals import Samples
 from schemas.vectors import Vector
 
-__all__ = ["Candidate", "candidates", "chosen", "picked"]
+__all__ = ["Candidate", "chosen", "grid", "picked"]
 
 _SMOOTHINGS = SMOOTHING * 2.0 ** np.arange(-1, 6)
 """s/rad and s/m: half to 32 times the published one."""
@@ -35,22 +34,16 @@ class Candidate(NamedTuple):
 
     shape: FrictionShape
     columns: Vector
-    """Those of dry friction, shape (N, n, rubbing or twice that)."""
+    """Filtered, those of dry friction, shape (N, n, rubbing or twice that)."""
 
 
-def candidates(model: LinearModel, samples: Samples, *, stribeck: bool) -> list[Candidate]:
-    """Return all shapes on the grid, the same for all things that rub, with their filtered columns."""
-    return [
-        Candidate(shape, samples.low_passed(model.dry(samples.dq, shape))[samples.inner])
-        for shape in _shapes(model, stribeck=stribeck)
-    ]
-
-
-def _shapes(model: LinearModel, *, stribeck: bool) -> Iterator[FrictionShape]:
+def grid(model: LinearModel, *, stribeck: bool) -> list[FrictionShape]:
+    """Return all shapes on the grid, the same for all things that rub."""
     fastest = np.abs(model.shares) @ np.array([joint.velocity for joint in model.arm.joints])
-    for smoothing, share in product(_SMOOTHINGS, _STRIBECK if stribeck else (0.0,)):
-        shape = np.full(len(model.rubbing), smoothing)
-        yield FrictionShape(shape, share * fastest if stribeck else None)
+    return [
+        FrictionShape(np.full(len(model.rubbing), smoothing), share * fastest if stribeck else None)
+        for smoothing, share in product(_SMOOTHINGS, _STRIBECK if stribeck else (0.0,))
+    ]
 
 
 def chosen(
@@ -76,9 +69,8 @@ def chosen(
 
     def explained(picks: list[int]) -> float:
         columns = list(range(fixed.shape[-1]))
-        columns += [
-            int(first[pick]) + kind * rubbing + i for i, pick in enumerate(picks) for kind in range(kinds)
-        ]
+        for i, pick in enumerate(picks):
+            columns += [int(first[pick]) + kind * rubbing + i for kind in range(kinds)]
         values, vectors = np.linalg.eigh(normal[np.ix_(columns, columns)])
         known = values > _SMALL * values[-1]
         return float(np.sum((vectors.T @ goal[columns])[known] ** 2 / values[known]))

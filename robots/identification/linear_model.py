@@ -3,9 +3,9 @@
 effort = sum_b trace(Y_b^T J_b) + armature ddq + stiffness q + offset + friction. J_b is the pseudo-inertia of
 a body of the arm (`robots.dvrk.dynamics`). What rubs are the arm's own joints and the discs of an instrument,
 each turning by v = sum of share dq; its friction viscous v + coulomb tanh(s v) goes to the joints by the same
-shares, which is the coupling of the cables. Stribeck's friction adds static exp(-(v / w)^2) tanh(s v) (Armstrong
-et al., "A survey of models, analysis tools and compensation methods for the control of machines with
-friction", Automatica 30(7), 1994). s and w are not linear: `FrictionShape` has them. SI units, radians.
+shares, which is the coupling of the cables. Stribeck's friction adds static exp(-(v / w)^2) tanh(s v)
+(Armstrong et al., "A survey of models, analysis tools and compensation methods for the control of machines
+with friction", Automatica 30(7), 1994). s and w are not linear: `FrictionShape` has them. SI units, radians.
 """
 
 from __future__ import annotations
@@ -113,9 +113,10 @@ class LinearModel:
 
     def _some(self, q: Vector, dq: Vector, ddq: Vector) -> tuple[Vector, Vector]:
         (count, n), moving = q.shape, len(self.arm.chain.joints)
-        state = (values[:, :moving] for values in (q, dq, ddq))
         gradients = np.zeros((count, n, len(self.arm.bodies) + len(self._carried), 4, 4))
-        gradients[:, :moving] = self._dynamics.effort_gradients(*state, self.gravity)
+        gradients[:, :moving] = self._dynamics.effort_gradients(
+            q[:, :moving], dq[:, :moving], ddq[:, :moving], self.gravity
+        )
         bodies, known = np.split(gradients, [len(self.arm.bodies)], axis=2)
         parts = [
             (bodies[..., _UPPER[0], _UPPER[1]] * _TWICE).reshape(count, n, -1),
@@ -128,7 +129,7 @@ class LinearModel:
         return np.concatenate(parts, axis=-1), np.einsum("kibcd,bcd->ki", known, self._carried)
 
     def dry(self, dq: Vector, shape: FrictionShape) -> Vector:
-        """Return the columns of dry friction at joint velocities (N, n): Coulomb's, then static friction's."""
+        """Return the columns of dry friction at joint velocities (N, n): Coulomb's, then static."""
         v = dq @ self.shares.T
         direction = np.tanh(shape.smoothing * v)
         coulomb = self.spread(direction)
