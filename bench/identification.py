@@ -27,7 +27,7 @@ from learning.identification.measurements import measurements
 from robots.dvrk.instruments import instrument
 from robots.identification.arms import IdentifiedArm, of_psm
 from robots.identification.excitation import excitation
-from robots.identification.fit import Fit, fit
+from robots.identification.fit import Fit, fit, relative_residual
 from robots.identification.linear_model import LinearModel, pseudo_inertias
 from robots.identification.signals import Measured, Samples, filtered
 from schemas.vectors import Vector
@@ -36,8 +36,10 @@ TOOL = instrument("400006")
 CUTOFF, RATE = 6.0, 200.0
 MATTERS = 0.05
 """Share of a joint's effort from which a base parameter matters."""
-WPI_RESIDUAL = (0.09, 0.18, 0.19, 0.13, 0.24, 0.21, 0.26)
-"""What that repository's own fit leaves on its test file, joints 1 to 7."""
+WPI = np.array([0.09, 0.18, 0.19, 0.13, 0.24, 0.21, 0.26])
+"""What that repository's own fit leaves on its test file, joints 1 to 4, then motors 5 to 7."""
+MOTOR_TO_JOINT = np.array([[1.0186, 0.0, 0.0], [-0.8306, 0.6089, 0.6089], [0.0, -1.2177, 1.2177]])
+"""Wrist pitch, wrist yaw and jaw of the last three motors."""
 
 
 def another_arm(model: LinearModel) -> Vector:
@@ -127,30 +129,45 @@ def simulated() -> dict[str, Any]:
     return against(found, LinearModel(arm, shape=found.model.shape).nominal)
 
 
-def wpi(path: Path) -> Measured:
-    """Return the joint states of a file of that repository: no names, by row time, then 7 of each kind."""
-    raise NotImplementedError(path)
+def wpi(path: Path, rate: float) -> Measured:
+    """Return the joint states of a file of that repository, with the jaw.
+
+    Rows of 21 numbers without names or times: positions, velocities, efforts of yaw, pitch, insertion, roll
+    and the last three motors, after their ratios (main_psm.ipynb there, M_motor2dvrk_q).
+    """
+    table = np.loadtxt(path, delimiter=",", ndmin=2)
+    q, effort = table[:, :7].copy(), table[:, 14:21].copy()
+    q[:, 4:] = q[:, 4:] @ MOTOR_TO_JOINT.T
+    effort[:, 4:] = np.linalg.solve(MOTOR_TO_JOINT.T, effort[:, 4:].T).T
+    return Measured(np.arange(len(q)) / rate, q, effort)
 
 
-def compared(train: Path, test: Path) -> dict[str, Any]:
+def of_motors(efforts: Vector) -> Vector:
+    """Return efforts of seven joints with the last three as those of the motors, shape (N, 7)."""
+    return np.hstack([efforts[:, :4], efforts[:, 4:] @ MOTOR_TO_JOINT])
+
+
+def compared(train: Path, test: Path, rate: float) -> dict[str, Any]:
     """Fit on one recording and judge on the other."""
-    first = train.read_text("utf-8").split("\n", 1)[0]
-    if first.startswith("time"):
-        arm = of_psm(TOOL)
-        joints = [joint.name for joint in arm.joints]
-        pair = [measurements(path, "PSM1", joints) for path in (train, test)]
-    else:
-        arm = of_psm(TOOL, jaw=True)
-        pair = [wpi(path) for path in (train, test)]
+    ours = train.read_text("utf-8").startswith("time")
+    arm = of_psm(TOOL, jaw=not ours)
+    joints = [joint.name for joint in arm.joints]
+    pair = [measurements(path, "PSM1", joints) if ours else wpi(path, rate) for path in (train, test)]
     seen, judged = (filtered(measured, CUTOFF, 100.0) for measured in pair)
     result: dict[str, Any] = {}
     for stribeck in (False, True):
         found = fit([seen], arm, stribeck=stribeck, judged=judged)
+        predicted, published, measured = (
+            efforts[found.test] if ours else of_motors(efforts[found.test])
+            for efforts in (found.predicted, found.published, found.measured)
+        )
+        left = relative_residual(predicted, measured)
         result["stribeck" if stribeck else "coulomb"] = {
-            "residual_percent": (100.0 * found.residual).round(1).tolist(),
-            "against_wpi": (found.residual / WPI_RESIDUAL[: len(found.residual)]).round(2).tolist(),
-            "published_percent": (100.0 * found.published_residual).round(1).tolist(),
+            "residual_percent": (100.0 * left).round(1).tolist(),
+            "published_percent": (100.0 * relative_residual(published, measured)).round(1).tolist(),
         }
+        if not ours:
+            result["stribeck" if stribeck else "coulomb"]["against_wpi"] = (left / WPI).round(2).tolist()
     return result
 
 
@@ -162,9 +179,10 @@ def main() -> None:
     parser.add_argument("--train", type=Path)
     parser.add_argument("--test", type=Path)
     parser.add_argument("--noise", type=float, default=0.05)
+    parser.add_argument("--rate", type=float, default=200.0, help="rows in a second of files without times")
     arguments = parser.parse_args()
     if arguments.train and arguments.test:
-        print(json.dumps(compared(arguments.train, arguments.test), indent=2))
+        print(json.dumps(compared(arguments.train, arguments.test, arguments.rate), indent=2))
         return
     start = process_time()
     print(json.dumps({"synthetic": synthetic(arguments.noise), "simulated": simulated()}, indent=2))

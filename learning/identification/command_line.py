@@ -124,7 +124,7 @@ def _excite(output: Path, arm: str, moving: IdentifiedArm, periods: int, seed: i
         typer.echo(f"  {joint.name:12} {q:7.3f} {unit} {dq:7.3f} {unit}/s {ddq:7.3f} {unit}/s^2")
     typer.echo(
         f"wrote {output}, {periods * PERIOD:g} s from and to {arm} at home; play it:\n  trocar run identify"
-        f" --set participants.motion.samples={output.resolve()} --record recordings/identify"
+        f" --set participants.commands.bag={output.resolve()} --record recordings/identify"
     )
 
 

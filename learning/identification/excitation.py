@@ -21,8 +21,12 @@ def write_excitation(directory: Path, arm: str, joints: list[str], motion: Excit
 def _messages(arm: str, joints: list[str], motion: Excitation) -> Iterator[tuple[str, int, JointState]]:
     own = [i for i, joint in enumerate(joints) if joint != JAW]
     jaw = [i for i, joint in enumerate(joints) if joint == JAW]
-    for time, q in zip(motion.time.tolist(), motion.q, strict=True):
+    for time, q, dq in zip(motion.time.tolist(), motion.q, motion.dq, strict=True):
         for topic, columns in ((f"/{arm}/servo_jp", own), (f"/{arm}/jaw/servo_jp", jaw)):
             if columns:
                 names = [joints[i] for i in columns]
-                yield topic, round(time * 1e9), JointState(name=names, position=q[columns])
+                yield (
+                    topic,
+                    round(time * 1e9),
+                    JointState(name=names, position=q[columns], velocity=dq[columns]),
+                )

@@ -43,7 +43,7 @@ def _table(path: Path) -> tuple[list[str], Vector]:
         raise RecordingError(f"cannot read '{path}': {error.strerror}") from error
     except ValueError as error:
         raise RecordingError(f"'{path}' is not a table of numbers below a line of names: {error}") from error
-    return names, table.reshape(len(table), -1)
+    return names, table.reshape(-1, max(1, len(names)))
 
 
 def _of_csv(path: Path, joints: Sequence[str]) -> Measured:
@@ -89,10 +89,15 @@ def _at(clock: Vector, states: Measured, values: Vector) -> Vector:
 
 
 def _states(path: Path, bag: RosBag, ending: str, count: int) -> Measured:
-    """Return the first `count` numbers of the joint states on the one topic that ends in `ending`."""
+    """Return the first `count` numbers of the joint states on the topic that ends in `ending`.
+
+    Of several, such as those of an engine and its controller, it is the one with the most messages.
+    """
     times: list[float] = []
     states: list[tuple[Any, Any]] = []
     found = _topics(bag, ending)
+    most = max((bag.topics[name].messages for name in found), default=0)
+    found = [name for name in found if bag.topics[name].messages == most]
     if len(found) != 1:
         raise RecordingError(
             f"'{path}' has {len(found) or 'no'} topics that end in '{ending}', one is needed."
