@@ -58,6 +58,9 @@ def identify(
     rate: Annotated[
         float, typer.Option(min=20.0, max=1000.0, help="Samples in a second for the fit.")
     ] = 100.0,
+    owner: Annotated[
+        str, typer.Option("--of", metavar="NAME", help="Whose states count in the recording of a session.")
+    ] = "",
     stribeck: Annotated[
         bool, typer.Option("--stribeck", help="Friction that is larger at rest, too.")
     ] = False,
@@ -101,7 +104,7 @@ def identify(
     jaw = tool is not None and tool.jaw is not None and all(has_jaw(path, arm) for path in paths)
     moving = of_ecm() if tool is None else of_psm(tool, jaw=jaw)
     joints = [joint.name for joint in moving.joints]
-    samples = [filtered(measurements(path, arm, joints), cutoff, rate) for path in paths]
+    samples = [filtered(measurements(path, arm, joints, owner), cutoff, rate) for path in paths]
     found = fit(samples, moving, gravity=_gravity(up), stribeck=stribeck)
     output.write_text(own_dynamics(found, cutoff, [path.name for path in paths]).text(), "utf-8")
     _print(found, joints)

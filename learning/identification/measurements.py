@@ -20,16 +20,20 @@ __all__ = ["has_jaw", "measurements"]
 _TOPIC = "measured_js"
 
 
-def measurements(path: Path, arm: str, joints: Sequence[str]) -> Measured:
+def measurements(path: Path, arm: str, joints: Sequence[str], owner: str = "") -> Measured:
     """Return the states of n joints of `arm` as `path` records them, by receipt or message time.
 
     A bag has `<arm>/measured_js` at the end of a topic, and `<arm>/jaw/measured_js` for the jaw, the last
-    joint if it is one. A CSV file has a line of names: `time` (s),
+    joint if it is one; `owner` is the participant of a session whose topics count. A CSV file has a line of names: `time` (s),
     `position.<joint>` (rad, m) and `effort.<joint>` (N m, N), the joints in any order.
 
     Raises RecordingError where the topic, a column or the effort is missing.
     """
-    return _of_csv(path, joints) if path.suffix == ".csv" else _of_bag(path, arm, joints)
+    return (
+        _of_csv(path, joints)
+        if path.suffix == ".csv"
+        else _of_bag(path, f"{owner}/{arm}" if owner else arm, joints)
+    )
 
 
 def _table(path: Path) -> tuple[list[str], Vector]:
