@@ -24,8 +24,8 @@ def measurements(path: Path, arm: str, joints: Sequence[str], owner: str = "") -
     """Return the states of n joints of `arm` as `path` records them, by receipt or message time.
 
     A bag has `<arm>/measured_js` at the end of a topic, and `<arm>/jaw/measured_js` for the jaw, the last
-    joint if it is one; `owner` is the participant of a session whose topics count. A CSV file has a line of names: `time` (s),
-    `position.<joint>` (rad, m) and `effort.<joint>` (N m, N), the joints in any order.
+    joint if it is one; `owner` is the participant of a session whose topics count. A CSV file has a line of
+    names: `time` (s), `position.<joint>` (rad, m) and `effort.<joint>` (N m, N), the joints in any order.
 
     Raises RecordingError where the topic, a column or the effort is missing.
     """
