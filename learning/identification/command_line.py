@@ -22,7 +22,7 @@ app = typer.Typer()
 
 _PACKAGES = ("matplotlib", "scipy")
 _ARMS = ("PSM1", "PSM2", "PSM3", "ECM")
-_RATE = 200.0
+_RATE = 100.0
 """Hz, of the commands of an exciting motion."""
 
 
