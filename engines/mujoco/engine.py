@@ -109,7 +109,13 @@ class MujocoEngine(Stepped):
         model.place(self._model, self._data, self.params.arms)
         self._servos = Servos(self._model, self._data, self.params.arms, period * 1e-9)
         mujoco.mj_forward(self._model, self._data)
-        self._readings = Readings(self._model, self._data, self.params.arms, self._servos)
+        self._readings = Readings(
+            self._model,
+            self._data,
+            self.params.arms,
+            self._servos,
+            weighs=self.params.measured_effort == "motor",
+        )
         self._brakes = brakes.Brakes(self._model, self._data, self.params)
         self._holding = holding.Holding(
             self._model, self._data, self.params, self.params.publish_period * 1e-9
