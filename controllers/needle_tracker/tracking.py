@@ -14,8 +14,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from controllers.needle_tracker.arc_fit import Arc, Noise
+from controllers.needle_tracker.arc_fit import Arc
 from controllers.needle_tracker.filter import Estimate, Update, View, predicted, updated
+from controllers.needle_tracker.noise import Noise
 from controllers.needle_tracker.pose import difference, moved, turned_about
 from schemas.vectors import Vector
 
