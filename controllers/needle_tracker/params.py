@@ -58,13 +58,13 @@ class TrackerParams(Params):
     baseline: Length = Field(default=_BASELINE, ge=0.0, description="distance of the two cameras")
     eyes: Literal["both", "left"] = Field(default="both", description="whose pictures are used")
     arc_noise: float = Field(
-        default=0.3,
+        default=0.5,
         gt=0.0,
         description="px, at each pixel of the wire's length: standard deviation, anew in each picture",
     )
     tip_noise: float = Field(default=0.5, gt=0.0, description="px: of the tip, likewise")
     lasting: float = Field(
-        default=0.05,
+        default=0.02,
         ge=0.0,
         description="px by which the wire is seen aside, alike in both eyes and for about a second",
     )
