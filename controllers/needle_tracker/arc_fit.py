@@ -23,6 +23,8 @@ _PIECE = 4
 """Samples of the centre line in a piece whose distances are averaged."""
 _LEAST_COVER = 0.5
 """Share of a piece that must be seen: of one whose wire is covered in part, the middle is elsewhere."""
+_MOST_COVER = 1.5
+"""The same of a piece that is left out since other wire is seen in its place too."""
 _BEYOND = 1.5
 """Samples beyond an end of the line up to which something seen belongs to that end."""
 
@@ -139,7 +141,7 @@ def fit(
     reach += 1.0 + 0.5 * width
     residuals, lengths = _by_piece(image, tangents, normals, spacing, reach, seen)
     expected = spacing[:-1].reshape(PIECES, _PIECE).sum(axis=1)
-    used = lengths > _LEAST_COVER * expected
+    used = (lengths > _LEAST_COVER * expected) & (lengths < _MOST_COVER * expected)
     tip, refused = _tip(image[-1], slopes[-1], seen.tips, noise.tip**2 + lasts.tip**2, covariance, gate)
     # each piece has the slope of its middle sample
     found = Fit(
