@@ -1,12 +1,13 @@
 """Visual servoing and needle tracking, over random goals and needles.
 
     python -m bench.vision [servoing] [out-of-reach] [servoing-pictures] [tracking] [trouble]
-                           [tracking-pictures] [--seeds 50] [--json]
+                           [tracking-pictures] [carried-pictures] [--seeds 50] [--json]
 
 `servoing` and `out-of-reach` use the law with an ideal camera at 25 Hz, `tracking` and `trouble` the filter
 with what the camera model says that the eyes see (`bench.vision_goals`, `bench.vision_needle`); `-pictures`
-use the renderer: the controller with an ideal arm, and the scenario `needle-tracking`. All times are
-simulated. Errors are medians, with the 90th percentile behind them, over all pictures after the first second.
+use the renderer: the controller with an ideal arm, the scenario `needle-tracking`, and many needles in an
+arm that is put where it is (`bench.vision_pictures`). All times are simulated. Errors are medians, with the
+90th percentile behind them, over all pictures after the first second.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from scipy.optimize import least_squares
 import trocar
 from bench.vision_goals import CAMERA, CHAIN, features, random_goal, servo
 from bench.vision_needle import AUTHORS, OURS, Trouble, track
+from bench.vision_pictures import PICTURED, track_pictures
 from controllers.needle_tracker.pose import vector_of
 from controllers.visual_servoing.controller import VisualServoing
 from controllers.visual_servoing.params import ServoingParams
@@ -192,18 +194,7 @@ def trouble(seeds: int) -> Iterator[Row]:
 
 def tracking_pictures(seeds: int) -> Iterator[Row]:  # noqa: ARG001
     """The scenario as it is, and with the authors' camera."""
-    theirs = {
-        "scene.baseline": "1 mm",
-        "participants.endoscope.width": 640,
-        "participants.endoscope.height": 480,
-        "participants.endoscope.field_of_view": "30 deg",
-    }
-    for name, values in {
-        "ours, both eyes": {},
-        "ours, one eye": {"participants.tracker.eyes": "left"},
-        "authors', both eyes": theirs,
-        "authors', one eye": theirs | {"participants.tracker.eyes": "left"},
-    }.items():
+    for name, values in PICTURED.items():
         with tempfile.TemporaryDirectory() as directory:
             record = Path(directory) / "session"
             trocar.run("needle-tracking", set=values, pace="fast", one_host=True, record=record)
@@ -223,6 +214,21 @@ def tracking_pictures(seeds: int) -> Iterator[Row]:  # noqa: ARG001
             }
 
 
+def carried_pictures(seeds: int) -> Iterator[Row]:
+    """Rendered pictures of as many needles, held and carried otherwise, without physics."""
+    for name, changes in PICTURED.items():
+        runs = [track_pictures(changes, seed) for seed in range(seeds)]
+        found = {port: np.array([run[port][_SECOND:] for run in runs]) for port in runs[0]}
+        yield {
+            "camera": name,
+            "position mm": spread(1e3 * found["position"]),
+            "normal deg": spread(np.degrees(found["normal"])),
+            "axis deg": spread(np.degrees(found["axis"])),
+            "E (SRC) mm": spread(1e3 * found["marks"]),
+            "NEES": f"mean {found['nees'].mean():.2f}, {spread(found['nees'])}",
+        }
+
+
 PARTS: dict[str, Callable[[int], Iterator[Row]]] = {
     "servoing": servoing,
     "out-of-reach": out_of_reach,
@@ -230,6 +236,7 @@ PARTS: dict[str, Callable[[int], Iterator[Row]]] = {
     "tracking": tracking,
     "trouble": trouble,
     "tracking-pictures": tracking_pictures,
+    "carried-pictures": carried_pictures,
 }
 
 

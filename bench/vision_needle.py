@@ -42,6 +42,8 @@ class Trouble:
     other: bool = False
     """A second green arc is beside it."""
     angle: float = np.radians(20.0)
+    aside: tuple[float, float] = (0.0, 0.0)
+    """px by which wire and tip are seen aside in all pictures."""
 
 
 class Carried:
@@ -93,8 +95,8 @@ class Carried:
                 points = np.vstack([points, self._wire(projection, aside, noise_px, 1.0)])
             tip = _project(projection, to_gripper, NEEDLE.marks[2:])
             tip = tip + tip_px * self.rng.normal(size=2)
-            tips = np.zeros((0, 2)) if i in trouble.covered else tip
-            detection = Detection(points, np.ones(len(points)), tips)
+            tips = np.zeros((0, 2)) if i in trouble.covered else tip + trouble.aside
+            detection = Detection(points + trouble.aside, np.ones(len(points)), tips)
             found.append(View(projection @ gripper, detection))
         return found
 

@@ -11,6 +11,7 @@ import pytest
 from hub.planning.scenario_file import load
 from hub.session.launch import launch, plan_of
 from schemas.errors import MissingExtraError
+from schemas.scenario import Connection
 from tests.devices.ros.dds.test_gateway import domain
 from tests.devices.ros.rclpy_environment import rclpy_python
 from trocar import run
@@ -59,6 +60,35 @@ def test_keys_lead_the_right_arm(monkeypatch):
     metrics = found.scores["task"]["metrics"]
     assert metrics["PSM1/path_length"]["value"] > 1e-3
     assert metrics["PSM1/clutch_count"]["value"] is not None
+
+
+def test_the_masters_of_a_recorded_dvrk_lead_an_arm_and_are_scored():
+    measure = {"jaw": {"kind": "final", "of": "motion.PSM1/jaw/measured_js.position"}}
+    found = run(
+        "peg-board-masters",
+        set={**BARE, "duration": "3.2 s", "measure": measure},
+        pace="fast",
+        one_host=True,
+    )
+    metrics = found.scores["task"]["metrics"]
+    assert metrics["PSM1/path_length"]["value"] > 4e-3
+    assert metrics["PSM1/clutch_count"]["value"] is not None
+    assert found.measures["jaw"] < 0.6  # closed by the gripper
+
+
+def test_the_masters_of_a_real_dvrk_fit_where_their_recording_is():
+    gateway = (
+        "participants.lead={kind: ros2-zenoh, host: ros, listen: [MTML, MTMR, footpedals],"
+        " namespace: simulation, teleoperations: [MTMR_PSM1, MTML_PSM2]}"
+    )
+    loaded = load("peg-board-masters", [gateway])
+    both = [("console.*", "lead.*"), ("motion.*", "lead.*"), ("lead.*", "motion.*")]
+    more = [Connection.model_validate({"source": source, "target": target}) for source, target in both]
+    connections = (*loaded.scenario.connections, *more)
+    plan, _ = plan_of(loaded.scenario.model_copy(update={"connections": connections}), loaded.params)
+    assert {outlet.target_port for outlet in plan.to_devices} >= {"MTMR/move_cp", "PSM1/measured_js"}
+    heard = {inlet.source_port for inlet in plan.from_devices}
+    assert heard >= {"footpedals/clutch", "MTMR/gripper/measured_js", "MTMR_PSM1/state_command"}
 
 
 @pytest.mark.parametrize("name", ["peg-board", "peg-board-surrol", "peg-board-fls", "pick-and-place"])

@@ -71,9 +71,17 @@ class Chore(Protocol):
         """Return the height of a thing's middle, just over `place`, at which it is brought in line, m."""
         ...
 
-    def grasps(self, thing: int, pose: Vector, reach: float) -> Iterator[Grasps]:
-        """Yield how a thing with `pose`, shape (4, 4), can be taken by fingers as long as `reach`, m.
+    def grasps(self, thing: int, poses: Vector, reach: float, other: Vector | None) -> Iterator[Grasps]:
+        """Yield how a thing can be taken by fingers as long as `reach`, m, given the poses (n, 4, 4) of all.
 
-        Those that come later are for where an arm reaches none of those before.
+        `other`: the tip's pose (4, 4) of a hand as long that holds it, if one does. Those that come later are
+        for where an arm reaches none of those before.
+        """
+        ...
+
+    def room(self, points: Vector) -> Vector:
+        """Return the least room of an instrument to what stands around, m, shape (n,), at best `ROOMY`.
+
+        `points` in it, shape (n, points, 3), m, are those of controllers.expert.reach.
         """
         ...

@@ -8,7 +8,7 @@ from math import cos, pi, sin
 import numpy as np
 
 from controllers.expert.chores import DROP, SLACK
-from controllers.expert.grasps import Grasps, of_piece
+from controllers.expert.grasps import ROOMY, Grasps, of_piece
 from robots.training.dishes import DISH, PIECE
 from robots.training.fixtures import DishParams
 from schemas.vectors import Vector
@@ -67,6 +67,16 @@ class PickAndPlace:
         """Return the height over the rim."""
         return self.travel
 
-    def grasps(self, thing: int, pose: Vector, reach: float) -> Iterator[Grasps]:  # noqa: ARG002
+    def grasps(
+        self,
+        thing: int,
+        poses: Vector,
+        reach: float,
+        other: Vector | None,  # noqa: ARG002
+    ) -> Iterator[Grasps]:
         """Yield its grasps."""
-        yield of_piece(pose, reach)
+        yield of_piece(poses[thing], reach)
+
+    def room(self, points: Vector) -> Vector:
+        """Return enough: a tip stays over the rim of a dish."""
+        return np.full(len(points), ROOMY)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.expert.grasps import AJAR, FINGER, FREE, Grasps
+from controllers.expert.grasps import AJAR, FINGER, FREE, ROOMY, Grasps
 from robots.dvrk.instruments import WRIST_RADIUS
 from robots.training.boards import Ring
 from schemas.vectors import Vector
@@ -77,13 +77,14 @@ def of_fallen_ring(ring: Ring, pose: Vector, reach: float, around: Around) -> Gr
                 tip[:3, :3] = np.column_stack([np.cross(way * normal, fingers), way * normal, fingers])
                 tip[:3, 3] = ends - reach * fingers
                 poses.append(tip)
-                outwards.append(away / max(1e-9, sqrt(float(away @ away))))
+                outwards.append(away)
                 ups.append(out)
     return Grasps(
         np.array(poses).reshape(-1, 4, 4),
         np.full(len(poses), AJAR),
         np.array(outwards).reshape(-1, 2),
         np.array(ups).reshape(-1, 3),
+        np.full(len(poses), ROOMY),
     )
 
 

@@ -141,6 +141,12 @@ class Hand:
         off = self.state.goal[:3] - self.measured[:3]
         return sqrt(float(off @ off))
 
+    @property
+    def lag(self) -> float:
+        """Distance of the measured tip from its line, m."""
+        off = self.line()[:3] - self.measured[:3]
+        return sqrt(float(off @ off))
+
     def stand(self, base: Vector) -> None:
         """Take that the arm's base is at `base`, shape (4, 4), in the world."""
         self.base, self._into_base = base, inverse_pose(base)

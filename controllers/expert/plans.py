@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
 
-from controllers.expert.grasps import Grasps
+from controllers.expert.grasps import ROOMY, Grasps
 from controllers.expert.hand import Hand, pose_of
-from controllers.expert.reach import margins
+from controllers.expert.reach import links, margins, ways
 from robots import rotation
 from schemas.vectors import Vector
 
 __all__ = ["Plan", "plan", "plan_leaning", "upright"]
 
-_COMFORT, _PER_TURN, _PER_OPENING, _PER_SIDE = 0.25, 0.02, 0.2, 0.2
+_COMFORT, _PER_TURN, _PER_OPENING, _PER_SIDE, _PER_ROOM = 0.25, 0.02, 0.2, 60.0, 100.0
 """Of a grasp: the joints' margin beyond which more is no better; what a radian of turning and a radian of the
-jaw's opening cost, and what a side that leaves room to the other hand is worth, in margins.
+jaw's opening cost, and what a metre away from the other hand and a metre of room about the instrument are
+worth, in margins.
 """
 _LEAST, _LEAST_LEANING = 0.01, 0.04
 """The least margin of a way that is gone: 1.2 mm of insertion; 5 mm on a way to a thing that leans, where a
@@ -44,7 +46,9 @@ class Plan(NamedTuple):
     """Orientation of the tip then: a quaternion."""
 
 
-def plan(hand: Hand, found: Grasps, lift: float, way: Vector, away: Vector) -> Plan | None:
+def plan(
+    hand: Hand, found: Grasps, lift: float, way: Vector, away: Vector, room: Callable[[Vector], Vector]
+) -> Plan | None:
     """Return the best of the grasps of an upright thing; None if the arm reaches none.
 
     Args:
@@ -53,16 +57,22 @@ def plan(hand: Hand, found: Grasps, lift: float, way: Vector, away: Vector) -> P
         lift: by how much it is lifted, m.
         way: from where it is to where it is put, m, shape (3,).
         away: direction from the other hand, of length 1, shape (2,); 0 if that does not matter.
+        room: of points in an instrument, shape (n, points, 3), as `links` gives them: how far they all are
+            from what stands around, m, shape (n,).
     """
     if not len(found.poses):
         return None
     tips = np.repeat(found.poses[:, None], 3, axis=1)
     tips[:, 1, 2, 3] += lift
     tips[:, 2, :3, 3] += way
-    reached = margins(hand.chain, hand.base, tips)
+    reached, q = ways(hand.chain, hand.base, tips)
+    free = found.room.copy()
+    for held in (q[:, 0], q[:, 2]):
+        can = reached > _LEAST
+        free[can] = np.minimum(free[can], room(links(hand.chain, hand.base, held[can])))
     score = np.where(reached > _LEAST, np.minimum(reached, _COMFORT), -np.inf)
     score -= _PER_TURN * _turns(hand, found.poses) + _PER_OPENING * found.opening
-    score += _PER_SIDE * found.outwards @ away
+    score += _PER_SIDE * found.outwards @ away + _PER_ROOM * (free - ROOMY)
     best = int(score.argmax())
     if score[best] == -np.inf:
         return None

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 
 from controllers.expert.chores import DROP, SLACK
 from controllers.expert.fallen_rings import Around, of_fallen_ring
-from controllers.expert.grasps import UPRIGHT, Grasps, of_ring
+from controllers.expert.grasps import ROOMY, UPRIGHT, Grasps, of_ring, shut_fingers
+from controllers.expert.outlines import box_of_ring, gap
+from controllers.expert.outlines import of_ring as of_ring_above
+from controllers.expert.reach import LINK_RADII
 from robots.training.fixtures import BoardParams
 from schemas.vectors import Vector
 
@@ -24,6 +28,12 @@ _ENOUGH = 8.0e-3
 """Room about a ring there beyond which more is no better, m."""
 _PER_WAY = 0.05
 """What a metre of way to that point costs, in metres of room."""
+_APART = 1.0e-3
+"""Between a ring that is put down and the others, beyond which more is no better, m."""
+_SHIFTS = np.array([[0, 0], *([i, j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)], np.float64)
+"""Of a ring from the middle of its post, in halves of what the post leaves."""
+_PER_SHIFT = 10.0
+"""What a metre of that costs, in metres of way."""
 
 
 class PegBoard:
@@ -78,12 +88,32 @@ class PegBoard:
         return bool(there.any()) and abs(float(pose[2, 2])) > UPRIGHT
 
     def place(self, thing: int, poses: Vector, side: int) -> Vector:
-        """Return the place around the side's nearest free post."""
-        posts, others = self._sides[side], np.delete(poses[:, :3, 3], thing, axis=0)
-        free = [i for i, post in enumerate(posts) if self._is_free(post, others)]
-        off = posts[free] - poses[thing, :3, 3]
-        place = posts[free[int((off[:, :2] ** 2).sum(axis=1).argmin())]].copy()
-        place[2] += DROP
+        """Return the place around the side's nearest free post, clear of the other rings as it is turned now.
+
+        Where it would touch one the ring goes a little beside the middle of a post, or to another post.
+        """
+        posts, others = self._sides[side], np.delete(poses, thing, axis=0)
+        free = np.array([post for post in posts if self._is_free(post, others[:, :3, 3])])
+        ring, middle = self._board.ring, poses[thing, :2, 3]
+        outline = of_ring_above(ring, poses[thing]) - middle
+        outlines = [of_ring_above(ring, other) for other in others]
+        aside = (ring.inradius - self._board.post_radius) / 2.0
+        ways = [
+            (
+                float(np.linalg.norm(post[:2] - middle) + _PER_SHIFT * aside * np.linalg.norm(shift)),
+                post,
+                shift,
+            )
+            for post, shift in product(free, _SHIFTS)
+        ]
+        best, place = -np.inf, free[0]
+        for _, post, shift in sorted(ways, key=lambda way: way[0]):
+            at = post[:2] + aside * shift
+            room = min([_APART, *(gap(outline + at, other) for other in outlines)])
+            if room > best:
+                best, place = room, np.append(at, post[2] + DROP)
+            if room == _APART:
+                break
         return place
 
     def _is_free(self, post: Vector, others: Vector) -> bool:
@@ -119,24 +149,51 @@ class PegBoard:
         """Return the height just over the posts."""
         return self.clear + self._board.ring.height / 2.0 - SLACK / 2.0
 
-    def grasps(self, thing: int, pose: Vector, reach: float) -> Iterator[Grasps]:  # noqa: ARG002
+    def grasps(self, thing: int, poses: Vector, reach: float, other: Vector | None) -> Iterator[Grasps]:
         """Yield its grasps, clear of the post that it is around, or of all that is about a fallen one.
 
-        From straight above, then from a hand that leans.
+        From straight above, then from a hand that leans; where nothing else is left, without regard to other
+        rings.
         """
+        pose, ring = poses[thing], self._board.ring
+        near = [each for each in np.delete(poses, thing, axis=0) if self._is_near(each, pose)]
         if abs(float(pose[2, 2])) < UPRIGHT:
-            yield of_fallen_ring(self._board.ring, pose, reach, self._surroundings(pose[:3, 3]))
+            for others in (near, []) if near else ([],):
+                yield of_fallen_ring(ring, pose, reach, self._surroundings(pose[:3, 3], others))
             return
         off = self._posts - pose[:3, 3]
-        near = int((off[:, :2] ** 2).sum(axis=1).argmin())
-        within = -off[near, 2] < self._board.post_height
-        post = (self._posts[near, :2], self._board.post_radius) if within else None
-        for lean in _LEANS:
-            yield of_ring(self._board.ring, pose, reach, post, lean)
+        nearest = int((off[:, :2] ** 2).sum(axis=1).argmin())
+        within = -off[nearest, 2] < self._board.post_height
+        post = (self._posts[nearest, :2], self._board.post_radius) if within else None
+        outlines = [of_ring_above(ring, each) for each in near]
+        if other is not None:
+            outlines.append(shut_fingers(other, reach, ring.thickness))
+        for beside in (outlines, []) if outlines else ([],):
+            for lean in _LEANS:
+                yield of_ring(ring, pose, reach, post, lean, beside)
 
-    def _surroundings(self, middle: Vector) -> Around:
+    def _is_near(self, other: Vector, pose: Vector) -> bool:
+        """Say whether fingers that take a ring with `pose` come near another one."""
+        off = other[:3, 3] - pose[:3, 3]
+        return bool(np.linalg.norm(off) < 2.0 * self._board.ring.side)
+
+    def _surroundings(self, middle: Vector, others: list[Vector]) -> Around:
         local = np.abs((middle - self._pose[:3, 3]) @ self._pose[:3, :2])
         on_board = bool((local < np.array(self._board.size[:2]) / 2.0).all())
         floor = self._top if on_board else self._table
         top = self._top + self._board.post_height
-        return Around(floor, self._posts[:, :2], self._board.post_radius, top, self._boxes)
+        boxes = (*self._boxes, *(box_of_ring(self._board.ring, other) for other in others))
+        return Around(floor, self._posts[:, :2], self._board.post_radius, top, boxes)
+
+    def room(self, points: Vector) -> Vector:
+        """Return the room of wrist and shaft to posts and walls."""
+        room = np.full(points.shape[:2], ROOMY)
+        over = np.maximum(points[..., 2] - self._top - self._board.post_height, 0.0)
+        for x, y, _ in self._posts:
+            off = np.hypot(points[..., 0] - x, points[..., 1] - y)
+            room = np.minimum(room, np.hypot(off, over) - self._board.post_radius - LINK_RADII)
+        for least, greatest in self._boxes:
+            off = np.maximum(np.maximum(least - points, points - greatest), 0.0)
+            room = np.minimum(room, np.linalg.norm(off, axis=-1) - LINK_RADII)
+        least_room: Vector = room.min(axis=1)
+        return least_room

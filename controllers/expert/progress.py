@@ -59,7 +59,7 @@ class Seen(Record):
     still = array("n")
     """s for which each has lain still."""
     tries = array("n")
-    """How often a jaw has closed on each in this leg."""
+    """How often a jaw has closed on each in this leg, or has struck something on its way down to it."""
     verdicts = array("n")
     said = array("n")
     """The verdicts that have been published."""

@@ -1,21 +1,28 @@
-"""How comfortably an arm reaches a pose: how far its joints are from the ends of their ranges."""
+"""How comfortably an arm reaches a pose, and where its instrument is then. SI units, poses in the world."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS
 from robots.dvrk.inverse import branches
 from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["margins"]
+__all__ = ["LINK_RADII", "links", "margins", "ways"]
+
+_WRIST, _SHAFT = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 0.08, 17)
+"""Points along the link from the wrist's yaw axis to its pitch axis, and from there up the shaft, m."""
+LINK_RADII = np.concatenate([np.full(len(_WRIST), WRIST_RADIUS), np.full(len(_SHAFT), SHAFT_RADIUS)])
+"""Of the instrument about the points of `links`, m."""
 
 
-def margins(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
-    """Return for each of n ways the least margin of any joint at any pose of it, shape (n,).
+def ways(chain: SerialChain, base: Vector, tips: Vector) -> tuple[Vector, Vector]:
+    """Return for each of n ways the least margin of any joint at any pose of it, shape (n,), and its joints.
 
-    1 is the middle of a joint's range and 0 its end; a way keeps to one branch of the inverse kinematics.
+    1 is the middle of a joint's range and 0 its end; a way keeps to one branch of the inverse kinematics,
+    that with the largest margin, and so do the joints, shape (n, poses, 6).
 
     Args:
         chain: a PSM with a wrist of three joints.
@@ -24,5 +31,21 @@ def margins(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
     """
     q = branches(chain, inverse_pose(base) @ tips)  # (4, n, poses, 6)
     free = 2.0 * np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)
-    least: Vector = free.min(axis=(-2, -1)).max(axis=0)
-    return least
+    least: Vector = free.min(axis=(-2, -1))
+    best = least.argmax(axis=0)
+    each = np.arange(len(best))
+    return least[best, each], q[best, each]
+
+
+def margins(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
+    """Return the least margins of `ways` alone."""
+    return ways(chain, base, tips)[0]
+
+
+def links(chain: SerialChain, base: Vector, q: Vector) -> Vector:
+    """Return points in the wrist and the shaft of an instrument, shape (n, points, 3), for joints (n, 6)."""
+    frames = chain.frames(q)
+    yaw, pitch = frames[:, 5, None, :3, 3], frames[:, 4, None, :3, 3]
+    up = -pitch / np.linalg.norm(pitch, axis=-1, keepdims=True)  # the shaft goes through the base's origin
+    points = np.concatenate([yaw + _WRIST[:, None] * (pitch - yaw), pitch + _SHAFT[:, None] * up], axis=1)
+    return points @ base[:3, :3].T + base[:3, 3]

@@ -14,7 +14,7 @@ import numpy as np
 
 from controllers.expert.fallen_rings import BESIDE
 from controllers.expert.grasps import AJAR, UPRIGHT, Grasps
-from controllers.expert.hand import Hand, Phase, Role
+from controllers.expert.hand import Hand, Phase, Role, framed
 from controllers.expert.plans import Plan, plan, plan_leaning, upright
 from controllers.expert.team import Refusals, Team
 from robots import rotation
@@ -44,6 +44,8 @@ _WIDEST = 0.8
 """rad: so far a jaw opens, a step of `AJAR` at a time, while what it let go of clings to its fingers."""
 _AS_WIDE = 0.9
 """Share of its opening at which a jaw that still touches what it let go of does not come free by itself."""
+_STRUCK = 2.0e-3
+"""m: a tip that comes down so far from its line has struck something, with about 10 N; else it is 0.5 mm."""
 _GENTLE = 0.4
 """Share of the speed with which a hand comes down on things."""
 _OFFERED = 20.0
@@ -90,8 +92,16 @@ class Transfer:
         seen = self.state.thing >= 0 and self._seen.holders[self.state.thing] != 0.0
         self.state.unheld = 0.0 if seen else self.state.unheld + self.hand.period
         self.refusals.things[self._seen.still == 0.0] = 0.0
-        if self.hand.has_arrived:
+        if self.state.phase is Phase.DESCEND and not self.state.leans and self.hand.lag > _STRUCK:
+            self._back_off()
+        elif self.hand.has_arrived:
             self._next[self.state.phase]()
+
+    def _back_off(self) -> None:
+        """Leave a thing beside which, or on which, the fingers have come down."""
+        self._seen.tries[self.state.thing] += 1.0
+        self.hand.stay()
+        self._let_go()
 
     def refuse(self) -> bool:
         """Leave the thing after a command on the way to it was refused; return whether that is possible.
@@ -148,6 +158,11 @@ class Transfer:
         goal = self.state.grasp.copy()
         goal[:3] -= (BESIDE if self.state.leans else _HOVER) * rotation.matrix(goal[3:])[:, 2]
         return goal
+
+    @property
+    def _back(self) -> Vector:
+        """The way on which a hand leaves what it has let go of, m."""
+        return -(BESIDE if self.state.leans else _HOVER) * rotation.matrix(self.hand.line()[3:])[:, 2]
 
     @property
     def _holds(self) -> bool:
@@ -341,11 +356,15 @@ class Transfer:
             self.state.opening += AJAR
             self._let_go()
         else:
-            back = -(BESIDE if self.state.leans else _HOVER) * rotation.matrix(self.hand.line()[3:])[:, 2]
-            self._enter(Phase.RETREAT, self._moved(back), _GENTLE)
+            self._enter(Phase.RETREAT, self._moved(self._back), _GENTLE)
 
     def _retreat(self) -> None:
-        self._give_up()
+        """Leave what was let go of; if it has come along, put it down again, and open further."""
+        if self._clings and self.state.opening + AJAR <= _WIDEST:
+            self.state.opening += AJAR
+            self._enter(Phase.LOWER, self._moved(-self._back), _GENTLE)
+        else:
+            self._give_up()
 
     def _offer(self) -> None:
         if self._lost():
@@ -365,7 +384,9 @@ class Transfer:
 
     def _plan(self, thing: int) -> Plan | None:
         """Return how to take hold of a thing; None: it cannot be taken."""
-        ways = self._chore.grasps(thing, self._seen.poses[thing], self.hand.jaw.length)
+        other = self.team.other(self) if self.state.role is Role.TAKER else None
+        held = None if other is None else framed(other.hand.measured)
+        ways = self._chore.grasps(thing, self._seen.poses, self.hand.jaw.length, held)
         return next((found for found in (self._best(thing, each) for each in ways) if found), None)
 
     def _best(self, thing: int, found: Grasps) -> Plan | None:
@@ -383,4 +404,4 @@ class Transfer:
         if role is not Role.ALONE and (other := self.team.other(self)) is not None:
             away = (hand.base - other.hand.base)[:2, 3]
             away /= np.linalg.norm(away)
-        return plan(hand, found, lift, to - middle, away)
+        return plan(hand, found, lift, to - middle, away, self._chore.room)

@@ -13,34 +13,20 @@ from typing import cast
 
 import numpy as np
 
+from controllers.needle_tracker.noise import PIECES, Noise
 from robots.training.needles import NeedleShape
 from schemas.vectors import Vector
 
-__all__ = ["Arc", "Detection", "Fit", "Noise", "fit"]
+__all__ = ["Arc", "Detection", "Fit", "fit"]
 
 _PIECE = 4
 """Samples of the centre line in a piece whose distances are averaged."""
-_PIECES = 24
 _LEAST_COVER = 0.5
 """Share of a piece that must be seen: of one whose wire is covered in part, the middle is elsewhere."""
+_MOST_COVER = 1.5
+"""The same of a piece that is left out since other wire is seen in its place too."""
 _BEYOND = 1.5
 """Samples beyond an end of the line up to which something seen belongs to that end."""
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviations of what is seen, px."""
-
-    arc: float = 0.3
-    """Of the centre line, along its normal, at each pixel of its length."""
-    tip: float = 0.5
-    shading: float = 0.0
-    """Of the middle of what is seen of a lit wire, as a share of its width; added to both."""
-
-    def at(self, width: float) -> Noise:
-        """Return the noise where the wire is seen `width` px wide, with shading in the other two."""
-        added = self.shading * width
-        return Noise(float(np.hypot(self.arc, added)), float(np.hypot(self.tip, added)))
 
 
 @dataclass(frozen=True)
@@ -62,7 +48,7 @@ class Arc:
         """Take the needle, and how far beyond its end the middle of what marks the tip is seen, m."""
         self.needle = needle
         half = needle.arc / 2.0
-        angles = np.linspace(-half, half, _PIECE * _PIECES + 1)
+        angles = np.linspace(-half, half, _PIECE * PIECES + 1)
         angles[-1] += tip_ahead / needle.radius
         self.points = needle.points(angles)  # (m, 3)
         """m, in the needle's frame; the last one is the tip."""
@@ -103,6 +89,8 @@ class Fit:
     residuals: Vector
     slopes: Vector
     variances: Vector
+    common: Vector
+    """What they change by with what lasts, whose parts are independent and of variance 1, (n, k): px."""
     explained: float
     """Length of the seen wire that belongs to the needle, px."""
     unexplained: float
@@ -119,7 +107,11 @@ class Fit:
         """The same without the arc."""
         rows = slice(len(self.residuals) - 2 * self.tip, None)
         return replace(
-            self, residuals=self.residuals[rows], slopes=self.slopes[rows], variances=self.variances[rows]
+            self,
+            residuals=self.residuals[rows],
+            slopes=self.slopes[rows],
+            variances=self.variances[rows],
+            common=self.common[rows],
         )
 
 
@@ -139,23 +131,24 @@ def fit(
     """
     image, slopes, depth = arc.seen(projection, pose)
     width = arc.width(projection, depth)
-    noise = noise.at(width)
+    lasts = noise.that_lasts(width)
     along = cast("Vector", np.gradient(image, axis=0))
     spacing = np.hypot(along[:, 0], along[:, 1])  # (m,)
     tangents = along / np.maximum(spacing, 1e-9)[:, None]
     normals = tangents[:, ::-1] * (-1.0, 1.0)
     rows = np.einsum("mi,mij->mj", normals, slopes)  # (m, 6)
-    reach = gate * np.sqrt(np.einsum("mi,ij,mj->m", rows, covariance, rows) + noise.arc**2)
+    reach = gate * np.sqrt(np.einsum("mi,ij,mj->m", rows, covariance, rows) + noise.arc**2 + lasts.wire**2)
     reach += 1.0 + 0.5 * width
     residuals, lengths = _by_piece(image, tangents, normals, spacing, reach, seen)
-    expected = spacing[:-1].reshape(_PIECES, _PIECE).sum(axis=1)
-    used = lengths > _LEAST_COVER * expected
-    tip, refused = _tip(image[-1], slopes[-1], seen.tips, noise, covariance, gate)
+    expected = spacing[:-1].reshape(PIECES, _PIECE).sum(axis=1)
+    used = (lengths > _LEAST_COVER * expected) & (lengths < _MOST_COVER * expected)
+    tip, refused = _tip(image[-1], slopes[-1], seen.tips, noise.tip**2 + lasts.tip**2, covariance, gate)
     # each piece has the slope of its middle sample
     found = Fit(
         residuals[used],
         rows[_PIECE // 2 :: _PIECE][used],
-        noise.arc**2 / np.maximum(lengths[used], 1e-9),
+        noise.of_pieces(lengths[used], expected[used], width),
+        lasts.of_wire(normals[_PIECE // 2 :: _PIECE])[used],
         float(lengths[used].sum()),
         float(seen.lengths.sum() - lengths.sum()),
         float(expected.sum()),
@@ -169,6 +162,7 @@ def fit(
         residuals=np.concatenate([found.residuals, tip]),
         slopes=np.vstack([found.slopes, slopes[-1]]),
         variances=np.concatenate([found.variances, np.full(2, noise.tip**2)]),
+        common=np.vstack([found.common, lasts.of_tip()]),
     )
 
 
@@ -177,7 +171,7 @@ def _by_piece(
 ) -> tuple[Vector, Vector]:
     """Return the mean distance of each piece of the line from what is seen, and its seen length, px."""
     if not len(seen.points):
-        return np.zeros(_PIECES), np.zeros(_PIECES)
+        return np.zeros(PIECES), np.zeros(PIECES)
     # |a - b|^2 less |a|^2, which does not matter for what is nearest
     far = (image**2).sum(axis=1) - 2.0 * (seen.points @ image.T)  # (n, m)
     nearest = far.argmin(axis=1)
@@ -185,20 +179,20 @@ def _by_piece(
     across = (off * normals[nearest]).sum(axis=1)
     along = (off * tangents[nearest]).sum(axis=1)
     belongs = (abs(across) <= reach[nearest]) & (abs(along) <= _BEYOND * spacing[nearest] + 1.0)
-    piece = np.minimum(nearest[belongs] // _PIECE, _PIECES - 1)
+    piece = np.minimum(nearest[belongs] // _PIECE, PIECES - 1)
     weights = seen.lengths[belongs]
-    lengths = np.bincount(piece, weights, _PIECES).astype(np.float64)
-    sums = np.bincount(piece, weights * across[belongs], _PIECES)
+    lengths = np.bincount(piece, weights, PIECES).astype(np.float64)
+    sums = np.bincount(piece, weights * across[belongs], PIECES)
     return sums / np.maximum(lengths, 1e-9), lengths
 
 
 def _tip(
-    image: Vector, slopes: Vector, tips: Vector, noise: Noise, covariance: Vector, gate: float
+    image: Vector, slopes: Vector, tips: Vector, variance: float, covariance: Vector, gate: float
 ) -> tuple[Vector | None, bool]:
     """Return the distance (2,) of the likeliest of `tips` from the image of the tip, if it is near enough."""
     if not len(tips):
         return None, False
-    spread = slopes @ covariance @ slopes.T + noise.tip**2 * np.eye(2)
+    spread = slopes @ covariance @ slopes.T + variance * np.eye(2)
     off = tips - image  # (k, 2)
     squares = np.einsum("ki,ij,kj->k", off, np.linalg.inv(spread), off)
     best = int(squares.argmin())

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import EcmParams, MotionParams
-from controllers.needle_tracker.arc_fit import Arc, Noise
+from controllers.needle_tracker.arc_fit import Arc
 from controllers.needle_tracker.filter import Estimate, View
+from controllers.needle_tracker.noise import Noise
 from controllers.needle_tracker.overlay import drawn
 from controllers.needle_tracker.params import TrackerParams
 from controllers.needle_tracker.ports import CAMERA, tracker_ports
@@ -120,7 +121,7 @@ class NeedleTracker(Controller):
         self._camera = left_camera(cast("EcmParams", params.arms.driven["ECM"]).endoscope, params.baseline)
         self._middle = np.array(params.grasp.position)
         self._settings = Settings(
-            Noise(params.arc_noise, params.tip_noise, params.shading),
+            Noise(params.arc_noise, params.tip_noise, params.lasting, params.shading, params.capping),
             (params.drift.position, params.drift.angle),
             (params.slip.position, params.slip.angle),
         )

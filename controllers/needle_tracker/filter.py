@@ -18,7 +18,8 @@ from typing import cast
 
 import numpy as np
 
-from controllers.needle_tracker.arc_fit import Arc, Detection, Fit, Noise, fit
+from controllers.needle_tracker.arc_fit import Arc, Detection, Fit, fit
+from controllers.needle_tracker.noise import Noise
 from controllers.needle_tracker.pose import difference, moved
 from schemas.vectors import Vector
 
@@ -109,11 +110,12 @@ def updated(
         fits = [fit(arc, view.projection, pose, view.seen, noise, spread, gate) for view in views]
         first = first or fits
         tip_first = tip_first and any(each.tip for each in fits)
-        residuals, slopes, variances = _stacked([each.tip_only for each in fits] if tip_first else fits)
-        weights = _robust(residuals, variances) / variances
+        residuals, slopes, spreads = _stacked([each.tip_only for each in fits] if tip_first else fits)
+        weights = np.sqrt(_robust(residuals, spreads))
+        weighted = np.linalg.solve(spreads, weights[:, None] * slopes) * weights[:, None]  # (n, 6)
         off = difference(prior.pose, pose)
-        normal = information + slopes.T @ (weights[:, None] * slopes)
-        step = np.linalg.solve(normal, slopes.T @ (weights * residuals) - information @ off)
+        normal = information + slopes.T @ weighted
+        step = np.linalg.solve(normal, weighted.T @ residuals - information @ off)
         pose = moved(pose, cast("Vector", step))
         posterior = cast("Vector", np.linalg.inv(normal))
         if tip_first:
@@ -127,26 +129,29 @@ def updated(
 
 
 def _stacked(fits: Sequence[Fit]) -> tuple[Vector, Vector, Vector]:
+    """Return the residuals of all eyes (n,), their slopes (n, 6), and their covariance (n, n)."""
+    common = np.vstack([each.common for each in fits])
+    spread = np.diag(np.concatenate([each.variances for each in fits])) + common @ common.T
     return (
         np.concatenate([each.residuals for each in fits]),
         np.vstack([each.slopes for each in fits]),
-        np.concatenate([each.variances for each in fits]),
+        spread,
     )
 
 
-def _robust(residuals: Vector, variances: Vector) -> Vector:
-    size = np.abs(residuals) / np.sqrt(variances)
+def _robust(residuals: Vector, spread: Vector) -> Vector:
+    size = np.abs(residuals) / np.sqrt(np.diag(spread))
     return np.minimum(1.0, _HUBER / np.maximum(size, 1e-12))
 
 
 def _judged(estimate: Estimate, prior: Estimate, first: Sequence[Fit], last: Sequence[Fit]) -> Update:
-    residuals, _, variances = _stacked(last)
-    misfit = float((residuals**2 / variances).mean()) if residuals.size else 0.0
+    residuals, _, spread = _stacked(last)
+    misfit = float((residuals**2 / np.diag(spread)).mean()) if residuals.size else 0.0
     off = difference(prior.pose, estimate.pose)
-    residuals, slopes, variances = _stacked(first)
+    residuals, slopes, spread = _stacked(first)
     innovation = 1.0
     if residuals.size:
-        spread = slopes @ prior.covariance @ slopes.T + np.diag(variances)
+        spread = slopes @ prior.covariance @ slopes.T + spread
         innovation = float(residuals @ np.linalg.solve(spread, residuals)) / residuals.size
     seeing = [each for each in last if each.explained > 0.0]
     return Update(

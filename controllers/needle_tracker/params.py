@@ -58,18 +58,25 @@ class TrackerParams(Params):
     baseline: Length = Field(default=_BASELINE, ge=0.0, description="distance of the two cameras")
     eyes: Literal["both", "left"] = Field(default="both", description="whose pictures are used")
     arc_noise: float = Field(
-        default=0.8,
+        default=0.5,
         gt=0.0,
-        description=(
-            "px, at each pixel of the wire's length: standard deviation. More than that of one picture, 0.3,"
-            " since the errors of a picture are there again in the next one"
-        ),
+        description="px, at each pixel of the wire's length: standard deviation, anew in each picture",
     )
-    tip_noise: float = Field(default=1.2, gt=0.0, description="px: standard deviation, chosen likewise")
-    shading: float = Field(
-        default=0.25,
+    tip_noise: float = Field(default=0.5, gt=0.0, description="px: of the tip, likewise")
+    lasting: float = Field(
+        default=0.02,
         ge=0.0,
-        description="by which share of its width a lit wire may be seen aside: standard deviation",
+        description="px by which the wire is seen aside, alike in both eyes and for about a second",
+    )
+    shading: float = Field(
+        default=0.04,
+        ge=0.0,
+        description="by which share of its width the lit side draws the whole wire aside, likewise",
+    )
+    capping: float = Field(
+        default=0.1,
+        ge=0.0,
+        description="by which share of the wire's width the tip, in part hidden, is seen aside, likewise",
     )
     max_age: Duration = Field(
         default=200_000_000, gt=0, description="with no newer picture, the state is `blind`"

@@ -14,8 +14,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from controllers.needle_tracker.arc_fit import Arc, Noise
+from controllers.needle_tracker.arc_fit import Arc
 from controllers.needle_tracker.filter import Estimate, Update, View, predicted, updated
+from controllers.needle_tracker.noise import Noise
 from controllers.needle_tracker.pose import difference, moved, turned_about
 from schemas.vectors import Vector
 
@@ -36,6 +37,8 @@ _AGAIN = 8
 """Pictures from a search in vain to the next one."""
 _FOUND = 0.35
 """Share of the wire that a search must explain."""
+_FITS = 9.0
+"""Mean squared residual (in variances) beyond which a search has found nothing: other wire pulls at it."""
 _TURNS = (-0.45, -0.2, 0.2, 0.45)
 """rad about each axis of the needle, from which a search starts."""
 _TIP = 0.5
@@ -83,7 +86,8 @@ def followed(arc: Arc, belief: Belief, views: Sequence[View], seconds: float, se
             return Belief(_loosened(prior, _held(arc, prior.pose), settings.slip, _DOUBT), doubts)
         found = _searched(arc, prior, views, settings)
         if found is None:
-            return Belief(update.estimate if update.explained >= _LEAST else prior, doubts)
+            believed = update.explained >= _LEAST and update.misfit < _FITS
+            return Belief(update.estimate if believed else prior, doubts)
         update = found
     # while it was doubted, the estimate stood still: it is where the needle was before
     turn = np.linalg.norm(difference(prior.pose, update.estimate.pose)[3:])
@@ -106,7 +110,8 @@ def _searched(arc: Arc, prior: Estimate, views: Sequence[View], settings: Settin
     ]
     best = max(trials, key=_worth)
     usual = _worth(updated(arc, prior, views, settings.noise, _GATE))
-    return best if best.explained > _FOUND and _worth(best) > usual else None
+    fits = best.explained > _FOUND and best.misfit < _FITS
+    return best if fits and _worth(best) > usual else None
 
 
 def _worth(update: Update) -> float:

@@ -55,8 +55,9 @@ def reach(chain: SerialChain, base: Vector, tips: Vector) -> Reach:
     `base`: of the arm in the world, shape (4, 4). The shaft's roll may begin a turn on or back.
     """
     roll, found = 3, list[Reach]()
-    for q in branches(chain, inverse_pose(base) @ tips):  # (poses, 6)
-        q[:, roll] = np.unwrap(q[:, roll])
+    turning = [joint.kind == "revolute" for joint in chain.joints]
+    for q in branches(chain, inverse_pose(base) @ tips)[:2]:  # (poses, 6); no arm has the other two
+        q[:, turning] = np.unwrap(q[:, turning], axis=0)
         for turn in (-2.0 * pi, 0.0, 2.0 * pi):
             wound = q.copy()
             wound[:, roll] += turn

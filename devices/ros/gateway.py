@@ -52,6 +52,8 @@ from schemas.vectors import Vector
 
 __all__ = ["Gateway"]
 
+_ERRORS_OF_VREP = "stereo/error"
+"""Of the authors' simulator, whose own topics report nothing."""
 _STATUS_NS = 1_000_000_000
 
 
@@ -264,11 +266,12 @@ class Gateway(Device):
             event.write(message)
 
     def _publish_text(self, port: str, text: StringMessage) -> None:
-        """Publish a text of the gateway itself, if it has a topic: the console has warnings only."""
+        """Publish a text of the gateway itself, if it has a topic: not all owners have all of them."""
         owner = port.rpartition("/")[0]
-        event = self._events.get(port) or self._events.get(f"{owner}/warning")
-        if event is not None:
-            event.write(text)
+        for topic in (port, f"{owner}/warning", f"{owner}/status", _ERRORS_OF_VREP):
+            if (event := self._events.get(topic)) is not None:
+                event.write(text)
+                return
 
     def close(self) -> None:
         """Leave the graph."""

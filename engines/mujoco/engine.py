@@ -16,7 +16,7 @@ import numpy as np
 from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.pictures.opengl import import_mujoco
-from engines.mujoco.ports import THREAD, WIRE, bond_sides, scene_ports
+from engines.mujoco.ports import WIRE, bond_sides, scene_ports
 from hub.participant import BondPlan, Inputs, MotionSide, Outputs, Params, Setup, Stepped, Value, state_hash
 from robots.dvrk.mounted import MountedPsm
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
@@ -27,7 +27,6 @@ from schemas.vectors import Vector
 if TYPE_CHECKING:
     from engines.mujoco.interaction.contact_spheres import Spheres
     from engines.mujoco.interaction.probe import Probe
-    from engines.mujoco.interaction.strand import Strand
     from engines.mujoco.interaction.wire import Wire
 
 __all__ = ["MujocoEngine"]
@@ -51,9 +50,8 @@ class MujocoEngine(Stepped):
 
     def __init__(self, name: str, params: MujocoParams) -> None:
         super().__init__(name, params)
-        self._touching: list[Probe | Spheres | Strand | Wire] = []
+        self._touching: list[Probe | Spheres | Wire] = []
         self._wires: list[Wire] = []
-        self._strands: list[Strand] = []
         self._keepers: list[_Keeper] = []
         self._effective_mass: dict[str, float] = {}
         self._outputs: dict[str, Value] = {}
@@ -71,7 +69,7 @@ class MujocoEngine(Stepped):
         """The sphere of every palpation probe, `<arm>/probe`, and the contact spheres of instruments.
 
         The latter are called `<arm>/contact`; positions are those of the spheres' centres, in the world.
-        Of needles, `<needle>/wire` is base, middle and tip, and `<needle>/thread` the nodes of the thread.
+        Of needles, `<needle>/wire` is base, middle and tip.
         """
         return tuple(
             side.model_copy(update={"effective_mass": self._effective_mass.get(side.name)})
@@ -117,7 +115,14 @@ class MujocoEngine(Stepped):
         model.place(self._model, self._data, self.params.arms)
         self._servos = Servos(self._model, self._data, self.params.arms, period * 1e-9)
         mujoco.mj_forward(self._model, self._data)
-        self._readings = Readings(self._model, self._data, self.params.arms, self._servos, positions)
+        self._readings = Readings(
+            self._model,
+            self._data,
+            self.params.arms,
+            self._servos,
+            positions,
+            weighs=self.params.measured_effort == "motor",
+        )
         self._brakes = brakes.Brakes(self._model, self._data, self.params)
         self._holding = holding.Holding(
             self._model, self._data, self.params, self.params.publish_period * 1e-9
@@ -139,7 +144,6 @@ class MujocoEngine(Stepped):
             self._brakes,
             self._holding,
             *(touching.motion for touching in self._touching),
-            *self._strands,
             *([] if self._rigid is None or self._rigid.collisions is None else [self._rigid.collisions]),
         ]
         self._no_sensors = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -158,7 +162,7 @@ class MujocoEngine(Stepped):
         for bond in self.bonds:
             owner, _, kind = bond.name.partition("/")
             plan = setup.bonds.get(bond.name)
-            if kind in (WIRE, THREAD):
+            if kind == WIRE:
                 self._couple_needle(owner, bond, plan)
                 continue
             self._effective_mass[bond.name] = kinds[kind].least_mass(owner, self._model, self._data)
@@ -178,19 +182,9 @@ class MujocoEngine(Stepped):
         ]
 
     def _couple_needle(self, thing: str, bond: BondSide, plan: BondPlan | None) -> None:
-        from engines.mujoco.interaction.strand import Strand
         from engines.mujoco.interaction.wire import Wire
 
         params = cast("NeedleParams", self.params.objects[thing])
-        if bond.name == f"{thing}/{THREAD}" and params.thread is not None:
-            timestep = self._model.opt.timestep
-            self._effective_mass[bond.name] = Strand.least_mass(params.thread, timestep)
-            if plan:
-                strand = Strand(thing, params.thread, MotionSide(bond, plan), self._model, self._data)
-                self._touching.append(strand)
-                self._strands.append(strand)
-                self._outputs.update(strand.outputs)
-            return
         self._effective_mass[bond.name] = Wire.least_mass(thing, params, self._model, self._data)
         if plan:
             wire = Wire(thing, params, MotionSide(bond, plan), self._model, self._data)
@@ -343,6 +337,5 @@ class MujocoEngine(Stepped):
         """Release model and data."""
         self._touching.clear()
         self._wires.clear()
-        self._strands.clear()
         self._keepers.clear()
         self._outputs.clear()

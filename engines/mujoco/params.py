@@ -147,6 +147,13 @@ class MujocoParams(SceneParams):
             " period"
         ),
     )
+    measured_effort: Literal["servo", "motor"] = Field(
+        default="servo",
+        description=(
+            "what measured_js reports: the effort of the servos, or the whole effort of the motors, what"
+            " holds the arm against gravity included, as a real arm's currents tell"
+        ),
+    )
     rigid_wrench: bool = Field(
         default=True,
         description=(

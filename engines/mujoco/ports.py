@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from engines.mujoco.object_params import NeedleParams, ObjectParams
+from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import MujocoParams, SceneParams, has_jaw, has_probe, has_spheres
 from robots.dvrk import ecm
 from robots.dvrk.linkage import LINKAGES
@@ -13,7 +13,7 @@ from robots.dvrk.rolling_needle_driver import PADS
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message, JointState, PoseStamped, WrenchStamped
 
-__all__ = ["THREAD", "WIRE", "bond_sides", "position_count", "scene_ports"]
+__all__ = ["WIRE", "bond_sides", "position_count", "scene_ports"]
 
 _JOINT_STATE, _POSE, _WRENCH = JointState.ros_type, PoseStamped.ros_type, WrenchStamped.ros_type
 _ALL = ("position", "velocity", "effort")
@@ -23,8 +23,6 @@ _MODES = (
 )
 WIRE = "wire"
 """Of a needle: the bond at three points of it."""
-THREAD = "thread"
-"""Of a needle with a thread: the bond at the nodes of the thread."""
 _FREE_BODY = 7
 """Position and quaternion."""
 
@@ -73,21 +71,13 @@ def _collision_ports(slow: int) -> Iterator[Port]:
 def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
     """Return the bonds `<arm>/probe` of palpation probes and `<arm>/contact` of contact spheres.
 
-    Needles have `<needle>/wire`: base, middle and tip of the wire, and with a thread `<needle>/thread`: its
-    nodes. All are in the world.
+    Needles have `<needle>/wire`: base, middle and tip of the wire. All are in the world.
     """
+    needles = (name for name, thing in params.objects.items() if isinstance(thing, NeedleParams))
     return (
         *(side for name, arm in params.arms.items() for side in _arm_bonds(name, arm)),
-        *(side for name, thing in params.objects.items() for side in _object_bonds(name, thing)),
+        *(BondSide(name=f"{name}/{WIRE}", side="motion", dof=3, points=3, frame="world") for name in needles),
     )
-
-
-def _object_bonds(name: str, thing: ObjectParams) -> Iterator[BondSide]:
-    if isinstance(thing, NeedleParams):
-        yield BondSide(name=f"{name}/{WIRE}", side="motion", dof=3, points=3, frame="world")
-        if thing.thread is not None:
-            nodes = thing.thread.segments
-            yield BondSide(name=f"{name}/{THREAD}", side="motion", dof=3, points=nodes, frame="world")
 
 
 def _arm_bonds(name: str, arm: MountedPsm | MountedEcm) -> Iterator[BondSide]:
@@ -265,13 +255,9 @@ def _object_ports(thing: str, slow: int) -> Iterator[Port]:
 def position_count(scene: SceneParams) -> int:
     """Return the size of `qpos`, without building the model.
 
-    It has the joints, linkage and fingers with pads or phalanges of every arm, then the pose of every object,
-    after that of a needle the nodes of its thread.
+    It has the joints, linkage and fingers with pads or phalanges of every arm, then the pose of every object.
     """
     count = _FREE_BODY * len(scene.objects)
-    for thing in scene.objects.values():
-        if isinstance(thing, NeedleParams) and thing.thread is not None:
-            count += 3 * thing.thread.segments
     for name, arm in scene.arms.items():
         if isinstance(arm, MountedEcm):
             count += len(ecm.JOINT_NAMES)

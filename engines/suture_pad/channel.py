@@ -202,7 +202,8 @@ class Channel:
         missing[:, 2] = local[:, 2]
         state.swept = float(weights @ np.sqrt((missing * missing).sum(axis=1))) * SPACING
         self._missing = -(weights[:, None] * missing) @ rotation.T
-        along = np.stack([-radial[:, 1], radial[:, 0], np.zeros(state.count)], axis=1)
+        along = np.zeros_like(local)
+        along[:, 0], along[:, 1] = -radial[:, 1], radial[:, 0]
         loads = tissue.compression * SPACING * missing - self._rub(covered) * along
         loads *= weights[:, None]
         forces = loads @ rotation.T

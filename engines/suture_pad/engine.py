@@ -9,9 +9,9 @@ import numpy as np
 from engines.suture_pad.channel import Channel, Phase
 from engines.suture_pad.drawn_thread import DrawnThread
 from engines.suture_pad.params import SuturePadParams
-from engines.suture_pad.ports import BOND, SKIN, THREAD, THREAD_NUMBERS, bond_side, pad_ports, thread_side
+from engines.suture_pad.ports import BOND, SKIN, THREAD_NUMBERS, bond_side, pad_ports
 from engines.suture_pad.skin import Skin
-from engines.suture_pad.three_points import ThreePoints
+from engines.suture_pad.three_points import ThreePoints, cross
 from hub.participant import (
     ForceSide,
     Inputs,
@@ -26,6 +26,7 @@ from hub.participant import (
     state_hash,
 )
 from robots.dvrk.cart import inverse_pose
+from robots.training.threads import THREAD
 from schemas.errors import ScenarioError
 from schemas.ports import BondSide, Port
 from schemas.ros import Header, Time
@@ -36,6 +37,7 @@ __all__ = ["SuturePad"]
 
 _NEAR = 5.0e-3
 """From a hole, across it, m: an event names the hole within this distance."""
+_NO_TRIANGLES = np.zeros((0, 3), np.uint32)
 
 
 class PadState(Record):
@@ -63,9 +65,13 @@ class SuturePad(Stepped):
         self._shape = needle.shape
         self._channel = Channel(self._shape, params.tissue)
         self._frame_of = ThreePoints(self._shape.bonded)
+        self._tip_in_needle = self._shape.marks[2]
         self._state = PadState()
         self._side: ForceSide | None = None
-        self._thread = None if needle.thread is None else DrawnThread(needle.thread, self._shape, params)
+        self._thread = None
+        if needle.thread is not None:
+            depth = params.phantom.measures.skin[2]
+            self._thread = DrawnThread(needle.thread, self._shape, params.tissue, depth)
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -74,9 +80,8 @@ class SuturePad(Stepped):
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """The needle, and its thread where it has one."""
-        thread = self.params.needle[1].thread
-        return (bond_side(), *(() if thread is None else (thread_side(thread.segments),)))
+        """The needle, with what its thread does to it."""
+        return (bond_side(),)
 
     def configure(self, setup: Setup) -> Outputs:
         """Prepare the skin.
@@ -99,8 +104,6 @@ class SuturePad(Stepped):
         self._skin = Skin(phantom.skin, phantom.holes[:, :3, 3])
         if plan := setup.bonds.get(BOND):
             self._side = ForceSide(bond_side(), plan)
-        if self._thread is not None:
-            self._thread.couple(setup.bonds.get(THREAD))
         numbers = ["phase", "insertion", "depth", "resistance", "tip_force", "trauma"]
         if self._thread is not None:
             numbers += THREAD_NUMBERS
@@ -111,20 +114,19 @@ class SuturePad(Stepped):
             "entry": self._state.entry,
             "exit": self._state.exit,
             "events": (),
-            f"{SKIN}/nodes": self._nodes(0),
+            **self._drawn(0),
         }
         if self._side is not None:
             still = {self._side.force_port: np.zeros(9), self._side.work_port: np.zeros(1)}
             self._outputs |= still
-        if self._thread is not None:
-            self._outputs |= self._thread.outputs
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Follow the predicted needle, and return the reaction."""
         outputs, side = self._outputs, self._side
         outputs["events"] = ()
-        outputs.pop(f"{SKIN}/nodes", None)
+        for body in (SKIN, THREAD):
+            outputs.pop(f"{body}/nodes", None)
         if side is not None:
             was = self._channel.state.phase
             outputs |= self._react(side, inputs, h)
@@ -132,40 +134,36 @@ class SuturePad(Stepped):
                 outputs["events"] = self._events(was, t + h)
             self._report()
         if not (t + h) % self.params.node_period:
-            outputs[f"{SKIN}/nodes"] = self._nodes(t + h)
+            outputs |= self._drawn(t + h)
         return outputs
 
     def _react(self, side: ForceSide, inputs: Inputs, h: int) -> dict[str, Vector]:
         """Take the sub-steps of a step, and return the reaction."""
         side.begin(inputs, h * 1e-9)
-        thread = self._thread
-        if thread is not None:
-            thread.begin(inputs, h)
         dt, no_damper, pushed = self.params.timestep * 1e-9, np.zeros(9), np.zeros(9)
         for i in range(h // self.params.timestep):
             tau = (i + 0.5) * dt
-            position = side.position(tau)
-            pushed = self._push(position)
-            if thread is not None:  # what it does to its first point, the needle's base, acts on the needle
-                pushed[:3] += thread.push(position[:3], self._channel.state, tau, dt)
+            pushed = self._push(side.position(tau))
             side.add(pushed, no_damper, tau, dt)
         self._numbers["resistance"][0] = self._size
-        result = side.result(pushed, no_damper)
-        if thread is not None:
-            result |= thread.result()
-            self._numbers["thread_pull"][0], self._numbers["passages"][0] = thread.pull, thread.count
-        return result
+        if self._thread is not None:
+            pull, count = self._thread.pull, self._thread.count
+            self._numbers["thread_pull"][0], self._numbers["passages"][0] = pull, count
+        return side.result(pushed, no_damper)
 
     def _push(self, position: Vector) -> Vector:
         """Return the forces (N) of the needle on the pad at its points (m), both in the world, shape (9,)."""
         rotation, shift = self._world_in_pad[:3, :3], self._world_in_pad[:3, 3]
         points = position.reshape(3, 3) @ rotation.T + shift
         turned, origin = self._frame_of.frame(points)
-        self._tip = turned @ self._shape.marks[2] + origin
+        self._tip = turned @ self._tip_in_needle + origin
         over = bool((np.abs(self._tip[:2]) < self._half).all())
         force, moment = self._channel.advance(turned, origin, over_pad=over)
         self._size = float(np.sqrt(force @ force))
-        if self._size == 0.0 and not moment.any():
+        if self._thread is not None:
+            pull, place = self._thread.follow(turned, origin, self._channel.state)
+            force, moment = force + pull, moment + cross(place, pull)
+        if not (force.any() or moment.any()):
             return np.zeros(9)
         return -(self._frame_of.forces(points, force, moment) @ rotation).ravel()
 
@@ -213,15 +211,25 @@ class SuturePad(Stepped):
         nearest = int(away.argmin())
         return self._names[nearest] if away[nearest] <= _NEAR else ""
 
-    def _nodes(self, time_ns: int) -> SoftBodyState:
-        nodes = self._skin.displaced(*self._channel.displaced()) @ self._pad_in_world[:3, :3].T
-        triangles = self._skin.triangles.ravel() if time_ns == 0 else np.zeros(0, np.uint32)
-        return SoftBodyState(
-            header=Header(stamp=Time.from_ns(time_ns), frame_id="world"),
-            body=SKIN,
-            nodes_m=(nodes + self._pad_in_world[:3, 3]).astype(np.float32).ravel(),
-            triangles=triangles,
-        )
+    def _drawn(self, time_ns: int) -> dict[str, SoftBodyState]:
+        """Return the skin and the thread, which settles in the time since they were drawn last."""
+        first, thread = time_ns == 0, self._thread
+        skin = self._skin.displaced(*self._channel.displaced())
+        shown = {SKIN: (skin, self._skin.triangles if first else _NO_TRIANGLES)}
+        if thread is not None:
+            if not first and self._side is not None:
+                thread.settle(self.params.node_period * 1e-9)
+            shown[THREAD] = thread.tube(), thread.triangles() if first else _NO_TRIANGLES
+        rotation, shift = self._pad_in_world[:3, :3], self._pad_in_world[:3, 3]
+        return {
+            f"{body}/nodes": SoftBodyState(
+                header=Header(stamp=Time.from_ns(time_ns), frame_id="world"),
+                body=body,
+                nodes_m=(nodes @ rotation.T + shift).astype(np.float32).ravel(),
+                triangles=triangles.ravel(),
+            )
+            for body, (nodes, triangles) in shown.items()
+        }
 
     def _parts(self) -> tuple[Vector, ...]:
         side = () if self._side is None else (self._side.state,)

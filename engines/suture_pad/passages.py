@@ -1,128 +1,182 @@
 """A thread in the channels that it was drawn through: what holds it there. No ports, no bonds. SI units.
 
-A passage is a channel that the needle's base has gone into: a row of points in the tissue, and the length b
-of thread that has gone into it. At the point a metres from its mouth is then the point of the thread b - a
-behind the needle's base. As of the needle (`channel`), what lies between the two, d, is split along the
-channel's tangent t:
+A passage is a channel that the needle's base has gone into: a row of points in the tissue, of length L from
+its mouth to its end. The thread inside lies on it, so one number says all of it: b, the length of thread that
+has gone into the mouth. The thread does not stretch, so what pulls it is geometry alone:
 
-    along:       b grows by the mean of t . d over the passage; friction is a spring that slips (Prandtl)
-    across:      K ds (d - t (t . d)) on the thread: K times the area swept
+    in the newest    b >= L + the way from its end to the needle's base, or the base's own way while it is in
+    in one before    b >= L + the way from its end to the mouth of the next + the b of that
 
-The thread is straight between its nodes, so a force goes to the two nodes beside by their shares.
+Friction is a spring per length that slips at its largest force (Prandtl). A passage that nothing pulls
+returns to where its spring is at rest; one that is pulled adds its friction to what the needle's base feels.
+So the force is the gradient of the springs' energy and can only lose; it has no mass and no step that could
+be too long.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import pairwise
+from math import sqrt
+from typing import NamedTuple
+
 import numpy as np
 
 from engines.suture_pad.tissue import TissueParams
-from hub.participant import Record, array
+from hub.participant import Record, array, integer
 from robots.training.threads import ThreadParams
 from schemas.vectors import Vector
 
-__all__ = ["APART", "MOST", "Passages", "PassagesState"]
+__all__ = ["MOST", "Passage", "Passages", "PassagesState"]
 
 MOST = 8
 """Of passages: as many stitches as one thread is drawn through. More are not held."""
-APART = 1.0e-3
-"""Between the points of a passage, m."""
 _LONGEST = 40
-"""Of points of a passage; a channel that is longer is held at its mouth's end only, by so many."""
+"""Of points of a passage."""
+_STILL = np.zeros(3)
 
 
 class PassagesState(Record):
-    """All passages; those beyond the last that was opened are zero."""
+    """All passages in the order in which they were opened; those beyond `count` are zero."""
 
+    count = integer()
     points = array(MOST, _LONGEST, 3)
     """m, frame `pad`."""
     counts = array(MOST)
-    """Of points; 0: no passage, or the thread has left it."""
+    """Of points."""
     through = array(MOST)
     """Length of thread that has gone into the mouth, m."""
     slid = array(MOST)
     """What that would have to be for no friction, m."""
 
 
+class Passage(NamedTuple):
+    """One channel with thread in it."""
+
+    points: Vector
+    """From its mouth to its end, m, shape (n, 3)."""
+    ways: Vector
+    """Of the points from the mouth, m, shape (n,)."""
+    through: float
+    """Length of thread that has gone into the mouth, m."""
+
+    @property
+    def length(self) -> float:
+        """From mouth to end, m."""
+        return float(self.ways[-1])
+
+    def at(self, ways: Vector) -> Vector:
+        """Return the places so far (m) from the mouth, shape (n, 3); outside they go straight on."""
+        inside = np.clip(ways, 0.0, self.length)
+        places = np.stack([np.interp(inside, self.ways, self.points[:, axis]) for axis in range(3)], axis=1)
+        before, behind = np.minimum(ways - inside, 0.0), np.maximum(ways - inside, 0.0)
+        first, last = (self.points[at + 1] - self.points[at] for at in (0, -2))
+        places += before[:, None] * first / max(float(np.linalg.norm(first)), 1e-12)
+        places += behind[:, None] * last / max(float(np.linalg.norm(last)), 1e-12)
+        return places
+
+
 class Passages:
     """One thread, and the channels of one pad that it runs through."""
 
     def __init__(self, thread: ThreadParams, tissue: TissueParams) -> None:
-        self._thread, self._tissue = thread, tissue
+        self._total, self._friction = thread.length, tissue.thread_friction
+        self._stiffness = tissue.thread_friction / tissue.give
         self.state = PassagesState()
+        self.pull = 0.0
+        """Size of the force on the needle's base, N."""
         self.refresh()
 
     def open(self, points: Vector, through: float) -> None:
-        """Begin a passage along a channel's points (m, `APART`), shape (n, 3), with so much thread in it."""
+        """Begin a passage along a row of points (m), shape (n, 3), with so much thread in it."""
         state = self.state
-        if not (state.counts == 0.0).any():
-            return
-        at = int((state.counts == 0.0).argmax())
-        points = points[:_LONGEST]
+        at, points = state.count, points[:_LONGEST]
         state.points[at, : len(points)], state.counts[at] = points, len(points)
         state.through[at] = state.slid[at] = through
+        state.count = at + 1
         self.refresh()
 
-    def refresh(self) -> None:
-        """Take the rows of all passages, one after the other, from the state."""
-        counts = self.state.counts.astype(int)
-        self._which = np.repeat(np.arange(MOST), counts)
-        self._arclengths = APART * np.concatenate([np.arange(0.0), *map(np.arange, counts.tolist())])
-        self._points: Vector = np.concatenate(
-            [self.state.points[at, :count] for at, count in enumerate(counts.tolist())]
-        )
-        self._tangents: Vector = np.concatenate(
-            [_tangents(self.state.points[at, :count]) for at, count in enumerate(counts.tolist())]
-        )
+    @property
+    def is_full(self) -> bool:
+        """Whether no further passage can be opened."""
+        return self.state.count == MOST
 
-    def advance(self, line: Vector) -> Vector:
-        """Follow the thread, and return the forces (N) on its nodes, shape (n + 1, 3), frame `pad`.
+    def refresh(self) -> None:
+        """Measure all passages of the state."""
+        state = self.state
+        rows = [state.points[at, : int(state.counts[at])] for at in range(state.count)]
+        self._rows = [
+            (row, np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(row, axis=0), axis=1))]))
+            for row in rows
+        ]
+        self._lengths = [float(ways[-1]) for _, ways in self._rows]
+        self._ends: list[list[float]] = [row[-1].tolist() for row in rows]
+        self._gaps = [float(np.linalg.norm(later[0] - row[-1])) for row, later in pairwise(rows)]
+
+    def __iter__(self) -> Iterator[Passage]:
+        """Yield the passages from the newest on."""
+        for at in reversed(range(self.state.count)):
+            yield Passage(*self._rows[at], float(self.state.through[at]))
+
+    def advance(self, base: Vector, forward: Vector, inserted: float | None) -> Vector:
+        """Follow the needle's base, and return the force on it, N, frame `pad`.
 
         Args:
-            line: base of the needle and nodes of the thread, m, frame `pad`, shape (n + 1, 3).
+            base: of the needle, m, frame `pad`.
+            forward: from the base into the needle, unit vector, frame `pad`.
+            inserted: how far the base is in the newest passage, m; None: it is outside.
         """
-        forces = np.zeros_like(line)
-        if not len(self._which):
-            return forces
-        state, tissue, which = self.state, self._tissue, self._which
-        behind = state.through[which] - self._arclengths
-        weights = np.clip(behind / APART + 0.5, 0.0, 1.0)
-        weights *= np.clip((self._thread.length - behind) / APART + 0.5, 0.0, 1.0)
-        nodes = np.clip(behind / self._thread.segment, 0.0, self._thread.segments)
-        before = np.minimum(nodes.astype(int), self._thread.segments - 1)
-        share = (nodes - before)[:, None]
-        away = (1.0 - share) * line[before] + share * line[before + 1] - self._points
-        along = (away * self._tangents).sum(axis=1)
-        covered: Vector = np.bincount(which, weights, MOST).astype(np.float64)
-        moved = np.bincount(which, weights * along, MOST)
-        state.through += np.divide(moved, covered, out=np.zeros(MOST), where=covered > 0.0)
-        pull = self._rub()[which, None] * self._tangents
-        across = away - along[:, None] * self._tangents
-        loads = -APART * weights[:, None] * (tissue.compression * across + pull)
-        np.add.at(forces, before, (1.0 - share) * loads)
-        np.add.at(forces, before + 1, share * loads)
-        self._close(covered)
-        return forces
+        newest = self.state.count - 1
+        self.pull = 0.0
+        if newest < 0:
+            return _STILL
+        if inserted is not None:
+            self.pull = self._slide(inserted, is_led=True)
+            force: Vector = -self.pull * forward
+        else:
+            x, y, z = base.tolist()
+            u, v, w = self._ends[newest]
+            u, v, w = u - x, v - y, w - z
+            gap = sqrt(u * u + v * v + w * w)
+            self.pull = self._slide(self._lengths[newest] + gap, is_led=False)
+            scale = self.pull / max(gap, 1e-9)
+            force = np.array([scale * u, scale * v, scale * w])
+        self._forget(inserted)
+        return force
 
-    def _rub(self) -> Vector:
-        """Return the friction of each passage, N/m; let the thread slip where it is too large."""
-        state, largest = self.state, self._tissue.thread_friction
-        stiffness = largest / self._tissue.give
-        pull = np.clip(stiffness * (state.through - state.slid), -largest, largest)
-        state.slid[:] = state.through - pull / stiffness
+    def _slide(self, demand: float, *, is_led: bool) -> float:
+        """Draw the newest passage to `demand` (m) and the others after it; return the sum of friction, N.
+
+        `is_led`: the needle itself is in the newest, and pushes its thread back, too.
+        """
+        pull, total, is_taut = 0.0, self._total, True
+        through, slid = self.state.through, self.state.slid
+        for at in reversed(range(self.state.count)):
+            rest, length = float(slid[at]), self._lengths[at]
+            way = demand if is_led else max(rest, demand)
+            is_taut, is_led = is_taut and (is_led or demand > rest), False
+            stretch = way - rest
+            rub = max(-self._friction, min(self._friction, self._stiffness * stretch))
+            through[at], slid[at] = way, way - rub / self._stiffness
+            if is_taut:
+                pull += rub * max(0.0, min(way, length) - max(0.0, way - total))
+            if at:
+                demand = way + self._gaps[at - 1] + self._lengths[at - 1]
         return pull
 
-    def _close(self, covered: Vector) -> None:
-        """Forget the passages in which there is no thread any more."""
-        left = (covered == 0.0) & (self.state.counts > 0.0)
-        if left.any():
-            self.state.counts[left] = self.state.through[left] = self.state.slid[left] = 0.0
-            self.state.points[left] = 0.0
-            self.refresh()
+    def _forget(self, inserted: float | None) -> None:
+        """Forget the newest passage if the needle has left it by its mouth, and the oldest without thread."""
+        state = self.state
+        if inserted is not None and inserted <= 0.0:
+            state.count -= 1
+            self._clear(state.count)
+        elif float(state.through[0]) >= self._total + self._lengths[0]:
+            for kept in (state.points, state.counts, state.through, state.slid):
+                kept[:-1] = kept[1:].copy()
+            state.count -= 1
+            self._clear(state.count)
 
-
-def _tangents(points: Vector) -> Vector:
-    """Return unit vectors along a row of points, shape (n, 3), from its mouth on."""
-    if len(points) < 2:
-        return np.zeros((len(points), 3))
-    ways = np.gradient(points, axis=0)
-    return ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    def _clear(self, at: int) -> None:
+        state = self.state
+        state.points[at] = state.counts[at] = state.through[at] = state.slid[at] = 0.0
+        self.refresh()

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from engines.suture_pad.channel import Phase
+from robots.training.threads import THREAD
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message
 from schemas.trocar_msgs import SoftBodyState, TaskEvent
 
-__all__ = ["BOND", "EVENTS", "SKIN", "THREAD", "THREAD_NUMBERS", "bond_side", "pad_ports", "thread_side"]
+__all__ = ["BOND", "EVENTS", "SKIN", "THREAD_NUMBERS", "bond_side", "pad_ports"]
 
 BOND = "needle"
-THREAD = "thread"
 SKIN = "skin"
 EVENTS = ("entered", "exited", "withdrawn", "pulled out")
 """The tip has broken through the skin; has come out again; the needle is out the way it came, or all through.
@@ -25,7 +25,7 @@ _NUMBERS = (
     ("stitches", "", "how many needles have been pulled all through"),
 )
 _OF_THREAD = (
-    ("thread_pull", "N", "size of the force of all channels on the thread"),
+    ("thread_pull", "N", "size of the force of the thread on the needle's base"),
     ("passages", "", "how many channels the thread runs through"),
 )
 THREAD_NUMBERS = tuple(name for name, _, _ in _OF_THREAD)
@@ -57,13 +57,16 @@ def pad_ports(node_period_ns: int, *, thread: bool) -> tuple[Port, ...]:
             variability="event",
             description=f"{', '.join(EVENTS)}: with the nearest hole, and the force of the tip just before",
         ),
-        Port(
-            name=f"{SKIN}/nodes",
-            causality="output",
-            type=SoftBodyState.ros_type,
-            frame="world",
-            period_ns=node_period_ns,
-            description="the skin, to be drawn; its triangles come with the first",
+        *(
+            Port(
+                name=f"{body}/nodes",
+                causality="output",
+                type=SoftBodyState.ros_type,
+                frame="world",
+                period_ns=node_period_ns,
+                description=f"the {body}, to be drawn; its triangles come with the first",
+            )
+            for body in ((SKIN, THREAD) if thread else (SKIN,))
         ),
     )
 
@@ -71,8 +74,3 @@ def pad_ports(node_period_ns: int, *, thread: bool) -> tuple[Port, ...]:
 def bond_side() -> BondSide:
     """Return the bond: base, middle and tip of the needle, in the world."""
     return BondSide(name=BOND, side="force", dof=3, points=3, frame="world")
-
-
-def thread_side(nodes: int) -> BondSide:
-    """Return the bond: the nodes of the thread from the first behind the needle's base, in the world."""
-    return BondSide(name=THREAD, side="force", dof=3, points=nodes, frame="world")

@@ -32,6 +32,7 @@ class Skin:
         """Take the size along x, y and z (m) and where the holes are, m, shape (n, 3)."""
         xs, ys = (_lines(size[axis] / 2.0, holes[:, axis]) for axis in (0, 1))
         columns, rows = len(xs), len(ys)
+        self._xs, self._ys = xs, ys
         top = np.stack([*np.meshgrid(xs, ys), np.zeros((rows, columns))], axis=-1).reshape(-1, 3)
         self._count = len(top)
         bottom = top - [0.0, 0.0, size[2]]
@@ -46,13 +47,21 @@ class Skin:
         nodes = self.rest.copy()
         if len(places):
             top = nodes[: self._count]
-            away = top[:, None] - places
-            distances = np.sqrt((away * away).sum(axis=-1))  # (n, m)
+            distances = self._distances(places)
             nearest = distances.min(axis=1, keepdims=True)
-            shares = np.exp((nearest - distances) / _BLEND)
+            shares = np.subtract(nearest, distances, out=distances)
+            shares /= _BLEND
+            np.exp(shares, out=shares)
             shares /= shares.sum(axis=1, keepdims=True)
             top += np.exp(-nearest / _REACH) * (shares @ displacements)
         return nodes
+
+    def _distances(self, places: Vector) -> Vector:
+        """Return how far the top's nodes at rest, a grid, are from `places`, (m, 3): m, shape (n, m)."""
+        x, y = self._xs[:, None] - places[:, 0], self._ys[:, None] - places[:, 1]
+        squares = (x * x)[None] + (y * y)[:, None]  # (rows, columns, m)
+        squares += places[:, 2] * places[:, 2]
+        return np.sqrt(squares, out=squares).reshape(-1, len(places))
 
 
 def _lines(half: float, holes: Vector) -> Vector:

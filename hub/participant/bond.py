@@ -139,6 +139,11 @@ class MotionSide:
         self.work_port = f"{bond.name}/work"
         self._work = np.zeros(1)
 
+    @property
+    def is_even(self) -> bool:
+        """Whether the force is the same all through a step."""
+        return self._correction is None
+
     def begin(self, inputs: Inputs, position: Vector, velocity: Vector) -> None:
         """Read the reaction for this step; `position` and `velocity` are the motion at its start."""
         self._reaction = inputs[self.force_port]

@@ -22,7 +22,9 @@ from hub.recording.report_figures import (
     press_figure,
     step_time_figures,
 )
+from hub.recording.report_notes import noted
 from hub.recording.report_scores import score_figures, score_table, scored
+from hub.recording.report_tissue import tissue_figures
 from hub.recording.report_vision import vision_figures
 from hub.recording.series import Series
 from schemas.errors import RecordingError
@@ -51,8 +53,10 @@ def report(recording: Recording, output: Path) -> None:
         bonds=_section("Coupling", _bond_figures(traces, books)),
         steps=_section("Timing", _step_figures(recording, scenario, statuses)),
         scores=_scores(recording),
-        vision=_vision(recording),
+        vision=_section("Vision", vision_figures(recording)),
+        tissue=_section("Tissue", tissue_figures(recording)),
         profile=_profile(recording),
+        notes=_notes(scenario),
         ports=_table(("topic", "type", "messages", "per second"), _ports(recording)),
         scenario=escape(recording.attachments.get("scenario.yaml", b"").decode("utf-8", "replace")),
         versions=_table(("package", "version"), sorted(recording.versions().items())),
@@ -168,13 +172,14 @@ def _profile(recording: Recording) -> str:
     return f'<section aria-labelledby="h-profile"><h2 id="h-profile">Processor time</h2>{tables}</section>'
 
 
-def _vision(recording: Recording) -> str:
-    """Return the section about what controllers saw; empty if there was none."""
-    figures = _sections(vision_figures(recording))
-    if not figures:
+def _notes(scenario: Scenario) -> str:
+    """Return the section about how far what was computed holds; empty if no participant has notes."""
+    rows = list(noted(scenario))
+    if not rows:
         return ""
-    heading = '<h2 id="h-vision">Vision</h2>'
-    return f'<section aria-labelledby="h-vision">{heading}<div class="figures">{figures}</div></section>'
+    heading = '<h2 id="h-notes">Validity</h2>'
+    table = _table(("participant", "of", "is"), rows)
+    return f'<section id="notes" aria-labelledby="h-notes">{heading}{table}</section>'
 
 
 def _scores(recording: Recording) -> str:

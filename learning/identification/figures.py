@@ -1,4 +1,4 @@
-"""The figure of a fit: predicted over measured efforts, by joint."""
+"""The figure of a fit: predicted over measured efforts, before and after identification, by joint."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ def write_figure(file: Path, found: Fit, joints: Sequence[str]) -> None:
     ):
         axes.axvspan(unseen[0], unseen[-1], color="0.92", label="not seen by the fit")
         axes.plot(found.time, found.measured[:, i], color="0.6", lw=3.0, label="measured")
-        axes.plot(found.time, found.predicted[:, i], color="tab:blue", lw=1.0, label="predicted")
+        axes.plot(found.time, found.published[:, i], color="tab:orange", lw=0.8, label="published parameters")
+        axes.plot(found.time, found.predicted[:, i], color="tab:blue", lw=1.0, label="identified")
         axes.set_ylabel(f"{joint}, {'N' if joint == 'insertion' else 'N m'}")
-    figure.axes[0].legend(loc="upper right", ncols=3, fontsize="small")  # pyright: ignore[reportUnknownMemberType]
+    figure.axes[0].legend(loc="upper right", ncols=4, fontsize="small")  # pyright: ignore[reportUnknownMemberType]
     figure.axes[-1].set_xlabel("time, s")  # pyright: ignore[reportUnknownMemberType]
     figure.savefig(file, dpi=_DPI)  # pyright: ignore[reportUnknownMemberType]

@@ -10,26 +10,34 @@ from typing import Any
 import numpy as np
 
 from hub.recording.ros_bag_reader import RosBag
+from robots.dvrk.own_dynamics import JAW
 from robots.identification.signals import Measured
 from schemas.errors import RecordingError, did_you_mean
+from schemas.vectors import Vector
 
-__all__ = ["measurements"]
+__all__ = ["has_jaw", "measurements"]
 
 _TOPIC = "measured_js"
 
 
-def measurements(path: Path, arm: str, joints: Sequence[str]) -> Measured:
-    """Return the states of the first n joints of `arm` as `path` records them, by receipt or message time.
+def measurements(path: Path, arm: str, joints: Sequence[str], owner: str = "") -> Measured:
+    """Return the states of n joints of `arm` as `path` records them, by receipt or message time.
 
-    A bag has `<arm>/measured_js` at the end of a topic. A CSV file has a line of names: `time` (s),
-    `position.<joint>` (rad, m) and `effort.<joint>` (N m, N), the joints in any order.
+    A bag has `<arm>/measured_js` at the end of a topic, and `<arm>/jaw/measured_js` for the jaw, the last
+    joint if it is one; `owner` is the participant of a session whose topics count. A CSV file has a line of
+    names: `time` (s), `position.<joint>` (rad, m) and `effort.<joint>` (N m, N), the joints in any order.
 
     Raises RecordingError where the topic, a column or the effort is missing.
     """
-    return _of_csv(path, joints) if path.suffix == ".csv" else _of_bag(path, arm, len(joints))
+    return (
+        _of_csv(path, joints)
+        if path.suffix == ".csv"
+        else _of_bag(path, f"{owner}/{arm}" if owner else arm, joints)
+    )
 
 
-def _of_csv(path: Path, joints: Sequence[str]) -> Measured:
+def _table(path: Path) -> tuple[list[str], Vector]:
+    """Return names and numbers of a CSV file, the numbers by rows."""
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = csv.reader(file)
@@ -39,37 +47,76 @@ def _of_csv(path: Path, joints: Sequence[str]) -> Measured:
         raise RecordingError(f"cannot read '{path}': {error.strerror}") from error
     except ValueError as error:
         raise RecordingError(f"'{path}' is not a table of numbers below a line of names: {error}") from error
+    return names, table.reshape(-1, max(1, len(names)))
+
+
+def _of_csv(path: Path, joints: Sequence[str]) -> Measured:
+    names, table = _table(path)
     wanted = ["time", *(f"{part}.{joint}" for part in ("position", "effort") for joint in joints)]
     for name in wanted:
         if name not in names:
             raise RecordingError(f"'{path}' has no column '{name}'.{did_you_mean(name, names)}")
-    columns = table.reshape(len(table), -1)[:, [names.index(name) for name in wanted]]
+    columns = table[:, [names.index(name) for name in wanted]]
     return Measured(columns[:, 0], columns[:, 1 : 1 + len(joints)], columns[:, 1 + len(joints) :])
 
 
-def _of_bag(path: Path, arm: str, count: int) -> Measured:
+def has_jaw(path: Path, arm: str) -> bool:
+    """Return whether `path` has states of the jaw of `arm`."""
+    if path.suffix == ".csv":
+        return f"effort.{JAW}" in _table(path)[0]
+    with RosBag(path) as bag:
+        return bool(_topics(bag, f"{arm}/{JAW}/{_TOPIC}"))
+
+
+def _topics(bag: RosBag, ending: str) -> list[str]:
+    return [name for name in bag.topics if f"/{name}".endswith(f"/{ending}")]
+
+
+def _of_bag(path: Path, arm: str, joints: Sequence[str]) -> Measured:
+    with RosBag(path) as bag:
+        parts = [_states(path, bag, f"{arm}/{_TOPIC}", len(joints) - (JAW in joints))]
+        if JAW in joints:
+            jaw = _states(path, bag, f"{arm}/{JAW}/{_TOPIC}", 1)
+            clock = parts[0].time
+            parts.append(
+                jaw._replace(position=_at(clock, jaw, jaw.position), effort=_at(clock, jaw, jaw.effort))
+            )
+    return Measured(
+        parts[0].time,
+        np.hstack([part.position for part in parts]),
+        np.hstack([part.effort for part in parts]),
+    )
+
+
+def _at(clock: Vector, states: Measured, values: Vector) -> Vector:
+    return np.interp(clock, states.time, values[:, 0])[:, None]
+
+
+def _states(path: Path, bag: RosBag, ending: str, count: int) -> Measured:
+    """Return the first `count` numbers of the joint states on the topic that ends in `ending`.
+
+    Of several, such as those of an engine and its controller, it is the one with the most messages.
+    """
     times: list[float] = []
     states: list[tuple[Any, Any]] = []
-    with RosBag(path) as bag:
-        ending = f"{arm}/{_TOPIC}"
-        found = [name for name in bag.topics if f"/{name}".endswith(f"/{ending}") and "jaw" not in name]
-        if len(found) != 1:
+    found = _topics(bag, ending)
+    most = max((bag.topics[name].messages for name in found), default=0)
+    found = [name for name in found if bag.topics[name].messages == most]
+    if len(found) != 1:
+        raise RecordingError(
+            f"'{path}' has {len(found) or 'no'} topics that end in '{ending}', one is needed."
+            f"{did_you_mean(ending, bag.topics)}"
+        )
+    for _, time_ns, message in bag.messages(found, bag.start_ns):
+        if isinstance(message, Exception):
+            raise RecordingError(f"'{path}': a message of '{found[0]}' is damaged: {message}") from message
+        state: Any = message
+        if len(state.position) < count or len(state.effort) < count:
             raise RecordingError(
-                f"'{path}' has {len(found) or 'no'} topics that end in '{ending}', one is needed."
-                f"{did_you_mean(ending, bag.topics)}"
+                f"'{path}': '{found[0]}' has {len(state.position)} positions and {len(state.effort)}"
+                f" efforts, {count} of each are needed"
             )
-        for _, time_ns, message in bag.messages(found, bag.start_ns):
-            if isinstance(message, Exception):
-                raise RecordingError(
-                    f"'{path}': a message of '{found[0]}' is damaged: {message}"
-                ) from message
-            state: Any = message
-            if len(state.position) < count or len(state.effort) < count:
-                raise RecordingError(
-                    f"'{path}': '{found[0]}' has {len(state.position)} positions and {len(state.effort)}"
-                    f" efforts, {count} of each are needed"
-                )
-            times.append((time_ns - bag.start_ns) * 1e-9)
-            states.append((state.position[:count], state.effort[:count]))
+        times.append((time_ns - bag.start_ns) * 1e-9)
+        states.append((state.position[:count], state.effort[:count]))
     values = np.array(states, np.float64).reshape(-1, 2, count)
     return Measured(np.array(times), values[:, 0], values[:, 1])

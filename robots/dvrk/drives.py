@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import exp, inf, tanh
 from types import MappingProxyType
 
 import numpy as np
@@ -54,6 +55,12 @@ class Drive:
     """Largest effort."""
     velocity: float
     """Largest velocity."""
+    smoothing: float = SMOOTHING
+    """How fast Coulomb friction changes its sign, s/rad or s/m."""
+    static_friction: float = 0.0
+    """Effort at rest beyond Coulomb's friction (Stribeck)."""
+    stribeck_velocity: float = inf
+    """At which it has fallen to 1/e."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,9 @@ class Disc:
     shares: Mapping[str, float]
     viscous_friction: float
     coulomb_friction: float
+    smoothing: float = SMOOTHING
+    static_friction: float = 0.0
+    stribeck_velocity: float = inf
 
 
 _ARM = {
@@ -209,20 +219,21 @@ def friction(
 ) -> dict[str, float]:
     """Return the friction (N m, N) by joint at the velocities `dq`, as FONT has it: smooth around zero.
 
+    Of an identified arm it may be larger at rest (Stribeck).
+
     Args:
         drives: by joint.
         dq: velocities by joint, rad/s or m/s; of a jaw, by finger.
         wrist: the discs of the instrument, if any.
     """
-    result = {
-        name: (
-            drives[name].viscous_friction * v + drives[name].coulomb_friction * float(np.tanh(SMOOTHING * v))
-        )
-        for name, v in dq.items()
-    }
+    result = {name: _friction(drives[name], v) for name, v in dq.items()}
     for disc in wrist:
-        v = sum(share * dq[name] for name, share in disc.shares.items())
-        torque = disc.viscous_friction * v + disc.coulomb_friction * float(np.tanh(SMOOTHING * v))
+        torque = _friction(disc, sum(share * dq[name] for name, share in disc.shares.items()))
         for name, share in disc.shares.items():
             result[name] += share * torque
     return result
+
+
+def _friction(of: Drive | Disc, v: float) -> float:
+    dry = of.coulomb_friction + of.static_friction * exp(-((v / of.stribeck_velocity) ** 2))
+    return of.viscous_friction * v + dry * tanh(of.smoothing * v)

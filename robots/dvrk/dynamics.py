@@ -29,6 +29,7 @@ STANDARD_GRAVITY = 9.81
 """m/s^2, as in the identified model and the real controller's gravity compensation."""
 
 _UNMOVED = np.eye(4)
+_DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 _INSTANT = 1e-4
 """s, of the central difference along the motion: its error is below 1e-8 of the velocity's square."""
 
@@ -75,61 +76,71 @@ class Dynamics:
         self._pseudo = np.array([body.pseudo_inertia for body in bodies.values()])  # (bodies, 4, 4)
 
     def displacements(self, q: Vector) -> Vector:
-        """Return the derivatives of the bodies' displacements by the joints, shape (bodies, n, 4, 4).
+        """Return the derivatives of the bodies' displacements by the joints, shape (..., bodies, n, 4, 4).
 
-        The bodies are in the order in which they were given.
+        Those of one configuration `q`, shape (n,), or of many, shape (N, n). The bodies are in the order in
+        which they were given.
 
-        Raises MotionError if `q` is not n finite numbers.
+        Raises MotionError if `q` is not n finite numbers for every configuration.
         """
         self._chain.check_form(q)
-        n = self._joints
-        steps = self._exponentials(self._ratios * q.take(self._leaders))
+        ways = (self._ratios * q.take(self._leaders, -1)).T  # (motions, ...)
+        steps, twists, ratios = self._exponentials(ways), self._over(self._twists, ways), self._ratios
         above, poses = np.empty_like(steps), np.empty_like(steps)
         for i, (parent, *_) in enumerate(self._motions):
             above[i] = poses[parent] if parent >= 0 else _UNMOVED
             np.matmul(above[i], steps[i], out=poses[i])
-        own = (self._ratios[:, None, None] * above) @ self._twists @ steps
-        slopes = np.zeros((len(steps), n, 4, 4))
+        own = (self._over(ratios, ways)[..., None, None] * above) @ twists @ steps
+        slopes = np.zeros((len(steps), self._joints, *steps.shape[1:]))
         for i, (parent, joint, *_) in enumerate(self._motions):
             if parent >= 0:
                 np.matmul(slopes[parent], steps[i], out=slopes[i])
             slopes[i, joint] += own[i]
-        return slopes[self._moved_by]
+        return np.moveaxis(slopes[self._moved_by], (0, 1), (-4, -3))
 
-    def effort_gradients(self, q: Vector, dq: Vector, ddq: Vector) -> Vector:
+    def effort_gradients(
+        self, q: Vector, dq: Vector, ddq: Vector, acceleration: Vector | None = None
+    ) -> Vector:
         """Return the derivatives of the joints' efforts by the bodies' pseudo-inertias.
 
-        The effort of motion and gravity, the base upright, is linear in the pseudo-inertias J of the bodies:
-        effort_i = sum_b trace(Y_ib^T J_b) with Y_ib = D_i^T A, A = sum_j D_j ddq_j + V' - (gravity, on e4).
-        V' is the derivative of V(q) = sum_j D_j dq_j along the motion, a central difference.
+        The effort of motion and gravity is linear in the pseudo-inertias J of the bodies: effort_i = sum_b
+        trace(Y_ib^T J_b) with Y_ib = D_i^T A, A = sum_j D_j ddq_j + V' - (gravity, on e4). V' is the
+        derivative of V(q) = sum_j D_j dq_j along the motion, a central difference.
 
         Args:
-            q: joint positions, rad and m, shape (n,).
-            dq: joint velocities, rad/s and m/s, shape (n,).
-            ddq: joint accelerations, rad/s^2 and m/s^2, shape (n,).
+            q: joint positions, rad and m, shape (n,) or (N, n).
+            dq: joint velocities, rad/s and m/s, same shape.
+            ddq: joint accelerations, rad/s^2 and m/s^2, same shape.
+            acceleration: of gravity, as of `gravity`.
 
         Returns:
-            Shape (n, bodies, 4, 4), symmetric, the bodies in the order in which they were given.
+            Shape (..., n, bodies, 4, 4), symmetric, the bodies in the order in which they were given.
 
-        Raises MotionError if `q` is not n finite numbers.
+        Raises MotionError if `q` is not n finite numbers for every configuration.
         """
         slopes = self.displacements(q)
-        acceleration = np.einsum("biac,i->bac", slopes, ddq)
+        moved = _along(slopes, ddq)
         for way in (1.0, -1.0):
             beside = self.displacements(q + way * _INSTANT * dq)
-            acceleration += way / (2.0 * _INSTANT) * np.einsum("biac,i->bac", beside, dq)
-        acceleration[:, 2, 3] += STANDARD_GRAVITY
-        gradients = np.einsum("biac,bad->ibcd", slopes, acceleration)
-        return (gradients + gradients.swapaxes(2, 3)) / 2.0
+            moved += way / (2.0 * _INSTANT) * _along(beside, dq)
+        moved[..., :3, 3] -= _DOWN if acceleration is None else acceleration
+        gradients = np.moveaxis(slopes.swapaxes(-1, -2) @ moved[..., None, :, :], -4, -3)
+        return (gradients + gradients.swapaxes(-1, -2)) / 2.0
 
-    def _exponentials(self, q: Vector) -> Vector:
-        """Return exp(q T), shape (motions, 4, 4), for the twist T and the way q of each motion.
+    @staticmethod
+    def _over(values: Vector, ways: Vector) -> Vector:
+        """Return `values`, one for each motion, such that they go with `ways`, shape (motions, ...)."""
+        return values if ways.ndim == 1 else values[:, None]
 
-        For a rotation it is 1 + sin q T + (1 - cos q) T^2 (Rodrigues), for a translation 1 + q T.
+    def _exponentials(self, ways: Vector) -> Vector:
+        """Return exp(w T), shape (motions, ..., 4, 4), for the twist T and the ways w of each motion.
+
+        For a rotation it is 1 + sin w T + (1 - cos w) T^2 (Rodrigues), for a translation 1 + w T.
         """
-        once = np.where(self._turning, np.sin(q), q)[:, None, None]
-        twice = np.where(self._turning, 1.0 - np.cos(q), 0.0)[:, None, None]
-        return _UNMOVED + once * self._twists + twice * self._twists @ self._twists
+        turning, twists = self._over(self._turning, ways), self._over(self._twists, ways)
+        once = np.where(turning, np.sin(ways), ways)[..., None, None]
+        twice = np.where(turning, 1.0 - np.cos(ways), 0.0)[..., None, None]
+        return _UNMOVED + once * twists + twice * twists @ twists
 
     def inertia_matrix(self, q: Vector) -> Vector:
         """Return the joint-space inertia matrix at `q`, shape (n, n): kg m^2, kg m, kg."""
@@ -145,7 +156,7 @@ class Dynamics:
             unless given. On a base
                 turned by R against the world it is R^T (0, 0, -9.81).
         """
-        pull = np.array([0.0, 0.0, -STANDARD_GRAVITY]) if acceleration is None else acceleration
+        pull = _DOWN if acceleration is None else acceleration
         return -np.einsum("a,biac,bc->i", pull, self.displacements(q)[..., :3, :], self._pseudo[..., 3])
 
 
@@ -161,6 +172,12 @@ def of_ecm(endoscope_mass: float = inertia.ENDOSCOPE_MASS["Classic_SD"]) -> Dyna
     chain = ecm.chain()
     rotors = [drives.ECM[joint.name].armature for joint in chain.joints]
     return Dynamics(chain, linkage.ECM, inertia.ecm(endoscope_mass), np.array(rotors))
+
+
+def _along(slopes: Vector, rates: Vector) -> Vector:
+    """Return sum_i D_i r_i, shape (..., bodies, 4, 4), of D, (..., bodies, n, 4, 4), and r, (..., n)."""
+    flat = slopes.reshape(*slopes.shape[:-2], 16)
+    return (rates[..., None, None, :] @ flat).reshape(*slopes.shape[:-3], 4, 4)
 
 
 def _joint_twist(chain: SerialChain, i: int) -> tuple[Vector, bool]:

@@ -183,7 +183,8 @@ def branches(chain: SerialChain, pose: Vector) -> Vector:
 
     Revolute ones are within half a turn of 0.
 
-    Where a singular pose leaves a joint free, it is at 0.
+    Where a singular pose leaves a joint free, it is at 0. In the last two the shaft points away from the
+    wrist: their insertion is below 0 by as much as the wrist is away, and never in range.
 
     Args:
         chain: a PSM with a wrist of three joints.

@@ -5,6 +5,7 @@ SI units, radians.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +26,7 @@ from robots.dvrk import drives, ecm, inertia, psm
 from robots.dvrk.drives import Disc, Drive
 from robots.dvrk.inertia import PROBE_RADIUS, Inertia
 from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.own_dynamics import OwnDynamics
+from robots.dvrk.own_dynamics import JAW, OwnDynamics
 from robots.dvrk.parameters import (
     FOLDED,
     EcmPositions,
@@ -45,6 +46,10 @@ __all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedArms", "MountedEcm", "Mou
 DEFAULT_INSTRUMENT = "palpation-probe"
 
 
+_Published = tuple[Mapping[str, Inertia], Mapping[str, Drive], tuple[Disc, ...]]
+"""Bodies, drives and discs."""
+
+
 class MountedArm(BaseModel):
     """One arm: where it stands unless setup joints carry it."""
 
@@ -57,6 +62,70 @@ class MountedArm(BaseModel):
         default=(0.0, 0.0, 0.0, 1.0),
         description="of the arm's base frame in the world: quaternion x, y, z, w",
     )
+    dynamics: Path | None = Field(
+        default=None,
+        description="file of `trocar identify`: masses, friction, springs of your own arm; null: published",
+    )
+
+    @cached_property
+    @abstractmethod
+    def chain(self) -> SerialChain:
+        """The arm's kinematics."""
+
+    @property
+    @abstractmethod
+    def _published(self) -> _Published: ...
+
+    @property
+    def _driven(self) -> list[str]:
+        """The joints that may be in a file of `dynamics`; the last one, a jaw, need not be."""
+        return [joint.name for joint in self.chain.joints]
+
+    @field_validator("dynamics")
+    @classmethod
+    def _find(cls, file: Path | None, info: ValidationInfo) -> Path | None:
+        context: dict[str, Any] = info.context or {}
+        return None if file is None else (Path(context.get("directory", Path.cwd())) / file).resolve()
+
+    @model_validator(mode="after")
+    def _has_these_dynamics(self) -> Self:
+        if (own := self._own) is None:
+            return self
+        joints, discs = self._driven, len(self._published[2])
+        if list(own.joints) not in (joints, [name for name in joints if name != JAW]) or (
+            len(own.discs) != discs
+        ):
+            raise ValueError(
+                f"dynamics: '{self.dynamics}' was identified with {own.instrument}, of joints"
+                f" {', '.join(own.joints)} and {len(own.discs)} discs; this arm has"
+                f" {', '.join(joints)} and {discs}: identify it with what it holds here"
+            )
+        return self
+
+    @cached_property
+    def _own(self) -> OwnDynamics | None:
+        try:
+            return None if self.dynamics is None else OwnDynamics.load(self.dynamics)
+        except MotionError as error:
+            raise ValueError(f"dynamics: {error}") from error
+
+    @cached_property
+    def bodies(self) -> Mapping[str, Inertia]:
+        """The inertia of its bodies by link, those of what it holds included."""
+        published = self._published[0]
+        return published if self._own is None else self._own.bodies_of(published)
+
+    @cached_property
+    def drives(self) -> Mapping[str, Drive]:
+        """The drives by joint, those of jaw or hand included."""
+        published = self._published[1]
+        return published if self._own is None else self._own.drives_of(published)
+
+    @cached_property
+    def discs(self) -> tuple[Disc, ...]:
+        """The discs of an instrument."""
+        published = self._published[2]
+        return published if self._own is None else self._own.discs_of(published)
 
 
 class PsmTool(BaseModel):
@@ -104,55 +173,16 @@ class MountedPsm(PsmTool, MountedArm):
         default=FOLDED,
         description="closings, then spreads, of a hand's fingers at time 0; default: folded",
     )
-    dynamics: Path | None = Field(
-        default=None,
-        description="file of `trocar identify`: masses, friction, springs of your own arm; null: published",
-    )
 
-    @field_validator("dynamics")
-    @classmethod
-    def _find(cls, file: Path | None, info: ValidationInfo) -> Path | None:
-        context: dict[str, Any] = info.context or {}
-        return None if file is None else (Path(context.get("directory", Path.cwd())) / file).resolve()
+    @property
+    def _driven(self) -> list[str]:
+        jaw = [] if self.tool.jaw is None else [JAW]
+        return [*super()._driven, *jaw]
 
-    @model_validator(mode="after")
-    def _has_these_dynamics(self) -> Self:
-        if (own := self._own) is None:
-            return self
-        joints = [joint.name for joint in self.chain.joints]
-        discs = len(drives.discs(self.tool))
-        if list(own.joints) != joints or len(own.discs) != discs:
-            raise ValueError(
-                f"dynamics: '{self.dynamics}' was identified with {own.instrument}, of joints"
-                f" {', '.join(own.joints)} and {len(own.discs)} discs; {self.instrument} has"
-                f" {', '.join(joints)} and {discs}: identify the arm with such an instrument"
-            )
-        return self
-
-    @cached_property
-    def _own(self) -> OwnDynamics | None:
-        try:
-            return None if self.dynamics is None else OwnDynamics.load(self.dynamics)
-        except MotionError as error:
-            raise ValueError(f"dynamics: {error}") from error
-
-    @cached_property
-    def bodies(self) -> Mapping[str, Inertia]:
-        """The inertia of its bodies by link, those of the instrument included."""
-        published = inertia.psm(self.tool, self.probe_radius)
-        return published if self._own is None else self._own.bodies_of(published)
-
-    @cached_property
-    def drives(self) -> Mapping[str, Drive]:
-        """The drives by joint, those of jaw or hand included."""
-        published = drives.psm(self.tool)
-        return published if self._own is None else self._own.drives_of(published)
-
-    @cached_property
-    def discs(self) -> tuple[Disc, ...]:
-        """The discs of the instrument."""
-        published = drives.discs(self.tool)
-        return published if self._own is None else self._own.discs_of(published)
+    @property
+    def _published(self) -> _Published:
+        tool = self.tool
+        return inertia.psm(tool, self.probe_radius), drives.psm(tool), drives.discs(tool)
 
     @property
     def fingers(self) -> HandPositions:
@@ -181,6 +211,10 @@ class MountedEcm(MountedArm):
     def chain(self) -> SerialChain:
         """The arm's kinematics, from `ECM_base` to the camera frame."""
         return ecm.chain(self.endoscope, self.tip_frame)
+
+    @property
+    def _published(self) -> _Published:
+        return inertia.ecm(), drives.ECM, ()
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:

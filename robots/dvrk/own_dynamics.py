@@ -1,4 +1,4 @@
-"""The dynamics of the reader's own PSM, as `trocar identify` writes them and a scenario names them.
+"""The dynamics of the reader's own arm, as `trocar identify` writes them and a scenario names them.
 
 A file of YAML: the inertia of the arm's bodies, the losses of its joints and of the discs of its instrument,
 and how it was found. SI units, radians; bodies stand in the arm's base frame with every joint at 0.
@@ -9,18 +9,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from io import StringIO
+from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Self, cast
+from typing import Annotated, Any, Self, TypeVar, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from ruamel.yaml import YAML, YAMLError
 
-from robots.dvrk.drives import Disc, Drive
+from robots.dvrk.drives import FINGERS, SMOOTHING, Disc, Drive
 from robots.dvrk.inertia import Inertia
 from schemas.errors import MotionError
 
-__all__ = ["BodyInertia", "DiscLosses", "JointLosses", "OwnDynamics"]
+__all__ = ["JAW", "BodyInertia", "DiscLosses", "JointLosses", "OwnDynamics"]
+
+JAW = "jaw"
+"""The joint that stands for the two fingers of an instrument."""
 
 _LARGEST = 2**20
 """Bytes of a file; one has 4 KiB."""
@@ -29,6 +33,9 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 _NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 _Row = tuple[_Finite, _Finite, _Finite]
+
+
+_Rubbing = TypeVar("_Rubbing", Drive, Disc)
 
 
 class _Part(BaseModel):
@@ -58,28 +65,43 @@ class BodyInertia(_Part):
         return self
 
 
-class JointLosses(_Part):
-    """Of one joint: effort = armature ddq + stiffness q + offset + viscous dq + coulomb sign(dq)."""
+class DiscLosses(_Part):
+    """Friction: viscous v + (coulomb + static exp(-(v / stribeck)^2)) tanh(smoothing v).
+
+    The simulation has viscous and Coulomb friction only.
+    """
+
+    viscous: _NotNegative = 0.0
+    coulomb: _NotNegative = 0.0
+    smoothing: _Positive = SMOOTHING
+    static: _NotNegative = 0.0
+    stribeck: _Positive | None = None
+
+    def of(self, published: _Rubbing) -> _Rubbing:
+        """Return `published` with this friction."""
+        return replace(
+            published,
+            viscous_friction=self.viscous,
+            coulomb_friction=self.coulomb,
+            smoothing=self.smoothing,
+            static_friction=self.static,
+            stribeck_velocity=inf if self.stribeck is None else self.stribeck,
+        )
+
+
+class JointLosses(DiscLosses):
+    """Of one joint: effort = armature ddq + stiffness q + offset + friction."""
 
     armature: _NotNegative
     stiffness: _Positive
     offset: _Finite
-    viscous: _NotNegative = 0.0
-    coulomb: _NotNegative = 0.0
-
-
-class DiscLosses(_Part):
-    """Friction of one disc of the instrument."""
-
-    viscous: _NotNegative
-    coulomb: _NotNegative
 
 
 class OwnDynamics(_Part):
     """The content of a file."""
 
     instrument: str
-    """With which it was identified."""
+    """With which it was identified; of an ECM its endoscope."""
     bodies: dict[str, BodyInertia]
     joints: dict[str, JointLosses]
     discs: list[DiscLosses]
@@ -118,22 +140,19 @@ class OwnDynamics(_Part):
 
     def drives_of(self, published: Mapping[str, Drive]) -> Mapping[str, Drive]:
         """Return `published` with the losses that were identified."""
-        found = {
-            name: replace(
-                published[name],
-                viscous_friction=losses.viscous,
-                coulomb_friction=losses.coulomb,
-                elasticity=losses.stiffness,
-                offset=losses.offset,
-                armature=losses.armature,
-            )
-            for name, losses in self.joints.items()
-        }
-        return {**published, **found}
+        drives = dict(published)
+        for name, losses in self.joints.items():
+            # the effort of a jaw turns two fingers by half the angle each
+            halves, joints = (2.0, FINGERS) if name == JAW else (1.0, (name,))
+            for joint in joints:
+                drives[joint] = replace(
+                    losses.of(published[joint]),
+                    elasticity=halves * losses.stiffness,
+                    offset=losses.offset,
+                    armature=halves * losses.armature,
+                )
+        return drives
 
     def discs_of(self, published: tuple[Disc, ...]) -> tuple[Disc, ...]:
         """Return `published` with the friction that was identified."""
-        return tuple(
-            replace(disc, viscous_friction=own.viscous, coulomb_friction=own.coulomb)
-            for disc, own in zip(published, self.discs, strict=True)
-        )
+        return tuple(own.of(disc) for disc, own in zip(published, self.discs, strict=True))

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
-from robots.dvrk import psm
-from robots.dvrk.instruments import Instrument
 from robots.identification.linear_model import LinearModel
 from schemas.vectors import Vector
 
 __all__ = ["BaseParameters", "base_parameters"]
 
 _STATES = 300
+_SLOWEST = 1e-3
+"""Of the random velocities, as a share of the limit: dry friction differs at low ones."""
 _TOLERANCE = 1e-8
 """Of the largest diagonal element of R, columns scaled to length 1: what is smaller is the error of the
 central difference.
@@ -36,18 +36,19 @@ class BaseParameters(NamedTuple):
     """From all parameters to the base parameters, shape (B, P)."""
 
 
-def base_parameters(model: LinearModel, tool: Instrument) -> BaseParameters:
+def base_parameters(model: LinearModel) -> BaseParameters:
     """Return the base parameters of `model`: of all motions within the joints' limits.
 
     The motions are random, with a fixed seed; the result depends on the structure of the arm alone.
     """
-    joints, random = psm.chain(tool).joints, np.random.default_rng(0)
+    joints, random = model.arm.joints, np.random.default_rng(0)
     lower, upper = np.array([[joint.lower, joint.upper] for joint in joints]).T
     speed = np.array([joint.velocity for joint in joints])
     shape = (_STATES, len(joints))
     q = random.uniform(lower, upper, shape)
-    dq, ddq = random.uniform(-speed, speed, shape), 5.0 * random.uniform(-speed, speed, shape)
-    stacked = model.regressor(q, dq, ddq).reshape(-1, len(model.nominal))
+    dq = speed * random.choice((-1.0, 1.0), shape) * _SLOWEST ** random.uniform(0.0, 1.0, shape)
+    ddq = 5.0 * random.uniform(-speed, speed, shape)
+    stacked = model.regressor(q, dq, ddq)[0].reshape(-1, len(model.nominal))
     lengths = np.linalg.norm(stacked, axis=0)
     lengths[lengths < _TOLERANCE * lengths.max()] = 1.0
     triangle, order = qr(stacked / lengths, mode="r", pivoting=True)

@@ -5,7 +5,8 @@ deviation of what an unweighted fit leaves there (Swevers et al., IEEE Control S
 standard deviations and the condition number. Then the parameters themselves, physically feasible: the
 pseudo-inertia of each body is (L M) (L M)^T with L of the published body and M lower triangular with diagonal
 exp(x) (Rucker and Wensing, RA-L 2022), friction, springs and rotors are not negative. What the measurements
-do not tell stays near the published values.
+do not tell stays near the published values. How sharply friction changes its sign is chosen before
+(`robots.identification.friction`).
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from robots.dvrk.instruments import Instrument
+from robots.identification.arms import IdentifiedArm
 from robots.identification.base_parameters import BaseParameters, base_parameters
+from robots.identification.friction import Candidate, chosen, grid, picked
 from robots.identification.linear_model import BODY_SIZE, LinearModel, pseudo_inertias
 from robots.identification.signals import Samples
 from schemas.errors import RecordingError
@@ -38,12 +40,15 @@ _SCALES = {
     "offset": 0.1,
     "viscous": 0.1,
     "coulomb": 0.1,
-    "disc_viscous": 0.01,
-    "disc_coulomb": 0.01,
+    "static": 0.1,
 }
 """kg m^2 and kg, N m/rad and N/m, N m and N, N m s/rad and N s/m: the order of the published values."""
+_SCALE_OF_DISC = 0.1
+"""Of the friction of a disc, against that of a joint."""
 _LEAST = 1e-6
 """Of friction, springs and rotors."""
+_FARTHEST = 5.0
+"""Of x in the exp(x) of a body: masses between 1/20000 and 20000 times the published ones."""
 _TRIANGLE = np.tril_indices(4)
 _DIAGONAL = _TRIANGLE[0] == _TRIANGLE[1]
 _UPPER = np.triu_indices(4)
@@ -52,6 +57,8 @@ _UPPER = np.triu_indices(4)
 class Fit(NamedTuple):
     """What was found; P parameters of the model, B base parameters, n joints."""
 
+    model: LinearModel
+    """Whose parameters these are, with the shape of the friction that was found."""
     parameters: Vector
     """Feasible, shape (P,)."""
     base: BaseParameters
@@ -59,6 +66,10 @@ class Fit(NamedTuple):
     """By weighted least squares, shape (B,)."""
     base_deviations: Vector
     """Standard deviations of these, shape (B,)."""
+    base_shares: Vector
+    """Root mean square of what each of these does to the effort, over that of the measured effort, at the
+    joint where it does most, shape (B,).
+    """
     condition: float
     """Of the base regressor, columns scaled to length 1."""
     residual: Vector
@@ -69,63 +80,132 @@ class Fit(NamedTuple):
     """s, shape (N,); recordings follow one another."""
     predicted: Vector
     """Efforts of the feasible parameters, shape (N, n)."""
+    published: Vector
+    """Efforts of the published parameters, shape (N, n)."""
     measured: Vector
     """Filtered, shape (N, n)."""
     test: slice
     """Which of these were not seen."""
 
 
-def fit(recorded: Sequence[Samples], tool: Instrument) -> Fit:
-    """Return the dynamic parameters of a PSM with `tool` that explain the samples of all recordings.
+def fit(
+    recorded: Sequence[Samples],
+    arm: IdentifiedArm,
+    *,
+    gravity: Vector | None = None,
+    stribeck: bool = False,
+    judged: Samples | None = None,
+) -> Fit:
+    """Return the dynamic parameters of an arm that explain the samples of all recordings.
+
+    Args:
+        recorded: of the joints of `arm`.
+        arm: which one, with what it holds.
+        gravity: its acceleration in the arm's base frame, m/s^2, shape (3,); of an upright base unless given.
+        stribeck: whether dry friction may be larger at rest.
+        judged: a recording that is kept back to judge the result; the last quarter of all unless given.
 
     Raises RecordingError if the motion does not excite the arm enough to tell them.
     """
-    model = LinearModel(tool)
-    time, regressor, carried, measured = _stacked(model, recorded)
-    effort = measured - carried
-    trained = int(_TRAINED * len(measured))
+    rows = _Rows.of(LinearModel(arm, gravity), [*recorded, *([judged] if judged else [])], stribeck=stribeck)
+    unseen = judged.kept if judged else round((1.0 - _TRAINED) * len(rows.time))
+    trained = len(rows.time) - unseen
     seen, test = slice(None, trained), slice(trained, None)
-    base = base_parameters(model, tool)
+    published = rows.regressor @ rows.model.nominal + rows.carried
+    rows = _with_friction(rows, seen)
+    model, regressor, carried, measured = rows.model, rows.regressor, rows.carried, rows.measured
+    effort = measured - carried
+    base = base_parameters(model)
     condition = _condition(regressor[seen], base)
     sigma = _noise(regressor[seen][..., base.columns], effort[seen])
-    rows = (regressor[seen] / sigma[:, None]).reshape(-1, regressor.shape[-1])
+    weighted = (regressor[seen] / sigma[:, None]).reshape(-1, regressor.shape[-1])
     goal = (effort[seen] / sigma).ravel()
-    chosen = rows[:, base.columns]
-    base_values: Vector = np.asarray(np.linalg.lstsq(chosen, goal)[0], np.float64)
-    deviations = np.sqrt(np.diag(np.linalg.inv(chosen.T @ chosen)) * _samples_per_independent(recorded[0]))
-    parameters = _feasible(model, rows, goal)
+    base_values, deviations = _least_squares(weighted[:, base.columns], goal)
+    parameters = _feasible(model, weighted, goal)
     predicted = regressor @ parameters + carried
-    published = regressor[test] @ model.nominal + carried[test]
+    size = np.sqrt(np.mean(measured[seen] ** 2, axis=0))
+    acts = np.sqrt(np.mean((regressor[seen][..., base.columns] * base_values) ** 2, axis=0)) / size[:, None]
     return Fit(
+        model,
         parameters,
         base,
         base_values,
-        deviations,
+        deviations * np.sqrt(_samples_per_independent(recorded[0])),
+        acts.max(axis=0),
         condition,
         relative_residual(predicted[test], measured[test]),
-        relative_residual(published, measured[test]),
-        time,
+        relative_residual(published[test], measured[test]),
+        rows.time,
         predicted,
+        published,
         measured,
         test,
     )
 
 
-def _stacked(model: LinearModel, recorded: Sequence[Samples]) -> tuple[Vector, Vector, Vector, Vector]:
-    """Return time, regressor, efforts of the instrument and measured efforts of all recordings, end to end.
+class _Rows(NamedTuple):
+    """All recordings, end to end; N samples."""
 
-    The first has shape (N,), the second (N, n, P), the others (N, n).
-    """
-    parts: list[tuple[Vector, Vector, Vector, Vector]] = []
-    start = 0.0
-    for samples in recorded:
-        state, inner = (samples.q, samples.dq, samples.ddq), samples.inner
-        regressor, carried = (samples.low_passed(term(*state)) for term in (model.regressor, model.carried))
-        time = start + samples.time[inner] - samples.time[0]
-        parts.append((time, regressor[inner], carried[inner], samples.effort[inner]))
-        start += float(samples.time[-1] - samples.time[0])
-    time, regressor, carried, measured = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return time, regressor, carried, measured
+    model: LinearModel
+    time: Vector
+    """s, shape (N,)."""
+    regressor: Vector
+    """Shape (N, n, P)."""
+    carried: Vector
+    """Efforts of what is known, shape (N, n)."""
+    measured: Vector
+    """Efforts, shape (N, n)."""
+    dry: list[Candidate]
+    """Shapes of the friction."""
+
+    @classmethod
+    def of(cls, model: LinearModel, recorded: Sequence[Samples], *, stribeck: bool) -> _Rows:
+        parts: list[tuple[Vector, ...]] = []
+        shapes = grid(model, stribeck=stribeck)
+        start = 0.0
+        for samples in recorded:
+            inner = samples.inner
+            filtered = map(samples.low_passed, model.regressor(samples.q, samples.dq, samples.ddq))
+            regressor, carried = (values[inner] for values in filtered)
+            dry = (samples.low_passed(model.dry(samples.dq, shape))[inner] for shape in shapes)
+            time = start + samples.time[inner] - samples.time[0]
+            parts.append((time, regressor, carried, samples.effort[inner], *dry))
+            start += float(samples.time[-1] - samples.time[0])
+        columns = zip(*parts, strict=True)
+        time, regressor, carried, measured, *dry = (np.concatenate(column) for column in columns)
+        return cls(
+            model,
+            time,
+            regressor,
+            carried,
+            measured,
+            [Candidate(*pair) for pair in zip(shapes, dry, strict=True)],
+        )
+
+
+def _with_friction(rows: _Rows, seen: slice) -> _Rows:
+    """Return the rows with the shape of the friction that explains the seen ones best."""
+    model, effort = rows.model, rows.measured - rows.carried
+    base = base_parameters(model)
+    coulomb = model.parts["coulomb"]
+    fixed = [column for column in base.columns.tolist() if not coulomb.start <= column < coulomb.stop]
+    sigma = _noise(rows.regressor[seen][..., base.columns], effort[seen])[:, None]
+    weighted = [Candidate(one.shape, one.columns[seen] / sigma) for one in rows.dry]
+    shape, picks = chosen(
+        model.shares, rows.regressor[seen][..., fixed] / sigma, weighted, effort[seen] / sigma[:, 0]
+    )
+    columns = picked([one.columns for one in rows.dry], picks)
+    regressor = np.concatenate([rows.regressor[..., : coulomb.start], columns], axis=-1)
+    return rows._replace(model=LinearModel(model.arm, model.gravity, shape), regressor=regressor)
+
+
+def _least_squares(rows: Vector, goal: Vector) -> tuple[Vector, Vector]:
+    """Return the parameters and their standard deviations, for rows of unit variance."""
+    lengths = np.linalg.norm(rows, axis=0)
+    _, triangle = np.linalg.qr(rows / lengths)
+    values: Vector = np.asarray(np.linalg.lstsq(rows / lengths, goal)[0], np.float64)
+    spread = np.linalg.norm(np.linalg.inv(triangle), axis=1)
+    return values / lengths, spread / lengths
 
 
 def relative_residual(predicted: Vector, measured: Vector) -> Vector:
@@ -168,11 +248,10 @@ def _feasible(model: LinearModel, rows: Vector, goal: Vector) -> Vector:
     triangle: Vector = np.asarray(np.linalg.qr(np.column_stack([rows, goal]), mode="r"), np.float64)
     matrix, wanted = triangle[:, :-1], triangle[:, -1]
     nominal = model.nominal[body.stop :]
-    scales = np.concatenate(
+    scales = np.array(
         [
-            np.full(part.stop - part.start, _SCALES[name])
-            for name, part in model.parts.items()
-            if name != "body"
+            _SCALES[kind] * (_SCALE_OF_DISC if what.startswith("disc_") else 1.0)
+            for kind, what in (name.split(".") for name in model.names[body.stop :])
         ]
     )
 
@@ -187,10 +266,12 @@ def _feasible(model: LinearModel, rows: Vector, goal: Vector) -> Vector:
     def residual(x: Vector) -> Vector:
         return np.concatenate([matrix @ parameters(x) - wanted, _PRIOR * x])
 
-    lower = np.full(len(model.nominal), -np.inf)
+    upper = np.full(len(model.nominal), np.inf)
+    upper[: body.stop] = np.where(np.tile(_DIAGONAL, len(roots)), _FARTHEST, np.inf)
+    lower = -upper
     lower[body.stop :] = (_LEAST - nominal) / scales
     offset = model.parts["offset"]
     lower[offset] = -np.inf
     start = np.maximum(np.zeros(len(lower)), lower + 1e-6)
-    found = least_squares(residual, start, bounds=(lower, np.inf), x_scale="jac", max_nfev=60)
+    found = least_squares(residual, start, bounds=(lower, upper), x_scale="jac", max_nfev=60)
     return parameters(found.x)

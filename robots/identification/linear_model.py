@@ -1,107 +1,145 @@
-"""The efforts of a PSM as a linear function of its dynamic parameters.
+"""The efforts of an arm as a linear function of its dynamic parameters.
 
-effort = sum_b trace(Y_b^T J_b) + armature ddq + stiffness q + offset + friction(dq) of joints and
-discs. J_b is the pseudo-inertia of a body of the arm (`robots.dvrk.dynamics`); the instrument's own bodies,
-which weigh grams, keep their known masses. Friction is viscous and Coulomb's, smoothed as
-`robots.dvrk.drives` has it; of roll and wrist it is in the discs that turn them, which is the coupling of the
-cables. SI units, radians.
+effort = sum_b trace(Y_b^T J_b) + armature ddq + stiffness q + offset + friction. J_b is the pseudo-inertia of
+a body of the arm (`robots.dvrk.dynamics`). What rubs are the arm's own joints and the discs of an instrument,
+each turning by v = sum of share dq; its friction viscous v + coulomb tanh(s v) goes to the joints by the same
+shares, which is the coupling of the cables. Stribeck's friction adds static exp(-(v / w)^2) tanh(s v)
+(Armstrong et al., "A survey of models, analysis tools and compensation methods for the control of machines
+with friction", Automatica 30(7), 1994). s and w are not linear: `FrictionShape` has them. SI units, radians.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from robots.dvrk import drives, inertia, linkage, psm
+from robots.dvrk.drives import SMOOTHING
 from robots.dvrk.dynamics import Dynamics
-from robots.dvrk.instruments import Instrument
+from robots.identification.arms import IdentifiedArm
 from schemas.vectors import Vector
 
-__all__ = ["ARM_BODIES", "BODY_SIZE", "LinearModel", "pseudo_inertias"]
+__all__ = ["BODY_SIZE", "FrictionShape", "LinearModel", "pseudo_inertias"]
 
 _UPPER = np.triu_indices(4)
 _TWICE = np.where(_UPPER[0] == _UPPER[1], 1.0, 2.0)
 BODY_SIZE = len(_TWICE)
 """Parameters of one body: the upper triangle of its pseudo-inertia, by rows."""
-_ARM_JOINTS = len(psm.ARM_JOINTS)
-ARM_BODIES = (
-    "yaw",
-    "pitch",
-    "insertion",
-    "pitch_back",
-    "pitch_front",
-    "pitch_bottom",
-    "pitch_top",
-    "counterweight",
-)
-"""Whose pseudo-inertias are parameters."""
+_AT_ONCE = 1000
+"""States of which the regressor is computed together: some megabytes."""
+
+
+class FrictionShape(NamedTuple):
+    """What friction is not linear in, for each thing that rubs."""
+
+    smoothing: Vector
+    """s/rad, s/m: how fast Coulomb friction changes its sign, shape (rubbing,)."""
+    stribeck: Vector | None = None
+    """rad/s, m/s: at which velocity static friction has fallen to 1/e; None without it."""
 
 
 class LinearModel:
-    """The regressor of a PSM with its instrument, the jaw at rest; n joints, P parameters.
+    """The regressor of an arm; n joints, P parameters.
 
     Attributes:
+        arm: which one.
+        gravity: its acceleration in the arm's base frame, or None.
         joints: names of the n joints.
+        rubbing: names of what rubs: joints and discs.
+        shares: by how much each of these turns with each joint, shape (rubbing, n).
+        shape: of the friction.
         parts: where each kind of parameter is among the P.
         names: of the P parameters.
         nominal: the published values, shape (P,).
     """
 
-    def __init__(self, tool: Instrument) -> None:
-        """Build the model of a PSM with `tool`."""
-        chain, bodies = psm.chain(tool), inertia.psm(tool)
-        self.joints = tuple(joint.name for joint in chain.joints)
-        self._own = Dynamics(
-            chain, linkage.PSM, {name: bodies[name] for name in ARM_BODIES}, np.zeros(len(self.joints))
+    def __init__(
+        self, arm: IdentifiedArm, gravity: Vector | None = None, shape: FrictionShape | None = None
+    ) -> None:
+        """Build the model of `arm`.
+
+        Args:
+            arm: which one.
+            gravity: its acceleration in the arm's base frame, m/s^2, shape (3,); of an upright base unless
+                given.
+            shape: of the friction; Coulomb's, as published, unless given.
+        """
+        self.arm, self.joints = arm, tuple(joint.name for joint in arm.joints)
+        self.gravity, moving = gravity, len(arm.chain.joints)
+        self._dynamics = Dynamics(arm.chain, arm.bars, {**arm.bodies, **arm.carried}, np.zeros(moving))
+        self._carried = np.array([body.pseudo_inertia for body in arm.carried.values()]).reshape(-1, 4, 4)
+        turned = {name for disc in arm.discs for name in disc.shares}
+        own = [name for name in self.joints if name not in turned]
+        self.rubbing = (*own, *(f"disc_{i + 1}" for i in range(len(arm.discs))))
+        self.shares = np.array(
+            [[float(name == joint) for joint in self.joints] for name in own]
+            + [[disc.shares.get(joint, 0.0) for joint in self.joints] for disc in arm.discs]
         )
-        carried = {name: body for name, body in bodies.items() if name not in ARM_BODIES}
-        self._carried = Dynamics(chain, linkage.PSM, carried, np.zeros(len(self.joints)))
-        self._carried_pseudo = np.array([body.pseudo_inertia for body in carried.values()])
-        driven, discs = drives.psm(tool), drives.discs(tool)
-        self._shares = np.array([[disc.shares.get(name, 0.0) for name in self.joints] for disc in discs])
+        self.shape = shape or FrictionShape(np.full(len(self.rubbing), SMOOTHING))
+        of_joints, losses = [arm.drives[name] for name in self.joints], [arm.drives[name] for name in own]
         values = {
-            "body": np.array([bodies[name].pseudo_inertia[_UPPER] for name in ARM_BODIES]).ravel(),
-            "armature": np.array([driven[name].armature for name in self.joints]),
-            "stiffness": np.array([driven[name].elasticity for name in self.joints]),
-            "offset": np.array([driven[name].offset for name in self.joints]),
-            "viscous": np.array([driven[name].viscous_friction for name in self.joints[:_ARM_JOINTS]]),
-            "coulomb": np.array([driven[name].coulomb_friction for name in self.joints[:_ARM_JOINTS]]),
-            "disc_viscous": np.array([disc.viscous_friction for disc in discs]),
-            "disc_coulomb": np.array([disc.coulomb_friction for disc in discs]),
+            "body": np.array([body.pseudo_inertia[_UPPER] for body in arm.bodies.values()]).ravel(),
+            "armature": np.array([drive.armature for drive in of_joints]),
+            "stiffness": np.array([drive.elasticity for drive in of_joints]),
+            "offset": np.array([drive.offset for drive in of_joints]),
+            "viscous": np.array([one.viscous_friction for one in (*losses, *arm.discs)]),
+            "coulomb": np.array([one.coulomb_friction for one in (*losses, *arm.discs)]),
         }
+        if self.shape.stribeck is not None:
+            values["static"] = np.zeros(len(self.rubbing))
         ends = np.cumsum([len(value) for value in values.values()]).tolist()
         self.parts = {
             name: slice(end - len(value), end)
             for (name, value), end in zip(values.items(), ends, strict=True)
         }
         self.nominal = np.concatenate(list(values.values()))
+        rows = {"armature": self.joints, "stiffness": self.joints, "offset": self.joints}
         self.names = (
-            *(f"{body}.J{i + 1}{j + 1}" for body in ARM_BODIES for i, j in zip(*_UPPER, strict=True)),
-            *(f"{part}.{joint}" for part in ("armature", "stiffness", "offset") for joint in self.joints),
-            *(f"{part}.{joint}" for part in ("viscous", "coulomb") for joint in self.joints[:_ARM_JOINTS]),
-            *(f"{part}.{i + 1}" for part in ("disc_viscous", "disc_coulomb") for i in range(len(discs))),
+            *(f"{body}.J{i + 1}{j + 1}" for body in arm.bodies for i, j in zip(*_UPPER, strict=True)),
+            *(f"{part}.{row}" for part in list(values)[1:] for row in rows.get(part, self.rubbing)),
         )
 
-    def regressor(self, q: Vector, dq: Vector, ddq: Vector) -> Vector:
-        """Return the derivatives of the efforts by the parameters, shape (N, n, P); arguments (N, n)."""
-        count, n = q.shape
-        bodies = np.array([self._own.effort_gradients(*row) for row in zip(q, dq, ddq, strict=True)])
-        turned = dq @ self._shares.T  # (N, discs)
+    def regressor(self, q: Vector, dq: Vector, ddq: Vector) -> tuple[Vector, Vector]:
+        """Return the derivatives of the efforts by the parameters, and the efforts that carry what is known.
+
+        Arguments (N, n); results (N, n, P) and (N, n).
+        """
+        parts = [
+            self._some(*(values[first : first + _AT_ONCE] for values in (q, dq, ddq)))
+            for first in range(0, len(q), _AT_ONCE)
+        ]
+        regressor, carried = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return regressor, carried
+
+    def _some(self, q: Vector, dq: Vector, ddq: Vector) -> tuple[Vector, Vector]:
+        (count, n), moving = q.shape, len(self.arm.chain.joints)
+        gradients = np.zeros((count, n, len(self.arm.bodies) + len(self._carried), 4, 4))
+        gradients[:, :moving] = self._dynamics.effort_gradients(
+            q[:, :moving], dq[:, :moving], ddq[:, :moving], self.gravity
+        )
+        bodies, known = np.split(gradients, [len(self.arm.bodies)], axis=2)
         parts = [
             (bodies[..., _UPPER[0], _UPPER[1]] * _TWICE).reshape(count, n, -1),
             _diagonal(ddq),
             _diagonal(q),
             _diagonal(np.ones_like(q)),
-            _diagonal(dq)[..., :_ARM_JOINTS],
-            _diagonal(_direction(dq))[..., :_ARM_JOINTS],
-            self._shares.T * turned[:, None, :],
-            self._shares.T * _direction(turned)[:, None, :],
+            self.spread(dq @ self.shares.T),
+            self.dry(dq, self.shape),
         ]
-        return np.concatenate(parts, axis=-1)
+        return np.concatenate(parts, axis=-1), np.einsum("kibcd,bcd->ki", known, self._carried)
 
-    def carried(self, q: Vector, dq: Vector, ddq: Vector) -> Vector:
-        """Return the efforts that the instrument's own bodies need, shape (N, n); arguments (N, n)."""
-        gradients = np.array([self._carried.effort_gradients(*row) for row in zip(q, dq, ddq, strict=True)])
-        return np.einsum("kibcd,bcd->ki", gradients, self._carried_pseudo)
+    def dry(self, dq: Vector, shape: FrictionShape) -> Vector:
+        """Return the columns of dry friction at joint velocities (N, n): Coulomb's, then static."""
+        v = dq @ self.shares.T
+        direction = np.tanh(shape.smoothing * v)
+        coulomb = self.spread(direction)
+        if shape.stribeck is None:
+            return coulomb
+        return np.concatenate([coulomb, self.spread(direction * np.exp(-((v / shape.stribeck) ** 2)))], -1)
+
+    def spread(self, values: Vector) -> Vector:
+        """Return what friction does to the joints, shape (N, n, rubbing), of `values`, (N, rubbing)."""
+        return self.shares.T * values[:, None, :]
 
 
 def pseudo_inertias(parameters: Vector) -> Vector:
@@ -115,7 +153,3 @@ def pseudo_inertias(parameters: Vector) -> Vector:
 def _diagonal(values: Vector) -> Vector:
     """Return a diagonal matrix for each row: (N, n) to (N, n, n)."""
     return values[:, :, None] * np.eye(values.shape[1])
-
-
-def _direction(dq: Vector) -> Vector:
-    return np.tanh(drives.SMOOTHING * dq)

@@ -2,55 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from robots.dvrk.instruments import Instrument
 from robots.dvrk.own_dynamics import BodyInertia, DiscLosses, JointLosses, OwnDynamics
 from robots.identification.fit import Fit
-from robots.identification.linear_model import ARM_BODIES, LinearModel, pseudo_inertias
+from robots.identification.linear_model import LinearModel, pseudo_inertias
 from schemas.vectors import Vector
 
 __all__ = ["own_dynamics"]
 
 
-def own_dynamics(found: Fit, tool: Instrument, cutoff: float, recordings: Sequence[str]) -> OwnDynamics:
-    """Return the content of the file: `found` for a PSM with `tool`, with how it was found."""
-    model = LinearModel(tool)
+def own_dynamics(found: Fit, cutoff: float, recordings: Sequence[str]) -> OwnDynamics:
+    """Return the content of the file: `found`, with how it was found."""
+    model = found.model
     values = {name: found.parameters[part].tolist() for name, part in model.parts.items()}
     bodies = pseudo_inertias(found.parameters[model.parts["body"]])
-    losses = {
-        joint: JointLosses(armature=armature, stiffness=stiffness, offset=offset)
-        for joint, armature, stiffness, offset in zip(
-            model.joints, values["armature"], values["stiffness"], values["offset"], strict=True
-        )
-    }
-    for joint, viscous, coulomb in zip(model.joints, values["viscous"], values["coulomb"], strict=False):
-        losses[joint] = losses[joint].model_copy(update={"viscous": viscous, "coulomb": coulomb})
+    friction = _friction(model, values)
     return OwnDynamics(
-        instrument=tool.name,
-        bodies={name: _body(pseudo) for name, pseudo in zip(ARM_BODIES, bodies, strict=True)},
-        joints=losses,
-        discs=[
-            DiscLosses(viscous=viscous, coulomb=coulomb)
-            for viscous, coulomb in zip(values["disc_viscous"], values["disc_coulomb"], strict=True)
-        ],
-        fit={
-            "recordings": list(recordings),
-            "cutoff_hz": cutoff,
-            "samples": len(found.time),
-            "condition_number": float(f"{found.condition:.3g}"),
-            "relative_residual": _rounded(model.joints, found.residual),
-            "relative_residual_of_published": _rounded(model.joints, found.published_residual),
-            "base_parameters": {
-                model.names[column]: {"value": float(f"{value:.5g}"), "deviation": float(f"{deviation:.2g}")}
-                for column, value, deviation in zip(
-                    found.base.columns, found.base_values, found.base_deviations, strict=True
-                )
-            },
+        instrument=model.arm.tool,
+        bodies={name: _body(pseudo) for name, pseudo in zip(model.arm.bodies, bodies, strict=True)},
+        joints={
+            joint: JointLosses(
+                armature=armature,
+                stiffness=stiffness,
+                offset=offset,
+                **friction.get(joint, DiscLosses()).model_dump(),
+            )
+            for joint, armature, stiffness, offset in zip(
+                model.joints, values["armature"], values["stiffness"], values["offset"], strict=True
+            )
         },
+        discs=[losses for name, losses in friction.items() if name not in model.joints],
+        fit=_how(found, cutoff, recordings),
     )
+
+
+def _friction(model: LinearModel, values: Mapping[str, list[float]]) -> dict[str, DiscLosses]:
+    """Return the friction of what rubs, by name."""
+    static = values.get("static", [0.0] * len(model.rubbing))
+    velocities = (
+        [None] * len(model.rubbing) if model.shape.stribeck is None else model.shape.stribeck.tolist()
+    )
+    columns = (values["viscous"], values["coulomb"], model.shape.smoothing.tolist(), static, velocities)
+    names = ("viscous", "coulomb", "smoothing", "static", "stribeck")
+    return {
+        name: DiscLosses.model_validate(dict(zip(names, row, strict=True)))
+        for name, *row in zip(model.rubbing, *columns, strict=True)
+    }
+
+
+def _how(found: Fit, cutoff: float, recordings: Sequence[str]) -> dict[str, Any]:
+    model = found.model
+    return {
+        "recordings": list(recordings),
+        "cutoff_hz": cutoff,
+        "samples": len(found.time),
+        "condition_number": float(f"{found.condition:.3g}"),
+        "relative_residual": _rounded(model.joints, found.residual),
+        "relative_residual_of_published": _rounded(model.joints, found.published_residual),
+        "base_parameters": {
+            model.names[column]: {
+                "value": float(f"{value:.5g}"),
+                "deviation": float(f"{deviation:.2g}"),
+                "share_of_effort": float(f"{share:.2g}"),
+            }
+            for column, value, deviation, share in zip(
+                found.base.columns,
+                found.base_values,
+                found.base_deviations,
+                found.base_shares,
+                strict=True,
+            )
+        },
+    }
 
 
 def _body(pseudo: Vector) -> BodyInertia:

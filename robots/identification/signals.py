@@ -58,7 +58,12 @@ class Samples(NamedTuple):
     def inner(self) -> slice:
         """Return which samples are not near an end, where the filter has no neighbours."""
         edge = int(np.ceil(_EDGE_PERIODS / (self.cutoff * float(self.time[1] - self.time[0]))))
-        return slice(edge, -edge)
+        return slice(edge, len(self.time) - edge)
+
+    @property
+    def kept(self) -> int:
+        """Return how many these are."""
+        return max(0, self.inner.stop - self.inner.start)
 
 
 def filtered(measured: Measured, cutoff: float, rate: float) -> Samples:

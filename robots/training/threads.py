@@ -6,9 +6,14 @@ from math import pi
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from schemas.quantity import Damping, Density, Length, Mass, Pressure
+from schemas.quantity import Density, Length, Pressure, Speed
 
-__all__ = ["ThreadParams"]
+__all__ = ["THREAD", "ThreadParams"]
+
+THREAD = "thread"
+"""The soft body as which it is drawn: `<this>/nodes`."""
+_GRAVITY = 9.81
+"""m/s^2."""
 
 
 class ThreadParams(BaseModel):
@@ -25,17 +30,9 @@ class ThreadParams(BaseModel):
         default=1.2e-4, gt=0.0, description="half the diameter of size 3-0, which is 0.20 to 0.25 mm (USP)"
     )
     segments: int = Field(
-        default=20, ge=4, le=60, description="equal in length; the cost grows with their number"
+        default=40, ge=4, le=100, description="equal in length; the cost of its shape grows with their number"
     )
     density: Density = Field(default=1400.0, gt=0.0, description="about that of polyglactin; assumed")
-    node_mass: Mass = Field(
-        default=5e-5,
-        gt=0.0,
-        description=(
-            "inertia of each node; its weight is by density. Assumed, and far more than that: a tension up to"
-            " node_mass segment / timestep^2, here 1 N, does not make it tremble"
-        ),
-    )
     young: Pressure = Field(
         default=1e8,
         gt=0.0,
@@ -44,13 +41,10 @@ class ThreadParams(BaseModel):
             " its length it does not stretch"
         ),
     )
-    drag: Damping = Field(
-        default=2.0,
-        ge=0.0,
-        description=(
-            "viscous resistance of tissue at each node that the pad pushes on. Assumed: as little as keeps a"
-            " node of a third of a milligram at rest there"
-        ),
+    sinking: Speed = Field(
+        default=0.1,
+        gt=0.0,
+        description="speed at which it falls, for its drag. Assumed, by eye; without effect on any force",
     )
 
     @property
@@ -59,6 +53,7 @@ class ThreadParams(BaseModel):
         return self.length / self.segments
 
     @property
-    def true_mass(self) -> float:
-        """Mass of a segment, kg, whose weight is that of the node at its far end."""
-        return self.density * pi * self.radius**2 * self.segment
+    def relaxation(self) -> float:
+        """Bending stiffness over drag, m^4/s: E I / c, where the drag c makes its weight sink so fast."""
+        drag = self.density * pi * self.radius**2 * _GRAVITY / self.sinking
+        return self.young * pi * self.radius**4 / 4.0 / drag

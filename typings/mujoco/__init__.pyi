@@ -326,7 +326,9 @@ class MjData:
     efc_type: NDArray[np.int32]
     eq_active: NDArray[np.uint8]
     ncon: int
+    qacc: _Array
     qfrc_bias: _Array
+    qfrc_gravcomp: _Array
     xpos: _Array
     xquat: _Array
     xmat: _Array

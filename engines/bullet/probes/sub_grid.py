@@ -29,8 +29,8 @@ __all__ = ["SubGrid", "Surface"]
 _GRID = 160
 """Points of the spring's law; they are close together at small forces, where it is steep."""
 
-_GRID_DEPTH = 2.0 * DEEPEST
-"""Depth in radii up to which the law goes on; beyond `DEEPEST` with the last share of Hertz's force."""
+_GRID_DEPTH = 4.0
+"""Depth in radii up to which the law goes on; beyond the table with its last share of Hertz's force."""
 
 _NEAR_M = 1e-3
 """How far before the surface the spring is ready, beside the way of two readings."""

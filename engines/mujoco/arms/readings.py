@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.mujoco.arms.motors import Motors
 from engines.mujoco.arms.servos import Servos
 from engines.mujoco.model import FINGERS, first_sensor
 from engines.mujoco.model.poses import ROS_ORDER
@@ -39,20 +40,28 @@ class Readings:
         arms: Mapping[CartArm, MountedPsm | MountedEcm],
         servos: Servos,
         positions: Vector | None = None,
+        *,
+        weighs: bool = False,
     ) -> None:
-        """Report on `arms`; `positions` is the matrix to those of the whole model where this one is lean."""
+        """Report on `arms`; `weighs`: by the whole efforts of their motors.
+
+        `positions` is the matrix to the positions of the whole model, where this one is lean.
+        """
         self._whole = positions
         self._sensors = data.sensordata
         self._qpos = np.empty(model.nq if positions is None else len(positions))
         self._positions = data.qpos
         self._jaws: list[tuple[Vector, Vector, Vector]] = []
+        self._motors = Motors(model, data) if weighs else None
         poses: list[NDArray[np.intp]] = []
         self._poses = np.empty(7 * len(arms))
         self.outputs: dict[str, Vector] = {"qpos": self._qpos}
         for i, (arm, params) in enumerate(arms.items()):
             first, n = int(model.sensor(first_sensor(arm)).adr[0]), len(params.chain.joints)
             poses.append(first + 3 * n + ROS_ORDER)
-            self.outputs[f"{arm}/measured_js"] = self._sensors[first : first + 3 * n]
+            self.outputs[f"{arm}/measured_js"] = measured = self._sensors[first : first + 3 * n]
+            if self._motors is not None:
+                self.outputs[f"{arm}/measured_js"] = self._motors.add(arm, params, measured)
             self.outputs[f"{arm}/setpoint_js"] = servos.arm_setpoint(arm)
             self.outputs[f"{arm}/measured_cp"] = self._poses[7 * i : 7 * i + 7]
             if isinstance(params, MountedPsm) and has_jaw(params):
@@ -77,6 +86,8 @@ class Readings:
         """Update what is due in every step."""
         for matrix, fingers, jaw in self._jaws:
             matrix.dot(fingers, jaw)
+        if self._motors is not None:
+            self._motors.update()
 
     def refresh(self) -> None:
         """Update what is published less often: the tips' poses and the model's positions."""

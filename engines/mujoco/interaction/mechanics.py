@@ -19,6 +19,9 @@ def moment(arms: Vector, forces: Vector) -> Vector:
 
     The cross product, at a quarter of the cost of np.cross.
     """
+    if arms.ndim == forces.ndim == 1:
+        (u, v, w), (x, y, z) = arms.tolist(), forces.tolist()
+        return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
     return arms.take(_YZX, -1) * forces.take(_ZXY, -1) - arms.take(_ZXY, -1) * forces.take(_YZX, -1)
 
 

@@ -54,17 +54,23 @@ class Wire:
         """Apply the reaction of the step that begins, and the drag while there is one."""
         self.motion.begin(inputs, self._position, self._velocity)
         self._push(0.0)
-        self._damping[:] = self._drag if self._force.any() else 0.0
+        is_pushed = bool(self._force.any())
+        self._is_free = self.motion.is_even and not is_pushed
+        self._damping[:] = self._drag if is_pushed else 0.0
         self.wrench[:] = 0.0
         self._substeps = 0
 
     def renew(self, tau: float) -> None:
         """Record the work done, and renew the load `tau` seconds into the step."""
-        self._move()
-        self._push(tau)
+        if not self._is_free:
+            self._move()
+            self._push(tau)
 
     def end(self) -> None:
         """Record the work done, and set the mean wrench."""
+        if self._is_free:
+            self.refresh()
+            return
         self._move()
         self.wrench /= self._substeps
 
@@ -73,7 +79,7 @@ class Wire:
         arms = self._marks @ self._axes.T
         self._position.reshape(3, 3)[:] = self._place + arms
         spin = self._axes @ self._speed[3:]
-        self._velocity.reshape(3, 3)[:] = self._speed[:3] + moment(np.broadcast_to(spin, (3, 3)), arms)
+        self._velocity.reshape(3, 3)[:] = self._speed[:3] + moment(spin, arms)
         self._last[:] = self._position
 
     @staticmethod

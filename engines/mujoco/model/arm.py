@@ -11,7 +11,6 @@ from engines.mujoco.model.names import FINGERS, sphere_site
 from engines.mujoco.model.poses import placed
 from engines.mujoco.model.shapes import Bodies
 from engines.mujoco.model.tree import BASE, Link, links
-from robots.dvrk import drives, inertia
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.contact_spheres import ContactSphere
 from robots.dvrk.drives import Drive
@@ -97,7 +96,7 @@ def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) 
 def _add_drives(spec: mujoco.MjSpec, arm: str, params: MountedPsm | MountedEcm) -> None:
     """Give each independent joint its drive, and an instrument's discs the friction of wrist and jaw."""
     is_psm = isinstance(params, MountedPsm)
-    driven = params.drives if is_psm else drives.ECM
+    driven = params.drives
     hand, roller = (params.tool.hand, params.tool.roller) if is_psm else (None, None)
     for name, drive in driven.items():
         if name != ROLLER and (hand is None or name not in (*hand.fingers, *hand.spreads)):
@@ -107,7 +106,7 @@ def _add_drives(spec: mujoco.MjSpec, arm: str, params: MountedPsm | MountedEcm) 
         hands.add_contacts(spec, arm, hand)
     if roller is not None:
         rollers.add_drive(spec, arm, roller, driven[ROLLER])
-    for i, disc in enumerate(params.discs if is_psm else (), 1):
+    for i, disc in enumerate(params.discs, 1):
         tendon = spec.add_tendon(
             name=f"{arm}/disc_{i}",
             damping=[disc.viscous_friction, 0.0, 0.0],
@@ -152,8 +151,7 @@ def _add_drive(spec: mujoco.MjSpec, name: str, drive: Drive) -> None:
 
 def _set_inertias(bodies: Bodies, params: MountedPsm | MountedEcm) -> None:
     """Carry the inertia of each link, given in the base frame with every joint at 0, to its body."""
-    masses = params.bodies if isinstance(params, MountedPsm) else inertia.ecm()
-    for link, given in masses.items():
+    for link, given in params.bodies.items():
         body, pose = bodies[link]
         turn = pose[:3, :3]
         tensor = turn.T @ given.tensor @ turn

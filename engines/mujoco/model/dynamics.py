@@ -16,11 +16,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from engines.mujoco.model.leading import to_all_joints
 from engines.mujoco.model.scene import build
-from engines.mujoco.model.tree import links
 from engines.mujoco.params import SceneParams
 from robots.dvrk import drives
-from robots.dvrk.mounted import MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
@@ -90,16 +89,12 @@ def dynamics(
     model = build(scene)
     data = mujoco.MjData(model)
     joints = [joint.name for joint in params.chain.joints]
-    to_all = np.zeros((model.nv, len(joints)))
-    for link in links(arm, params):
-        leader, ratio = (link.follow.joint, link.follow.ratio) if link.follow else (link.name, 1.0)
-        if leader in joints:
-            to_all[int(model.joint(f"{arm}/{link.name}").dofadr[0]), joints.index(leader)] = ratio
+    to_all = to_all_joints(model, arm, params)
     data.qpos[:] = to_all @ q
     mujoco.mj_forward(model, data)
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
-    driven, wrist = (params.drives, params.discs) if isinstance(params, MountedPsm) else (drives.ECM, ())
+    driven, wrist = params.drives, params.discs
     at_rest = dict.fromkeys(driven, 0.0)
     moving = drives.friction(driven, {**at_rest, **dict(zip(joints, dq, strict=True))}, wrist)
     alone = [

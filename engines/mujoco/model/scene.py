@@ -7,24 +7,20 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from engines.mujoco.model import arm, fixtures, objects, setup_joints, shapes, thread
+from engines.mujoco.model import arm, fixtures, objects, setup_joints, shapes
 from engines.mujoco.model.names import FINGERS
 from engines.mujoco.model.tree import links
-from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import SceneParams, has_hand
 from robots import rotation
 from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
 from robots.dvrk.rolling_needle_driver import PADS
 from robots.dvrk.setup_joints import CartArm
-from robots.training.fixtures import PhantomParams
 from schemas.vectors import Vector
 
 __all__ = ["build", "place", "spec"]
 
 _TIMESTEP = 5e-4
 """s; the default of `MujocoParams`."""
-_FAR_BELOW = -10.0
-"""m: there is nothing to lie on."""
 
 
 def build(scene: SceneParams, timestep: float = _TIMESTEP) -> mujoco.MjModel:
@@ -54,17 +50,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
         fixtures.add(result, name, fixture)
     for name, thing in scene.objects.items():
         objects.add(result, name, thing, scene.seed)
-        if isinstance(thing, NeedleParams) and thing.thread is not None:
-            thread.add(result, name, thing, thing.thread, _level(scene), scene.seed)
     return result
-
-
-def _level(scene: SceneParams) -> float:
-    """Return the height (m) at which a thread lies: of a phantom's skin, else of the table."""
-    heights = [one.position[2] for one in scene.fixtures.values() if isinstance(one, PhantomParams)]
-    if scene.table is not None:
-        heights.append(scene.table.position[2])
-    return heights[0] if heights else _FAR_BELOW
 
 
 def place(

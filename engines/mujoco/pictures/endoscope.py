@@ -47,7 +47,7 @@ class Endoscope(Stepped):
     def __init__(self, name: str, params: EndoscopeParams) -> None:
         super().__init__(name, params)
         self._positions = np.zeros(position_count(params))
-        self._bodies = {organ: SoftBody(f"{organ}/nodes") for organ in params.skins}
+        self._bodies = {organ: SoftBody(f"{organ}/nodes") for organ in params.soft_bodies}
         self._shown: ShownMarkers | None = None
         self._frame = f"{name}_left_optical"
         kinds: dict[str, type[Message]] = {} if params.images == "none" else {"camera_info": CameraInfo}

@@ -6,11 +6,13 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import SceneParams
 from engines.mujoco.pictures.skin_params import SkinParams
 from hub.participant import Params
 from robots.dvrk import endoscope
 from robots.dvrk.endoscope import StereoCamera
+from robots.training.threads import THREAD
 from schemas.quantity import Angle, Length
 from schemas.scenario import Name
 
@@ -62,7 +64,8 @@ class EndoscopeParams(SceneParams):
     skins: dict[Name, SkinParams] = Field(
         default_factory=dict[Name, SkinParams],
         description=(
-            "soft bodies of other engines to draw; the input `<name>/nodes` receives the nodes of each"
+            "soft bodies of other engines to draw; the input `<name>/nodes` receives the nodes of each. A"
+            " needle of the scene that has a thread adds `thread`"
         ),
     )
     markers: bool = Field(
@@ -84,6 +87,12 @@ class EndoscopeParams(SceneParams):
     def camera(self) -> StereoCamera:
         """The two cameras."""
         return StereoCamera(self.width, self.height, self.field_of_view, self.baseline)
+
+    @property
+    def soft_bodies(self) -> dict[str, SkinParams]:
+        """What is drawn of other engines, by name: `skins`, and the thread of a needle."""
+        threads = (thing.thread for thing in self.objects.values() if isinstance(thing, NeedleParams))
+        return ({THREAD: SkinParams()} if any(threads) else {}) | self.skins
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:

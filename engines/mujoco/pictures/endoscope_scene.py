@@ -40,7 +40,7 @@ class EndoscopeScene:
         scene, ecm = spec(params), params.arms.get("ECM")
         if params.view is not None or ecm is None:
             _add_sky(scene)
-        self._skins = Skins(scene, bodies, params.skins)
+        self._skins = Skins(scene, bodies, params.soft_bodies)
         self._model = scene.compile()
         self._data = mujoco.MjData(self._model)
         self._frames = SceneFrames(params, self._model)

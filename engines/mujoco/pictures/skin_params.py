@@ -24,10 +24,11 @@ _COLOURS: dict[str, Rgb] = {
     "fat": (0.90, 0.76, 0.42),
     "kidney": (0.60, 0.24, 0.20),
     "liver": (0.52, 0.20, 0.15),
+    "thread": (0.35, 0.1, 0.55),
 }
 """Chosen by eye for a white lamp at the camera, after descriptions of the living organs in anatomy: liver and
 kidney red-brown, the liver darker; the colon a greyish pink; the adrenal gland the yellow of its cortex;
-`tissue`, for all others, the pink of muscle.
+`tissue`, for all others, the pink of muscle. A thread is violet, as sutures of polyglactin are dyed.
 """
 
 

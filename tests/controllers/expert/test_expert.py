@@ -6,9 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from controllers.expert import outlines
 from controllers.expert.controller import Expert
 from controllers.expert.hand import Hand, Phase, framed, pose_of
 from controllers.expert.params import ExpertParams
+from controllers.expert.posts import PegBoard
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
 from robots.dvrk.instruments import instrument
@@ -117,6 +119,46 @@ def test_a_jaw_opens_further_until_nothing_clings_to_it():
     world.run(30)
     assert world.jaws["PSM1"] == pytest.approx(0.4)
     assert (world.outputs["placed"][0], world.outputs["attempts"][0]) == (1, 1)
+
+
+def test_a_ring_that_comes_along_when_the_hand_leaves_is_put_down_again_and_the_jaw_opens_further():
+    world = one_ring("peg-board-surrol")
+    hand = world.expert._team.hands[0]
+    world.run(20, until=lambda _: hand.state.phase is Phase.RETREAT)
+    world.grips["PSM1"] = "ring1", np.linalg.inv(world.tips["PSM1"]) @ world.things["ring1"]
+    put_down = world.things["ring1"].copy()
+    world.clings = 0.35
+    world.run(20, until=lambda _: "PSM1" not in world.grips)
+    assert world.jaws["PSM1"] == pytest.approx(0.4)
+    assert world.things["ring1"] == pytest.approx(put_down, abs=1e-4)
+
+
+def test_a_hand_that_comes_down_on_something_backs_off_and_leaves_the_thing_after_some_times():
+    world = one_ring("peg-board-surrol")
+    hand, tip = world.expert._team.hands[0], world.tips
+    struck = 0.0
+    while not world.expert.ended:
+        world.step()
+        if hand.state.phase is Phase.DESCEND and tip["PSM1"][2, 3] < 0.830:
+            struck = max(struck, 0.830 - tip["PSM1"][2, 3])
+            tip["PSM1"][2, 3] = 0.830
+    assert "ring1 is blocked" in world.expert.ended
+    assert world.outputs["attempts"][0] == 0  # no jaw has closed
+    assert struck < 4e-3
+
+
+def test_a_ring_is_put_down_clear_of_those_beside_it():
+    params = load("peg-board-fls", []).params["lead"]
+    board = PegBoard(params.rings[:2], params.board)
+    turned = framed(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]))
+    beside = framed(np.array([*board.place(0, np.stack([turned, turned]), 1), 0.0, 0.0, 0.0, 1.0]))
+    beside[:2, 3] += 2e-3
+    for angle in np.linspace(0.0, 2.0, 9):
+        carried = framed(np.array([*beside[:3, 3], 0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2)]))
+        place = board.place(0, np.stack([carried, beside]), 1)
+        carried[:3, 3] = place
+        ring = params.board.measures.ring
+        assert outlines.gap(outlines.of_ring(ring, carried), outlines.of_ring(ring, beside)) >= 1e-3
 
 
 def one_ring(name, pose=None, **params):

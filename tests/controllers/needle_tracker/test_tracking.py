@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.vision_needle import ARC, AUTHORS, NEEDLE, OURS, Carried, Trouble, track
-from controllers.needle_tracker.arc_fit import Detection, Noise, fit
+from controllers.needle_tracker.arc_fit import Detection, fit
 from controllers.needle_tracker.filter import Estimate, View, predicted, updated
+from controllers.needle_tracker.noise import Noise
 from controllers.needle_tracker.pose import difference, inverse, moved, turned_about
 from controllers.needle_tracker.tracking import Belief, Settings, followed, mirrored
 from robots import rotation
@@ -113,6 +114,24 @@ def test_it_is_as_wrong_as_it_says(plain, name):
     nees = np.array([run.nees[[15, 27, 39]] for run in plain[name]])
     # 95 % of the means of n values are within 6 +- 2 sqrt(12 / n)
     assert abs(nees.mean() - 6.0) < 2.0 * np.sqrt(12.0 / nees.size) + 0.6
+
+
+def test_a_wire_that_is_always_seen_aside_does_not_make_it_too_sure():
+    """By 4 % of a wire that is 11 px wide: what many pictures have in common is not averaged away."""
+    trouble = Trouble(aside=(0.3, -0.3))
+    means = {
+        share: np.mean(
+            [
+                track(
+                    AUTHORS, 2, seed, pictures=35, trouble=trouble, settings=Settings(Noise(shading=share))
+                ).nees[25:]
+                for seed in range(3)
+            ]
+        )
+        for share in (0.0, 0.04)
+    }
+    assert means[0.04] < 8.0
+    assert means[0.0] > 3.0 * means[0.04]
 
 
 @pytest.mark.parametrize("camera", [OURS, AUTHORS], ids=["ours", "theirs"])

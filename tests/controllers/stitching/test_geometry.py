@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from controllers.expert.hand import Hand
 from controllers.stitching.feasibility import reach
 from controllers.stitching.geometry import Grip, grip_pose, stitch_between
-from controllers.stitching.plan import make_plan, make_stitch
+from controllers.stitching.plan import make_plan, make_stitch, stitch_through
 from robots.dvrk.instruments import instrument
 from robots.dvrk.psm import chain
 from robots.training.needles import NEEDLES
@@ -97,6 +97,17 @@ def test_a_plan_says_which_joint_fails_and_which_angle():
         make_plan(*hands(shift=-0.2), stitches(), FLAT, **ANGLES)
     with pytest.raises(MotionError, match="held 100 degrees behind its tip, the jaw would be driven into"):
         make_plan(*hands(), stitches(), FLAT, **(ANGLES | {"held": np.radians(100)}))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_of_a_stitch_behind_the_wrist_it_says_the_wrists_angle(sign):
+    """Not the insertion of a shaft that points away from the needle."""
+    entry, leave = np.array([0.0, 8e-3 * sign, 0.0]), np.array([0.0, -8e-3 * sign, 0.0])
+    stitch = stitch_through(PHANTOMS["branch-top"], np.eye(4), entry, leave, NEEDLES["sh-plus"], "the stitch")
+    with pytest.raises(
+        MotionError, match=r"of PSM[12], wrist_\w+ would be -?\d+\.\d degrees, allowed -80 to 80"
+    ):
+        make_plan(*hands(), [stitch], FLAT, **ANGLES)
 
 
 def test_the_reach_is_that_of_the_joints():

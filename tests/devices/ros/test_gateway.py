@@ -27,6 +27,8 @@ from schemas.ros import (
     Header,
     Image,
     JointState,
+    Point,
+    PointStamped,
     Pose,
     PoseStamped,
     Quaternion,
@@ -35,6 +37,7 @@ from schemas.ros import (
     Time,
 )
 from schemas.trocar_msgs import GatewayStatus
+from schemas.visualization import Marker, MarkerArray
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise, sample
 from tests.devices.ros.memory import MemoryGateway, MemoryPeer
 
@@ -485,6 +488,31 @@ def test_the_same_mistake_is_told_again_later_with_how_often_it_came(
     once, again = words(gateway, "/PSM1/error")
     assert "times" not in once
     assert again.endswith("(5 times)")
+
+
+NOT_A_NUMBER, MANY = np.float64(np.nan).tobytes(), (10_000).to_bytes(4, "little")
+
+
+@pytest.mark.parametrize(
+    ("profile", "topic", "message", "told_on", "why"),
+    [
+        ("dvrk", "/endoscope/markers", b"\0\1\0\0" + MANY, "/endoscope/error", "allowed are at most 4000"),
+        ("dvrk", "/endoscope/markers", MarkerArray(markers=[Marker()]), "/endoscope/error", "finite"),
+        ("dvrk", "/stitch/pick", PointStamped(point=Point(x=1.0)), "/stitch/status", "finite"),
+        ("vrep", "/stereo/markers", b"\0\1\0\0" + MANY, "/stereo/error", "allowed are at most 4000"),
+        ("vrep", "/suture_planner/user_position", Pose(), "/stereo/error", "finite"),
+    ],
+)
+def test_what_a_picture_cannot_show_is_refused_with_a_reason(
+    tmp_path: Path, profile: str, topic: str, message: Message | bytes, told_on: str, why: str
+) -> None:
+    if isinstance(message, Message):
+        message = encode(message).replace(np.float64(1.0).tobytes(), NOT_A_NUMBER)
+    with make({"profile": profile, "stitching": True, "arms": {"PSM1": {}, "ECM": {}}}) as gateway:
+        gateway.open(tmp_path)
+        gateway.transport.send(topic, message)
+        assert commands(gateway) == []
+        assert why in " ".join(words(gateway, told_on))
 
 
 class CrtkMove:

@@ -65,6 +65,44 @@ def test_it_keeps_the_contract():
     check_engine(pad, period_ns=MS, inputs=inputs)
 
 
+def with_thread(**changes):
+    needle = SCENE["objects"]["needle"] | {"thread": {"length": 0.08, "segments": 32}}
+    return pad(objects={"needle": needle}, **changes)
+
+
+def test_with_a_thread_it_keeps_the_contract_too():
+    inputs = {
+        "needle/position": needle_at(ENTRY + 0.2).ravel(),
+        "needle/velocity": np.tile([0.0, 0.0, -0.01], 3),
+    }
+    check_engine(with_thread, period_ns=MS, inputs=inputs)
+    assert not [port.name for port in pad().ports if "thread" in port.name or port.name == "passages"]
+
+
+def test_the_needle_draws_its_thread_into_its_channel_and_feels_it():
+    engine = with_thread(node_period="1 ms")
+    first = engine.configure(Setup(MS, None, {"needle": IMPULSE}))["thread/nodes"]
+    assert first.triangles.max() == len(first.nodes_m) // 3 - 1
+    out = driven(engine, np.arange(ENTRY - 0.1, 2 * pi + 0.6, 0.01), row=2)
+    events = {event.event: i for i, row in enumerate(out) for event in row["events"]}
+    assert out[events["exited"]]["passages"][0] == 0.0
+    pulled_out = out[events["pulled out"]]
+    assert (pulled_out["passages"][0], out[-1]["passages"][0]) == (1.0, 1.0)
+    bite = 2.0 * NEEDLE.radius * acos((NEEDLE.radius**2 - 8e-3**2) ** 0.5 / NEEDLE.radius)
+    assert out[-1]["thread_pull"][0] == pytest.approx(10.0 * bite, rel=0.05)
+    # the needle goes on turning about the arc's centre, with the thread behind its base
+    force = out[-1]["needle/force"].reshape(3, 3).sum(axis=0)
+    exit_hole = PHANTOMS["branch-top"].exits[2, :3, 3]
+    way = exit_hole - needle_at(2 * pi + 0.6, 2)[0]
+    assert force @ way / np.linalg.norm(way) == pytest.approx(out[-1]["thread_pull"][0], rel=0.05)
+    centres = out[-1]["thread/nodes"].nodes_m.reshape(33, -1, 3).mean(axis=1)
+    inside = centres[:, 2] < -0.1e-3
+    assert inside.sum() >= 5
+    assert centres[inside, 1] == pytest.approx(exit_hole[1], abs=0.1e-3)
+    lengths = np.linalg.norm(np.diff(centres, axis=0), axis=1)
+    assert lengths.max() < 1.01 * 2.5e-3
+
+
 def test_events_name_the_holes_and_outputs_say_where_and_how_deep():
     engine = pad()
     engine.configure(Setup(MS, None, {"needle": IMPULSE}))

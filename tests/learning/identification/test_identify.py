@@ -2,9 +2,16 @@
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
-from learning.identification.measurements import measurements
+import trocar
+from learning.identification.command_line import app
+from learning.identification.measurements import has_jaw, measurements
+from robots.dvrk import inertia
+from robots.dvrk.instruments import instrument
 from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.own_dynamics import OwnDynamics
+from robots.identification import excitation
 from schemas.errors import RecordingError
 from trocar import write_bag
 from trocar.messages import JointState
@@ -40,7 +47,7 @@ def test_a_table_that_lacks_something_is_refused(tmp_path, text, reason):
 
 def test_dynamics_of_another_kind_of_instrument_are_refused(tmp_path):
     (tmp_path / "psm.yaml").write_text("{instrument: X, bodies: {}, joints: {}, discs: []}", "utf-8")
-    with pytest.raises(ValueError, match=r"was identified with X.*identify the arm with such"):
+    with pytest.raises(ValueError, match=r"was identified with X.*identify it with what it holds"):
         MountedPsm.model_validate({"dynamics": "psm.yaml"}, context={"directory": tmp_path})
 
 
@@ -60,3 +67,49 @@ def test_a_bag_has_one_such_topic(tmp_path):
         measurements(tmp_path / "bag", "PSM2", JOINTS)
     with pytest.raises(RecordingError, match="2 positions and 2 efforts, 3"):
         measurements(tmp_path / "bag", "PSM1", (*JOINTS, "insertion"))
+
+
+def test_the_topic_with_the_most_messages_is_read(tmp_path):
+    states = [JointState(name=list(JOINTS), position=[i, 0.0], effort=[3.0, 4.0]) for i in (0.0, 1.0, 2.0)]
+    rows = [("/robot/PSM1/measured_js", i * 10_000_000, one) for i, one in enumerate(states)]
+    write_bag(tmp_path / "bag", [*rows, ("/motion/PSM1/measured_js", 0, states[0])])
+    assert measurements(tmp_path / "bag", "PSM1", JOINTS).position[:, 0].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_the_jaw_is_read_at_the_times_of_the_joints(tmp_path):
+    rows = [
+        (topic, time * 1_000_000, JointState(name=names, position=[p] * len(names), effort=[p] * len(names)))
+        for time, p in ((0, 0.0), (10, 1.0), (20, 2.0))
+        for topic, names in (("/PSM1/measured_js", list(JOINTS)), ("/PSM1/jaw/measured_js", ["jaw"]))
+    ]
+    write_bag(tmp_path / "bag", rows)
+    assert has_jaw(tmp_path / "bag", "PSM1")
+    assert measurements(tmp_path / "bag", "PSM1", (*JOINTS, "jaw")).position[:, 2].tolist() == [0.0, 1.0, 2.0]
+    assert not has_jaw(tmp_path / "bag", "PSM2")
+
+
+def test_a_motion_or_recordings_are_asked_for():
+    for arguments in ((), ("--excite", __file__)):
+        result = CliRunner().invoke(app, [*arguments, "-o", "never.yaml"])
+        assert result.exit_code == 2
+        assert "--excite" in result.output
+
+
+def test_the_whole_circle(tmp_path, monkeypatch):
+    """Excite, run, identify: the weight and the friction of the simulated arm are found."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(excitation, "_TRIES", 10)
+    monkeypatch.setattr(excitation, "_ITERATIONS", 0)
+    done = CliRunner().invoke(app, ["--excite", "--periods", "1", "-o", "motion"])
+    assert done.exit_code == 0, done.output
+    changes = {"participants.commands.bag": str(tmp_path / "motion"), "duration": "12 s"}
+    trocar.run("identify", set=changes, record="recorded")
+    done = CliRunner().invoke(app, ["recorded", "-o", "own.yaml", "--plot", "own.png"])
+    assert done.exit_code == 0, done.output
+    own = OwnDynamics.load(tmp_path / "own.yaml")
+    assert max(own.fit["relative_residual"].values()) < 0.15
+    moving = own.bodies["insertion"].mass - own.bodies["counterweight"].mass
+    published = inertia.psm(instrument("400006"))
+    assert moving == pytest.approx(published["insertion"].mass - published["counterweight"].mass, rel=0.2)
+    assert own.joints["yaw"].viscous == pytest.approx(0.136, rel=0.05)
+    MountedPsm.model_validate({"instrument": "400006", "dynamics": "own.yaml"})

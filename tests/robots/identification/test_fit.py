@@ -3,53 +3,60 @@
 import numpy as np
 import pytest
 
-from robots.dvrk import psm
-from robots.dvrk.dynamics import of_psm
+from robots.dvrk import drives, dynamics
 from robots.dvrk.instruments import instrument
 from robots.dvrk.own_dynamics import OwnDynamics
+from robots.identification.arms import of_ecm, of_psm
 from robots.identification.fit import fit
-from robots.identification.linear_model import LinearModel, pseudo_inertias
+from robots.identification.linear_model import FrictionShape, LinearModel, pseudo_inertias
 from robots.identification.result import own_dynamics
 from robots.identification.signals import Measured, filtered
 from schemas.errors import MotionError, RecordingError
 
 TOOL = instrument("400006")
-MODEL = LinearModel(TOOL)
-LOWER, UPPER, SPEED = np.array(
-    [[joint.lower, joint.upper, joint.velocity] for joint in psm.chain(TOOL).joints]
-).T
+ARM = of_psm(TOOL)
+MODEL = LinearModel(ARM)
 CUTOFF, RATE = 6.0, 50.0
 
 
-def another_arm():
+def another_arm(model=MODEL):
     """Return parameters of a body and losses unlike the published ones, that an arm can have."""
-    random, truth = np.random.default_rng(1), MODEL.nominal.copy()
-    body = MODEL.parts["body"]
+    random, truth = np.random.default_rng(1), model.nominal.copy()
+    body = model.parts["body"]
     roots = np.linalg.cholesky(pseudo_inertias(truth[body]))
     factors = roots @ (np.tril(random.normal(0.0, 0.1, roots.shape)) + np.eye(4))
     truth[body] = (factors @ factors.swapaxes(1, 2))[:, *np.triu_indices(4)].ravel()
     losses = slice(body.stop, None)
     truth[losses] *= random.uniform(0.5, 2.0, truth[losses].shape)
-    truth[MODEL.parts["offset"]] += 0.02
+    truth[model.parts["offset"]] += 0.02
     return truth
 
 
-def motion(duration, seed):
+def motion(duration, seed, arm=ARM):
     """Return times and joint positions of a Fourier series within the limits."""
+    lower, upper, speed = np.array([[joint.lower, joint.upper, joint.velocity] for joint in arm.joints]).T
+    n = len(lower)
     random, time = np.random.default_rng(seed), np.arange(0.0, duration, 1.0 / RATE)
     orders = np.arange(1, 7)[:, None]
-    waves = np.sin(2.0 * np.pi / 15.0 * orders * time + random.uniform(0.0, 6.28, (6, 6, 1)))
-    shape = np.einsum("jk,jkt->jt", random.normal(size=(6, 6)), waves)
+    waves = np.sin(2.0 * np.pi / 15.0 * orders * time + random.uniform(0.0, 6.28, (n, 6, 1)))
+    shape = np.einsum("jk,jkt->jt", random.normal(size=(n, 6)), waves)
     shape /= np.abs(shape).max(axis=1, keepdims=True)
-    speed = np.abs(np.gradient(shape, 1.0 / RATE, axis=1)).max(axis=1)
-    half = np.minimum(0.4 * (UPPER - LOWER), 0.9 * SPEED / speed)
-    return time, ((LOWER + UPPER) / 2.0 + half * shape.T)
+    fastest = np.abs(np.gradient(shape, 1.0 / RATE, axis=1)).max(axis=1)
+    half = np.minimum(0.4 * (upper - lower), 0.9 * speed / fastest)
+    return time, ((lower + upper) / 2.0 + half * shape.T)
 
 
-def efforts(truth, q):
+def efforts(truth, q, model=MODEL):
     dq = np.gradient(q, 1.0 / RATE, axis=0)
-    state = q, dq, np.gradient(dq, 1.0 / RATE, axis=0)
-    return MODEL.regressor(*state) @ truth + MODEL.carried(*state)
+    regressor, carried = model.regressor(q, dq, np.gradient(dq, 1.0 / RATE, axis=0))
+    return regressor @ truth + carried
+
+
+def recorded(model, truth, seed=3):
+    time, q = motion(20.0, seed, model.arm)
+    effort = efforts(truth, q, model)
+    effort += 0.005 * effort.std(axis=0) * np.random.default_rng(seed).normal(size=effort.shape)
+    return filtered(Measured(time, q, effort), CUTOFF, RATE)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +66,7 @@ def found():
     time, q = motion(30.0, seed=3)
     effort = efforts(truth, q)
     effort += 0.02 * effort.std(axis=0) * random.normal(size=effort.shape)
-    return truth, fit([filtered(Measured(time, q, effort), CUTOFF, RATE)], TOOL)
+    return truth, fit([filtered(Measured(time, q, effort), CUTOFF, RATE)], ARM)
 
 
 def test_what_is_told_is_within_two_percent(found):
@@ -81,7 +88,7 @@ def test_efforts_not_seen_are_predicted(found):
 
 def test_the_file_holds_a_body_that_can_be(found, tmp_path):
     file = tmp_path / "psm.yaml"
-    file.write_text(own_dynamics(found[1], TOOL, CUTOFF, ["sim.csv"]).text(), "utf-8")
+    file.write_text(own_dynamics(found[1], CUTOFF, ["sim.csv"]).text(), "utf-8")
     own = OwnDynamics.load(file)
     assert list(own.joints) == list(MODEL.joints)
     assert own.fit["recordings"] == ["sim.csv"]
@@ -91,13 +98,14 @@ def test_the_file_holds_a_body_that_can_be(found, tmp_path):
 
 
 def test_the_regressor_is_the_inertia_matrix_and_keeps_the_energy():
-    arm, random = of_psm(TOOL), np.random.default_rng(0)
+    arm, random = dynamics.of_psm(TOOL), np.random.default_rng(0)
     q, dq, ddq = (random.normal(0.0, 0.3, (1, 6)) for _ in range(3))
     losses = MODEL.nominal.copy()
     losses[MODEL.parts["stiffness"].start :] = 0.0
 
     def effort(dq, ddq):
-        return (MODEL.regressor(q, dq, ddq) @ losses + MODEL.carried(q, dq, ddq))[0]
+        regressor, carried = MODEL.regressor(q, dq, ddq)
+        return (regressor @ losses + carried)[0]
 
     rest = np.zeros((1, 6))
     assert effort(rest, ddq) == pytest.approx(
@@ -129,4 +137,50 @@ def test_a_motion_that_excites_little_is_refused():
     time, q = motion(6.0, seed=6)
     q[:, 1:] = 0.1
     with pytest.raises(RecordingError, match="condition number"):
-        fit([filtered(Measured(time, q, np.zeros_like(q)), CUTOFF, RATE)], TOOL)
+        fit([filtered(Measured(time, q, np.zeros_like(q)), CUTOFF, RATE)], ARM)
+
+
+def test_the_jaw_is_a_joint_that_shares_the_discs_of_the_wrist():
+    arm = of_psm(TOOL, jaw=True)
+    model = LinearModel(arm)
+    truth = another_arm(model)
+    found = fit([recorded(model, truth)], arm)
+    discs = model.parts["coulomb"].start + 3 + np.arange(4)
+    assert found.parameters[discs] == pytest.approx(truth[discs], rel=0.1)
+    assert (found.residual < 0.02).all()
+    own = own_dynamics(found, CUTOFF, ["sim.csv"])
+    assert own.joints["jaw"].armature == pytest.approx(found.parameters[model.parts["armature"]][-1])
+    closed = dict(own.drives_of(drives.psm(TOOL)))
+    assert closed["jaw_left"].armature == 2.0 * own.joints["jaw"].armature
+
+
+def test_a_base_that_is_turned_is_identified_with_its_gravity():
+    gravity = -9.81 * np.array([0.0, np.sin(0.5), np.cos(0.5)])
+    model = LinearModel(ARM, gravity)
+    samples = recorded(model, another_arm(model))
+    assert (fit([samples], ARM, gravity=gravity).residual < 0.02).all()
+    assert fit([samples], ARM).residual[2] > 0.05
+
+
+def test_the_endoscope_arm_is_identified(monkeypatch):
+    # it is too slow for a random motion to tell its inertia from its weight
+    monkeypatch.setattr("robots.identification.fit.LARGEST_CONDITION", 1e7)
+    arm = of_ecm()
+    model = LinearModel(arm)
+    found = fit([recorded(model, another_arm(model))], arm)
+    assert (found.residual < [0.02, 0.02, 0.02, 0.1]).all()
+    assert (found.published_residual > 0.1).any()
+    own_dynamics(found, CUTOFF, ["sim.csv"])
+
+
+def test_friction_that_is_larger_at_rest_is_found():
+    shape = FrictionShape(
+        np.full(7, 200.0), 0.03 * np.abs(MODEL.shares) @ [joint.velocity for joint in ARM.joints]
+    )
+    model = LinearModel(ARM, shape=shape)
+    truth = another_arm(model)
+    truth[model.parts["static"]] = 0.5 * truth[model.parts["coulomb"]]
+    samples = recorded(model, truth)
+    with_it, without = (fit([samples], ARM, stribeck=stribeck).residual for stribeck in (True, False))
+    assert (with_it < 0.02).all()
+    assert (with_it < 0.5 * without)[[0, 1, 3]].all()

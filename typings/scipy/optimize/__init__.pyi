@@ -1,4 +1,4 @@
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
@@ -9,6 +9,13 @@ class OptimizeResult:
     cost: float
     jac: NDArray[np.float64]
 
+def minimize(
+    fun: Callable[[NDArray[np.float64]], float],
+    x0: NDArray[np.float64],
+    *,
+    method: Literal["L-BFGS-B"],
+    options: Mapping[str, int],
+) -> OptimizeResult: ...
 def least_squares(
     fun: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     x0: NDArray[np.float64],

@@ -155,7 +155,7 @@ def test_what_the_data_does_not_tell_has_a_large_deviation():
 @pytest.mark.parametrize(
     ("indenter", "message"),
     [
-        (Indenter("sphere", 1.5e-3), "allowed up to 2 radii"),
+        (Indenter("sphere", 1.5e-3), "allowed up to 2.5 radii"),
         (Indenter("sphere", 8e-3, 4e-3), "too thin for a contact"),
         (Indenter("punch", 5e-3, 2e-2), "for a sphere only"),
     ],

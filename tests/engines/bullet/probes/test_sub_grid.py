@@ -60,6 +60,11 @@ def test_spheres_of_other_sizes_and_stiffer_tissue(radius, young_modulus, at):
     np.testing.assert_allclose(forces, layer(radius, depths, young_modulus), rtol=0.06)
 
 
+def test_a_small_sphere_two_and_a_half_radii_deep():
+    (force,) = pressed(params(BLOCK, {"radius": 2e-3}, sub_grid=True), PLACES["face"], [5e-3], 2e-3)
+    assert force == pytest.approx(0.1743, rel=0.05)  # bench/tissue_truth.json
+
+
 @pytest.mark.parametrize("at", [PLACES["node"], PLACES["face"]], ids=["node", "face"])
 def test_it_follows_at_5_hz(at):
     w = 10 * np.pi
@@ -108,7 +113,7 @@ def test_beyond_the_depths_that_are_known_it_says_so(caplog):
         list(pressed(params(BLOCK, {"radius": radius}, sub_grid=True), PLACES["face"], [2.5e-3], radius))
         assert not caplog.records
         list(pressed(params(BLOCK, {"radius": radius}, sub_grid=True), PLACES["face"], [5e-3], radius))
-    assert "deeper than 2 radii, 3 mm" in caplog.text
+    assert "deeper than 2.5 radii, 3.75 mm" in caplog.text
 
 
 def test_the_same_press_has_the_same_hashes():

@@ -202,7 +202,7 @@ def test_without_an_ecm_the_cameras_see_the_scene(gl: str) -> None:
             "arms": {"PSM2": {}},
             "objects": {
                 "ring": {"kind": "ring", "position": [0, 0, 0]},
-                "needle": {"kind": "needle", "position": [0, 0, 0]},
+                "needle": {"kind": "needle", "position": [0, 0, 0], "thread": {}},
             },
         },
     ],
@@ -211,6 +211,14 @@ def test_the_number_of_positions_is_known_before_the_model_is_built(scene: dict[
     params = EndoscopeParams.model_validate({**scene, "looks": False})
     assert position_count(params) == build(params).nq
     assert Endoscope("endoscope", params).ports[0].size == build(params).nq
+
+
+def test_a_needle_with_a_thread_brings_it_as_a_soft_body_and_one_without_does_not() -> None:
+    needle = {"kind": "needle", "position": [0, 0, 0]}
+    for thread, bodies in ((None, []), ({"length": "80 mm"}, ["thread/nodes"])):
+        scene = {"arms": {"ECM": {}}, "objects": {"needle": needle | {"thread": thread}}, "looks": False}
+        ports = Endoscope("endoscope", EndoscopeParams.model_validate(scene)).ports
+        assert [port.name for port in ports if port.name.endswith("/nodes")] == bodies
 
 
 def test_it_keeps_the_contract_of_an_engine(gl: str) -> None:

@@ -1,0 +1,28 @@
+"""What participants have to say in a report about the validity of what they computed, by kind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib.metadata import entry_points
+from typing import Any
+
+from schemas.scenario import Scenario
+
+__all__ = ["GROUP", "noted"]
+
+GROUP = "trocar.notes"
+"""Entry points by kind: functions that take the parameters (a mapping, as the scenario states them) and
+return pairs of what is noted and the text.
+"""
+
+
+def noted(scenario: Scenario) -> Iterator[tuple[str, str, str]]:
+    """Yield participant, what is noted of it, and the text, of kinds that are installed and have notes."""
+    for name, spec in scenario.participants.items():
+        for entry in entry_points(group=GROUP, name=spec.kind):
+            try:
+                notes: Callable[[Mapping[str, Any]], Iterable[tuple[str, str]]] = entry.load()
+                rows = list(notes(spec.model_extra or {}))
+            except Exception as error:  # noqa: BLE001  # a plug-in may raise anything; the page says what
+                rows = [("none", f"{type(error).__name__}: {' '.join(str(error).split())[:300]}")]
+            yield from ((name, what, text) for what, text in rows)

@@ -1,0 +1,62 @@
+"""The part of a report about needles in tissue: force over depth, and by how much tissue is pushed aside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hub.recording.recording import Recording
+from hub.recording.report_canvas import Figure, axes_of, legend, line_of, thin
+
+__all__ = ["tissue_figures"]
+
+_LINES = 8
+"""Of insertions: more would look the same."""
+
+
+def tissue_figures(recording: Recording) -> Iterator[Figure]:
+    """Yield the figures of every participant with ports of these names.
+
+    `insertion` (m) and `tip_force` (N) give the force on the tip over its way, a line for each time that it
+    went in; `trauma` (m^2) the area between needle and channel.
+    """
+    for port in recording.ports:
+        name, _, kind = port.partition(".")
+        if kind == "trauma" and {f"{name}.insertion", f"{name}.tip_force"} <= set(recording.ports):
+            yield from _force(recording, name)
+            yield from _trauma(recording, name)
+
+
+def _force(recording: Recording, name: str) -> Iterator[Figure]:
+    insertion, force = recording[f"{name}.insertion"], recording[f"{name}.tip_force"]
+    count = min(len(insertion.time), len(force.time))
+    way, pushed = insertion.values[:count].ravel(), force.values[:count].ravel()
+    # an insertion begins where the tip touches and ends where the needle is out
+    is_there = np.concatenate([[False], (way > 0.0) | (pushed > 0.0), [False]])
+    starts, ends = np.flatnonzero(np.diff(is_there.astype(int))).reshape(-1, 2).T
+    through = [span for span in zip(starts, ends, strict=True) if way[span[0] : span[1]].any()]
+    if not through:
+        return
+    with axes_of("way of the tip since the skin (mm)", "force on the tip (N)") as (axes, result):
+        for i, (start, end) in enumerate(through[:_LINES]):
+            line = thin(np.arange(float(end - start)), pushed[start:end])
+            at = line[0].astype(int)
+            axes.plot(way[start:end][at] * 1e3, line[1], label=f"{i + 1}", **line_of(i))
+        legend(axes)
+    caption = (
+        f"Force of skin and tissue on the tip alone, {len(through)} times in: it breaks through the skin,"
+        f" cuts, and breaks out again. At most {pushed.max():.3g} N."
+    )
+    yield Figure(f"{name}: force on the tip", result.svg(caption), caption)
+
+
+def _trauma(recording: Recording, name: str) -> Iterator[Figure]:
+    series = recording[f"{name}.trauma"]
+    area = series.values.ravel() * 1e6
+    if not area.any():
+        return
+    with axes_of("time (s)", "swept area (mm²)") as (axes, result):
+        axes.plot(*thin(series.time, area), **line_of(0))
+    caption = f"Area between needle and channel: the tissue pushed aside. At most {area.max():.3g} mm²."
+    yield Figure(f"{name}: trauma", result.svg(caption), caption)
