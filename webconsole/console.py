@@ -9,6 +9,7 @@ from typing import Any
 from hub.devices.network_link_control import NetworkLinkRequest
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError, ScenarioError
+from schemas.trocar_msgs import ScoreCard
 from webconsole.commands import Control, Fork, Network, Start
 from webconsole.fork import fork_arguments
 from webconsole.frame import Section, SectionKind
@@ -123,7 +124,8 @@ class Console:
             raise MessageError("this page shows a running session; its recording has a timeline")
         return self.source
 
-    def card(self) -> dict[str, Any] | None:
-        """Return the newest score card, ready for JSON; None if there is none."""
-        card = self.source.card if isinstance(self.source, Live) else None
+    def card(self, time_ns: int | None) -> dict[str, Any] | None:
+        """Return the newest score card at a simulated time, ready for JSON; None if there is none."""
+        names = [one.name for one in self.source.outlets if one.port.type == ScoreCard.ros_type]
+        card = self.source.newest(names[0], time_ns) if names else None
         return None if card is None else card_of(card)

@@ -17,7 +17,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from hub.planning.scenario_file import installed_scenarios
 from hub.recording.recording import Recording
-from schemas.errors import TrocarError
+from schemas.errors import MessageError, TrocarError
 from webconsole.assets import asset, compressed
 from webconsole.commands import MOST_BYTES
 from webconsole.console import Console
@@ -55,6 +55,7 @@ class Server:
                 Route("/web/{name:path}", asset),
                 Route("/scene", self._scene),
                 Route("/series", self._series),
+                Route("/pressed", self._pressed),
                 Route("/events", self._events),
                 Route("/sessions", self._sessions),
                 Route("/start", self._start),
@@ -128,6 +129,19 @@ class Server:
         return Response(
             rows.astype("<f8").tobytes(), media_type=_BINARY, headers={"X-Width": str(len(columns) + 1)}
         )
+
+    async def _pressed(self, request: Request) -> Response:
+        """Answer with time, point and force of a bond of a recording, rows of seven f64."""
+        try:
+            recorded, stage = self._console.recorded(), await self._console.stage()
+            name = request.query_params.get("bond")
+            found = [one for one in (stage.arrows if stage else ()) if one.name == name and one.at_one_point]
+            if not found:
+                raise MessageError("no bond of this name acts at one point")
+            rows = await asyncio.to_thread(recorded.pressed, found[0], _MOST_BUCKETS)
+        except TrocarError as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)
+        return Response(rows.astype("<f8").tobytes(), media_type=_BINARY)
 
     async def _events(self, _request: Request) -> Response:
         """Answer with what happened in a recording."""

@@ -22,6 +22,7 @@ from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
 from webconsole.felt import felt_wrenches
 from webconsole.frame import Section, SectionKind
+from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
 from webconsole.source import Outlet, Value
 
@@ -65,6 +66,8 @@ class Stage:
         self.pictures = tuple(one.name for one in outlets if one.port.type == CompressedImage.ros_type)
         self.numbers = {one.name: VectorCodec(one.port) for one in signals if has_vector(one.port.type)}
         """The numeric outlets."""
+        self.gauges = {one.name: GAUGES[one.port.type] for one in signals if one.port.type in GAUGES}
+        """The outlets of the hub that can be plotted too."""
         self._codecs = {
             f"{participant}.{port}": self.numbers[f"{participant}.{port}"]
             for participant, scene in self.scenes.items()
@@ -130,9 +133,14 @@ class Stage:
             SectionKind.SURFACE, [*self.surfaces].index(name), state.triangles.astype("<u4").tobytes()
         )
 
+    def is_numeric(self, name: str) -> bool:
+        """Return whether an outlet can be plotted."""
+        return name in self.numbers or name in self.gauges
+
     def sample(self, index: int, name: str, value: Value) -> Section:
         """Return time (s) and numbers of a numeric outlet; raises MessageError if they are not valid."""
-        numbers = self.numbers[name].decode(value.payload)
+        gauge = self.gauges.get(name)
+        numbers = self.numbers[name].decode(value.payload) if gauge is None else gauge.read(value.payload)
         row = np.concatenate([[value.time_ns / 1e9], numbers])
         return Section(SectionKind.SAMPLE, index, row.astype("<f8").tobytes())
 
@@ -168,7 +176,21 @@ class Stage:
                     "live": self._outlets[name].live,
                 }
                 for name, codec in self.numbers.items()
+            ]
+            + [
+                {
+                    "name": name,
+                    "columns": gauge.columns,
+                    "units": gauge.units,
+                    "unit": "",
+                    "type": self._outlets[name].port.type,
+                    "frame": "",
+                    "text": gauge.text,
+                    "live": True,
+                }
+                for name, gauge in self.gauges.items()
             ],
+            "bonds": [{"name": bond.name, "one": bond.at_one_point} for bond in self.arrows],
             "notes": self.notes,
         }
 

@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from tests.webconsole.conftest import finish
 from tests.webconsole.test_gate import Visitor
 from webconsole.frame import SectionKind, sections
-from webconsole.recorded import Recorded, reduced
+from webconsole.recorded import Recorded
 from webconsole.serve import opened_recording
 
 
@@ -153,15 +153,6 @@ def test_a_message_that_is_too_long_ends_the_connection(console_of_recording):
         assert socket.close_code == 1009
 
     run(body, console_of_recording)
-
-
-def test_reduced_rows_keep_every_peak():
-    times, values = np.arange(10_000) * 0.001, np.zeros((10_000, 2))
-    values[4321, 0], values[777, 1] = 5.0, -3.0
-    rows = reduced(times, values, 100)
-    assert rows.shape == (200, 3)
-    assert (rows[:, 1].max(), rows[:, 2].min()) == (5.0, -3.0)
-    assert np.array_equal(reduced(times[:150], values[:150], 100)[:, 0], times[:150])
 
 
 def test_a_recording_that_was_cut_short_is_shown_as_far_as_it_goes(recording, tmp_path, caplog):
