@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gzip
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Mapping
 from math import isfinite
 
 import uvicorn
@@ -43,9 +43,20 @@ class _WebSocket(WebSocketsSansIOProtocol):
 
 
 class Server:
-    """Serves the pages of one console."""
+    """Serves the pages of one console.
 
-    def __init__(self, console: Console, listening: Listening) -> None:
+    Args:
+        console: What the pages show.
+        listening: Where.
+        others: What serves other programs, by the path of its WebSocket.
+    """
+
+    def __init__(
+        self,
+        console: Console,
+        listening: Listening,
+        others: Mapping[str, Callable[[WebSocket], Awaitable[None]]] | None = None,
+    ) -> None:
         self._console, self._socket = console, listening.socket
         self.port = listening.port
         self._pages = 0
@@ -62,6 +73,7 @@ class Server:
                 Route("/fork", self._fork),
                 Route("/forks", self._forks),
                 WebSocketRoute("/page", self._page),
+                *(WebSocketRoute(path, serve) for path, serve in (others or {}).items()),
             ]
         )
         self.gate = Gate(app, listening.origins)

@@ -8,6 +8,8 @@ import { creased, gathered, smooth } from "./mesh.js"
 const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
 const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5
 const FORCE = 0xf2b705, M_PER_N = 0.02, LONGEST_M = 0.08, LEAST_N = 0.005
+const PICTURE = [320, 256] // of an eye that the page draws itself: the field of view of 5:4, as on the page
+const POINT = new THREE.SphereGeometry(0.0012, 12, 8) // where a force acts
 const LEFT_EYE = "_left_optical" // after a camera's name: controllers and ROS programs name its frame so
 const FLIP = new THREE.Quaternion(1, 0, 0, 0) // from an optical frame (y down, z ahead) to three's camera (y up, -z ahead)
 
@@ -44,7 +46,7 @@ export class Scene {
     this.markers?.clear()
     for (const old of this.owned ?? []) {
       this.world.remove(old)
-      old.traverse((one) => { one.geometry?.dispose(); one.material?.dispose() })
+      old.traverse((one) => { if (one.geometry !== POINT) one.geometry?.dispose(); one.material?.dispose() })
     }
     this.owned = []
     this.bodies = [] // by scene: a group for each body
@@ -166,6 +168,9 @@ export class Scene {
         arrows[i] = new THREE.ArrowHelper(undefined, undefined, 1, FORCE)
         for (const { material } of [arrows[i].line, arrows[i].cone]) material.depthTest = false // inside of organs, too
         arrows[i].line.renderOrder = arrows[i].cone.renderOrder = 1
+        const point = new THREE.Mesh(POINT, arrows[i].cone.material)
+        point.renderOrder = 1
+        arrows[i].add(point)
         this.own(arrows[i])
       }
       const [x, y, z, fx, fy, fz] = rows.subarray(6 * i, 6 * i + 6), force = Math.hypot(fx, fy, fz)
@@ -224,6 +229,28 @@ export class Scene {
     return box
   }
 
+  // Draw what an eye (`left`, `right`) of the endoscope sees onto a canvas, in the size of its pictures.
+  look(side, canvas) {
+    const eye = this.cameras[0], [width, height] = PICTURE
+    if (!eye || !this.placed) return
+    const own = this.renderer.domElement, ratio = this.renderer.getPixelRatio()
+    const scale = Math.min(1, own.width / width, own.height / height), size = [width * scale, height * scale]
+    this.camera.aspect = width / height
+    this.follow(eye, (side === "left" ? -0.5 : 0.5) * eye.baseline)
+    this.camera.updateProjectionMatrix()
+    this.light()
+    this.renderer.setViewport(0, 0, size[0] / ratio, size[1] / ratio)
+    this.renderer.render(this.world, this.camera)
+    this.renderer.setViewport(0, 0, own.width / ratio, own.height / ratio)
+    if (canvas.width !== width) Object.assign(canvas, { width, height })
+    canvas.getContext("2d").drawImage(own, 0, own.height - size[1], ...size, 0, 0, width, height)
+  }
+
+  light() {
+    this.lamp.position.copy(this.camera.position)
+    this.lamp.target.position.set(0, 0, -1).applyQuaternion(this.camera.quaternion).add(this.camera.position)
+  }
+
   draw() {
     if (!this.focused && (this.placed || this.surfaces.some(({ mesh }) => mesh))) {
       this.focused = true
@@ -241,8 +268,7 @@ export class Scene {
       this.orbit.place(this.camera)
     }
     this.camera.updateProjectionMatrix()
-    this.lamp.position.copy(this.camera.position)
-    this.lamp.target.position.set(0, 0, -1).applyQuaternion(this.camera.quaternion).add(this.camera.position)
+    this.light()
     this.renderer.render(this.world, this.camera)
   }
 
@@ -265,10 +291,12 @@ export class Scene {
     this.draw()
   }
 
-  follow({ group, pose: [x, y, z, ...q], fieldOfView }) {
+  // `aside`: along the camera's x (m).
+  follow({ group, pose: [x, y, z, ...q], fieldOfView }, aside = 0) {
     this.camera.fov = (2 * Math.atan(Math.tan(fieldOfView / 2) / this.camera.aspect) * 180) / Math.PI
     this.camera.position.set(x, y, z).applyQuaternion(group.quaternion).add(group.position)
     this.camera.quaternion.copy(group.quaternion).multiply(new THREE.Quaternion(...q)).multiply(FLIP)
+    this.camera.translateX(aside)
   }
 }
 
