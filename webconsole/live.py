@@ -38,7 +38,7 @@ from schemas.network_link import NetworkLinkSpec
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import ScoreCard, SessionStatus
 from webconsole.gauges import HUB, hub_outlets
-from webconsole.log import LOGGED, Entry, entries_of
+from webconsole.log import LOGGED, Entries, Entry
 from webconsole.past import Past
 from webconsole.source import Outlet, Value
 
@@ -77,6 +77,7 @@ class Live:
         self._links: dict[str, NetworkLinkSpec] = {}
         self._entries: deque[tuple[int, Entry]] = deque(maxlen=_ENTRIES_KEPT)
         self._numbered = 0
+        self._lines = Entries()
         self.joined: Callable[[str, Plan], None] = lambda _endpoint, _plan: None
         """Is called with endpoint and plan of each session that is reached."""
         self.left_out: Callable[[], set[int]] = set
@@ -257,7 +258,7 @@ class Live:
 
     def _begin(self, session: zenoh.Session, keys: Keys, described: DescribeReply, *, here: bool) -> None:
         self._values, self._firsts = {}, {}
-        self._status, self._late = None, 0
+        self._status, self._late, self._lines = None, 0, Entries()
         self._run, self._keys = described.run, keys
         self.scenario, self.recording = described.scenario, described.recording
         self.past = Past(Path(described.recording)) if described.recording and here else None
@@ -337,7 +338,7 @@ class Live:
         self._values[outlet.name] = value
         if outlet.port.type in LOGGED:
             try:
-                for entry in entries_of(outlet, value):
+                for entry in self._lines.of(outlet, value):
                     self._note(entry)
             except MessageError as error:
                 self._note(Entry(value.time_ns / 1e9, "warn", outlet.name, f"not shown: {error}"))

@@ -21,7 +21,7 @@ from schemas.trocar_msgs import SessionStatus
 from schemas.vectors import Vector
 from webconsole.arrows import BondArrows
 from webconsole.gauges import GAUGES, HUB, hub_outlets
-from webconsole.log import LOGGED, Entry, entries_of
+from webconsole.log import LOGGED, Entries, Entry
 from webconsole.pyramid import Pyramid
 from webconsole.source import Outlet, Value
 
@@ -152,11 +152,12 @@ class Recorded:
         return sorted(found, key=lambda one: one.time_s)
 
     def _messages(self) -> Iterator[Entry]:
+        lines = Entries()
         for outlet in self.outlets:
             if outlet.port.type not in LOGGED:
                 continue
             for message in self.recording.messages(self._topics[outlet.name]):
-                yield from entries_of(outlet, Value(message.time_ns, message.payload))
+                yield from lines.of(outlet, Value(message.time_ns, message.payload))
 
     def _contacts(self) -> Iterator[Entry]:
         """Yield when something was touched and let go: the wrench of a bond's force side."""

@@ -49,7 +49,7 @@ export class Depths {
 
   // `bonds`: name, and whether each acts at one point.
   begin(bonds = [], recorded) {
-    this.plots = bonds.map(({ name, one }) => one ? new Depth(name) : null)
+    this.plots = bonds.map(({ name, one }) => one ? new Depth(name, recorded) : null)
     this.list.replaceChildren(...this.plots.filter(Boolean).map(({ element }) => element))
     if (recorded) for (const plot of this.plots) plot?.load()
   }
@@ -62,8 +62,8 @@ export class Depths {
 }
 
 class Depth {
-  constructor(name) {
-    this.name = name
+  constructor(name, recorded) {
+    Object.assign(this, { name, recorded })
     this.contacts = new Contacts()
     this.element = document.createElement("div")
     this.element.className = "plot"
@@ -79,7 +79,6 @@ class Depth {
     if (!answer.ok) return
     const rows = new Float64Array(await answer.arrayBuffer())
     for (let at = 0; at < rows.length; at += 7) this.contacts.push(...rows.subarray(at, at + 7))
-    this.recorded = true
     this.draw()
   }
 

@@ -5,9 +5,11 @@ import { Orbit } from "./orbit.js"
 import { Markers } from "./markers.js"
 import { creased, gathered, smooth } from "./mesh.js"
 
+const ASIDE_M = 0.1, ASIDE_RAD = 0.5
 const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
-const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5
-const FORCE = 0xf2b705, M_PER_N = 0.02, LONGEST_M = 0.08, LEAST_N = 0.005
+const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5, SMOOTH = 2
+const FORCE = 0xf2b705, M_PER_N = 0.05, LONGEST_M = 0.1, LEAST_N = 0.005
+export const FORCES = 3 // layer of what no endoscope sees; 1 and 2 are the eyes of a headset
 const PICTURE = [320, 256] // of an eye that the page draws itself: the field of view of 5:4, as on the page
 const POINT = new THREE.SphereGeometry(0.0012, 12, 8) // where a force acts
 const LEFT_EYE = "_left_optical" // after a camera's name: controllers and ROS programs name its frame so
@@ -22,14 +24,15 @@ export class Scene {
     this.renderer.setPixelRatio(this.ratio)
     this.interval = 0
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.002, 50)
+    this.camera.layers.enable(FORCES)
     this.choice = "work"
     this.orbit = new Orbit(canvas, (moved) => {
       if (moved && this.choice === "endoscope") this.choose("work")
       this.dirty()
     })
     this.world = new THREE.Scene()
-    this.world.add(new THREE.HemisphereLight(0xffffff, 0x8899a6, 1.7))
-    this.lamp = new THREE.DirectionalLight(0xffffff, 1.6)
+    this.world.add(new THREE.HemisphereLight(0xffffff, 0x6f7f8c, 1.5))
+    this.lamp = new THREE.DirectionalLight(0xffffff, 2)
     this.world.add(this.lamp, this.lamp.target)
     this.clear()
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.ground())
@@ -37,8 +40,19 @@ export class Scene {
   }
 
   ground() {
-    const colour = getComputedStyle(document.documentElement).getPropertyValue("--stage").trim()
-    this.world.background = new THREE.Color(colour)
+    const style = getComputedStyle(document.documentElement), canvas = document.createElement("canvas")
+    const colour = (name) => style.getPropertyValue(name).trim()
+    Object.assign(canvas, { width: 2, height: 64 })
+    const onto = canvas.getContext("2d"), shade = onto.createLinearGradient(0, 0, 0, canvas.height)
+    shade.addColorStop(0, colour("--sky"))
+    shade.addColorStop(1, colour("--stage"))
+    onto.fillStyle = shade
+    onto.fillRect(0, 0, canvas.width, canvas.height)
+    this.world.background?.dispose()
+    this.world.background = new THREE.CanvasTexture(canvas)
+    this.world.background.colorSpace = THREE.SRGBColorSpace
+    this.line = new THREE.Color(colour("--floor"))
+    this.grid?.material.color.copy(this.line)
     this.dirty()
   }
 
@@ -171,6 +185,7 @@ export class Scene {
         const point = new THREE.Mesh(POINT, arrows[i].cone.material)
         point.renderOrder = 1
         arrows[i].add(point)
+        arrows[i].traverse((one) => one.layers.set(FORCES))
         this.own(arrows[i])
       }
       const [x, y, z, fx, fy, fz] = rows.subarray(6 * i, 6 * i + 6), force = Math.hypot(fx, fy, fz)
@@ -196,10 +211,34 @@ export class Scene {
     if (tip) this.orbit.look(tip.axes.getWorldPosition(new THREE.Vector3()).toArray(), 0.12)
     else if (name !== "endoscope" && !box.isEmpty()) {
       const sphere = box.getBoundingSphere(new THREE.Sphere())
+      if (name === "work") this.turnToWork(sphere.center)
       this.orbit.look(sphere.center.toArray(), Math.max(sphere.radius, 0.03) * (name === "robot" ? 2.4 : 3.2))
     }
+    this.floor(name === "robot" ? box : this.surfaceBox())
     this.chosen?.(name)
     this.dirty()
+  }
+
+  // Look from where the robot does not stand: its arms would hide the work.
+  turnToWork(center) {
+    const robot = this.robotBox().getCenter(new THREE.Vector3()).sub(center).negate()
+    if (Math.hypot(robot.x, robot.y) > ASIDE_M) this.orbit.azimuth = Math.atan2(robot.y, robot.x) + ASIDE_RAD
+  }
+
+  // A grid of 10 mm, or of 100 mm, below what is seen: it shows where up is, and how large things are.
+  floor(box) {
+    this.grid?.removeFromParent()
+    this.grid?.dispose()
+    this.grid = null
+    if (box.isEmpty()) return
+    const sphere = box.getBoundingSphere(new THREE.Sphere()), cell = sphere.radius > 0.3 ? 0.1 : 0.01
+    const cells = 2 * Math.ceil((2.5 * sphere.radius) / cell)
+    this.grid = new THREE.GridHelper(cells * cell, cells, 0xffffff, 0xffffff)
+    this.grid.material.color.copy(this.line)
+    this.grid.rotation.x = Math.PI / 2
+    const round = (value) => Math.round(value / cell) * cell
+    this.grid.position.set(round(sphere.center.x), round(sphere.center.y), box.min.z - 0.0005)
+    this.world.add(this.grid)
   }
 
   robotBox() {
@@ -233,22 +272,27 @@ export class Scene {
   look(side, canvas) {
     const eye = this.cameras[0], [width, height] = PICTURE
     if (!eye || !this.placed) return
+    if (this.grid) this.grid.visible = false
     const own = this.renderer.domElement, ratio = this.renderer.getPixelRatio()
     const scale = Math.min(1, own.width / width, own.height / height), size = [width * scale, height * scale]
     this.camera.aspect = width / height
     this.follow(eye, (side === "left" ? -0.5 : 0.5) * eye.baseline)
     this.camera.updateProjectionMatrix()
     this.light()
+    this.camera.layers.disable(FORCES)
     this.renderer.setViewport(0, 0, size[0] / ratio, size[1] / ratio)
     this.renderer.render(this.world, this.camera)
+    this.camera.layers.enable(FORCES)
     this.renderer.setViewport(0, 0, own.width / ratio, own.height / ratio)
     if (canvas.width !== width) Object.assign(canvas, { width, height })
     canvas.getContext("2d").drawImage(own, 0, own.height - size[1], ...size, 0, 0, width, height)
   }
 
+  // The lamp is over the left shoulder of whoever looks: what it does not meet has a shape.
   light() {
-    this.lamp.position.copy(this.camera.position)
-    this.lamp.target.position.set(0, 0, -1).applyQuaternion(this.camera.quaternion).add(this.camera.position)
+    const way = (x, y, z) => new THREE.Vector3(x, y, z).applyQuaternion(this.camera.quaternion).add(this.camera.position)
+    this.lamp.position.copy(way(-0.7, 0.9, 0))
+    this.lamp.target.position.copy(way(0, 0, -1))
   }
 
   draw() {
@@ -262,6 +306,7 @@ export class Scene {
     if (size.x !== width || size.y !== height) this.renderer.setSize(width, height, false)
     this.camera.aspect = width / height
     const endoscope = this.choice === "endoscope" && this.cameras[0]
+    if (this.grid) this.grid.visible = !endoscope
     if (endoscope) this.follow(endoscope)
     else {
       this.camera.fov = 40
@@ -284,10 +329,10 @@ export class Scene {
     this.renderer.setPixelRatio(ratio)
   }
 
-  // Nothing moves: draw once with all pixels.
+  // Nothing moves: draw once with more pixels than there are, so that edges are smooth.
   settle() {
-    if (this.renderer.getPixelRatio() === this.finest) return
-    this.renderer.setPixelRatio(this.finest)
+    if (this.renderer.getPixelRatio() === SMOOTH) return
+    this.renderer.setPixelRatio(SMOOTH)
     this.draw()
   }
 
