@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hub.devices.network_link_control import NetworkLinkRequest
+from hub.planning import registry
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError, ScenarioError
 from schemas.trocar_msgs import ScoreCard
@@ -91,6 +92,14 @@ class Console:
         whole_ns = {key: f"{given[key] * 1e9:.0f} ns" for key in ("delay", "jitter") if key in given}
         request = NetworkLinkRequest.model_validate(given | whole_ns)
         await asyncio.to_thread(live.change_link, request)
+
+    async def prepare(self) -> None:
+        """Have processes ready for a session that is about to be started from here."""
+        kinds: set[str] = set()
+        if isinstance(self.source, Recorded) and self.source.scenario is not None:
+            kinds = {one.kind for one in self.source.scenario.participants.values()} & set(registry.kinds())
+        modules = ["hub.fork", *sorted(registry.find(kind).entry.module for kind in kinds)]
+        await asyncio.to_thread(self.started.prepare, modules)
 
     async def fork(self, order: Fork) -> int:
         """Start a fork of the recording and return its number; raises MessageError or ScenarioError."""

@@ -24,6 +24,7 @@ from webconsole.commands import (
     Lead,
     Leave,
     Network,
+    Prepare,
     Show,
     Start,
     Watch,
@@ -154,6 +155,8 @@ class Page:
             case Network():
                 await self._console.network(order)
                 return {}
+            case Prepare():
+                await self._console.prepare()
             case Fork():
                 return {"number": await self._console.fork(order)}
             case Start():

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import gzip
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
 from math import isfinite
 
 import uvicorn
@@ -30,6 +31,7 @@ from webconsole.start import start_form
 __all__ = ["Server"]
 
 _MOST_PAGES = 16
+_AHEAD_S = 0.2
 _MOST_BUCKETS = 4000
 _BINARY = "application/octet-stream"
 
@@ -61,6 +63,7 @@ class Server:
         self.port = listening.port
         self._pages = 0
         app = Starlette(
+            lifespan=self._ahead,
             routes=[
                 Route("/", asset),
                 Route("/web/{name:path}", asset),
@@ -74,7 +77,7 @@ class Server:
                 Route("/forks", self._forks),
                 WebSocketRoute("/page", self._page),
                 *(WebSocketRoute(path, serve) for path, serve in (others or {}).items()),
-            ]
+            ],
         )
         self.gate = Gate(app, listening.origins)
         self._uvicorn = uvicorn.Server(
@@ -82,7 +85,7 @@ class Server:
                 self.gate,
                 log_level="warning",
                 access_log=False,
-                lifespan="off",
+                lifespan="on",
                 ws=_WebSocket,
                 ws_max_size=MOST_BYTES,
                 ws_per_message_deflate=False,
@@ -107,6 +110,21 @@ class Server:
     def stop(self) -> None:
         """Let `run` return soon; from any thread."""
         self._uvicorn.should_exit = True
+
+    @asynccontextmanager
+    async def _ahead(self, _app: Starlette) -> AsyncGenerator[None]:
+        """Make what can be drawn of each session before the first page asks for it."""
+
+        async def make() -> None:
+            while True:
+                await self._console.stage()
+                await asyncio.sleep(_AHEAD_S)
+
+        making = asyncio.create_task(make())
+        try:
+            yield
+        finally:
+            making.cancel()
 
     async def _page(self, websocket: WebSocket) -> None:
         if self._pages >= _MOST_PAGES:
