@@ -13,7 +13,7 @@ from schemas.errors import MessageError, ScenarioError
 from schemas.trocar_msgs import ScoreCard
 from webconsole.commands import Control, Fork, Network, Start
 from webconsole.fork import fork_arguments
-from webconsole.frame import Section, SectionKind
+from webconsole.frame import Section, SectionKind, pose_content
 from webconsole.live import Live
 from webconsole.log import card_of
 from webconsole.pilot import Pilots
@@ -74,8 +74,8 @@ class Console:
         (value,) = [*values.values()][-1:]
         held = self._made.get(participant)
         if held is None or held[0] is not value:
-            poses = stage.poses(participant, values).astype("<f4")
-            section = Section(SectionKind.POSES, [*stage.scenes].index(participant), poses.tobytes())
+            content = pose_content(stage.poses(participant, values))
+            section = Section(SectionKind.POSES, [*stage.scenes].index(participant), content)
             held = self._made[participant] = value, section
         return held[1]
 

@@ -21,7 +21,7 @@ from schemas.trocar_msgs import ShownMarkers, SoftBodyState
 from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
 from webconsole.felt import felt_wrenches
-from webconsole.frame import Section, SectionKind
+from webconsole.frame import Section, SectionKind, node_content
 from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
 from webconsole.source import Outlet, Value
@@ -116,8 +116,9 @@ class Stage:
     def section(self, name: str, value: Value) -> Section:
         """Return what a frame has of an outlet that is a surface, markers or a picture."""
         if name in self.surfaces:
-            nodes = decode(SoftBodyState, value.payload).nodes_m
-            return Section(SectionKind.NODES, [*self.surfaces].index(name), nodes.astype("<f4").tobytes())
+            nodes = decode(SoftBodyState, value.payload).nodes_m.reshape(-1, 3)
+            content = node_content(nodes) if nodes.size else b""
+            return Section(SectionKind.NODES, [*self.surfaces].index(name), content)
         if name in self.markers:
             content = marker_content(decode(ShownMarkers, value.payload))
             return Section(SectionKind.MARKERS, self.markers.index(name), content)

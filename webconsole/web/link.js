@@ -7,7 +7,7 @@ export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS 
 
 export function parseFrame(buffer) {
   const view = new DataView(buffer)
-  if (buffer.byteLength < HEAD || view.getUint32(0, true) !== MAGIC || view.getUint16(4, true) !== 1) return null
+  if (buffer.byteLength < HEAD || view.getUint32(0, true) !== MAGIC || view.getUint16(4, true) !== 2) return null
   const sections = []
   let at = HEAD
   for (let left = view.getUint16(6, true); left > 0; left--) {
@@ -16,6 +16,16 @@ export function parseFrame(buffer) {
     at += 8 + size + ((8 - (size % 8)) % 8)
   }
   return { time: Number(view.getBigInt64(8, true)) / 1e9, number: view.getUint32(16, true), sections, buffer }
+}
+
+// Nodes of a surface: least and step (f32, 3 each), then steps (u16).
+export function nodesOf(buffer, at, size) {
+  const [x, y, z, dx, dy, dz] = new Float32Array(buffer, at, 6), steps = new Uint16Array(buffer, at + 24, (size - 24) / 2)
+  const nodes = new Float32Array(steps.length)
+  for (let i = 0; i < steps.length; i += 3) {
+    nodes[i] = x + dx * steps[i]; nodes[i + 1] = y + dy * steps[i + 1]; nodes[i + 2] = z + dz * steps[i + 2]
+  }
+  return nodes
 }
 
 export class Link {

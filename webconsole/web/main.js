@@ -1,6 +1,6 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
-import { ARROWS, FELT, Link, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { ARROWS, FELT, Link, nodesOf, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
 import { Alerts } from "./alerts.js"
 import { Depths } from "./depth.js"
 import { Eyes } from "./eyes.js"
@@ -167,9 +167,9 @@ function apply(frame) {
       const markers = notices.take(index, markersOf(frame.buffer, at))
       scene?.marked(index, markers)
     } else if (!scene) continue
-    else if (kind === POSES) scene.poses(index, new Float32Array(frame.buffer, at, size / 4))
+    else if (kind === POSES) scene.poses(index, frame.buffer, at, size)
     else if (kind === SURFACE) scene.surface(index, new Uint32Array(frame.buffer, at, size / 4))
-    else if (kind === NODES) scene.nodes(index, new Float32Array(frame.buffer, at, size / 4))
+    else if (kind === NODES) size && scene.nodes(index, nodesOf(frame.buffer, at, size))
   }
 }
 

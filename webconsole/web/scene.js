@@ -138,12 +138,15 @@ export class Scene {
     return ["work", "robot", ...(this.cameras.length ? ["endoscope"] : []), ...arms]
   }
 
-  poses(index, numbers) {
+  // In a buffer: positions (f32), then quaternions (i16, 32767 is 1).
+  poses(index, buffer, at, size) {
     const groups = this.bodies[index]
-    if (!groups || numbers.length !== 7 * groups.length) return
+    if (!groups || size !== 20 * groups.length) return
+    const places = new Float32Array(buffer, at, 3 * groups.length)
+    const turns = new Int16Array(buffer, at + 12 * groups.length, 4 * groups.length)
     groups.forEach((group, body) => {
-      group.position.fromArray(numbers, 7 * body)
-      group.quaternion.fromArray(numbers, 7 * body + 3)
+      group.position.fromArray(places, 3 * body)
+      group.quaternion.fromArray(turns, 4 * body).normalize()
       group.visible = true
     })
     this.placed = true
