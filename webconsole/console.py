@@ -50,7 +50,7 @@ class Console:
                 return None
             if generation != self._generation:
                 self._stage = await asyncio.to_thread(Stage, scenario, self.source.outlets)
-                await asyncio.to_thread(lambda: self._stage and self._stage.geometry)
+                await asyncio.to_thread(lambda: self._stage and self._stage.packed)
                 self._generation, self._made = generation, {}
             return self._stage
 

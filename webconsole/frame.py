@@ -78,13 +78,14 @@ def pose_content(poses: NDArray[np.float32]) -> bytes:
 
 
 def node_content(nodes: NDArray[np.float32]) -> bytes:
-    """Return least node and step, f32 (3,) each, and the steps from there to each node, u16 (n, 3).
+    """Return least node and step, f32 (3,) each, and the steps from there to each node, u16 (3, n).
 
     In an organ of 200 mm a node is 1.5 um aside at most. `nodes`: shape (n, 3).
     """
-    low, high = nodes.min(axis=0), nodes.max(axis=0)
-    step = np.maximum((high - low) / 65535.0, np.float32(1e-12))
-    steps: NDArray[np.uint16] = np.rint((nodes - low) / step).astype("<u2")
+    columns = np.ascontiguousarray(nodes.T)
+    low, high = columns.min(axis=1, keepdims=True), columns.max(axis=1, keepdims=True)
+    step = np.maximum((high - low) / np.float32(65535.0), np.float32(1e-12))
+    steps: NDArray[np.uint16] = np.rint((columns - low) / step).astype("<u2")
     return low.astype("<f4").tobytes() + step.astype("<f4").tobytes() + steps.tobytes()
 
 

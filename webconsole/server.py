@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gzip
 from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from math import isfinite
@@ -19,7 +18,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from hub.planning.scenario_file import installed_scenarios
 from hub.recording.recording import Recording
 from schemas.errors import MessageError, TrocarError
-from webconsole.assets import asset, compressed
+from webconsole.assets import asset, compress_all, compressed
 from webconsole.commands import MOST_BYTES
 from webconsole.console import Console
 from webconsole.fork import fork_form, tree_of
@@ -116,6 +115,7 @@ class Server:
         """Make what can be drawn of each session before the first page asks for it."""
 
         async def make() -> None:
+            await asyncio.to_thread(compress_all)
             while True:
                 await self._console.stage()
                 await asyncio.sleep(_AHEAD_S)
@@ -140,7 +140,7 @@ class Server:
         stage = await self._console.stage()
         if stage is None:
             return PlainTextResponse("no session\n", status_code=404)
-        return compressed(gzip.compress(stage.geometry, 5, mtime=0), _BINARY)
+        return compressed(stage.packed, _BINARY)
 
     async def _series(self, request: Request) -> Response:
         """Answer with the rows of a numeric port of a recording, f64; their columns are in a header."""

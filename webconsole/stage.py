@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import logging
 import struct
@@ -194,6 +195,11 @@ class Stage:
             "bonds": [{"name": bond.name, "one": bond.at_one_point} for bond in self.arrows],
             "notes": self.notes,
         }
+
+    @cached_property
+    def packed(self) -> bytes:
+        """The geometry, compressed by gzip."""
+        return gzip.compress(self.geometry, 5, mtime=0)
 
     @cached_property
     def geometry(self) -> bytes:

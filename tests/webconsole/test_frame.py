@@ -49,7 +49,7 @@ def test_poses_and_nodes_are_as_exact_as_they_say():
     nodes = (0.2 * rng.random((300, 3))).astype(np.float32)
     data = node_content(nodes)
     low, step = np.frombuffer(data, "<f4", 6).reshape(2, 3)
-    back = low + step * np.frombuffer(data, "<u2", offset=24).reshape(300, 3)
+    back = low + step * np.frombuffer(data, "<u2", offset=24).reshape(3, 300).T
     assert np.abs(back - nodes).max() < 1.6e-6
     flat = np.frombuffer(node_content(np.zeros((2, 3), np.float32)), "<u2", offset=24)
     assert not flat.any()

@@ -18,12 +18,13 @@ export function parseFrame(buffer) {
   return { time: Number(view.getBigInt64(8, true)) / 1e9, number: view.getUint32(16, true), sections, buffer }
 }
 
-// Nodes of a surface: least and step (f32, 3 each), then steps (u16).
+// Nodes of a surface: least and step (f32, 3 each), then the steps (u16) of all x, all y and all z.
 export function nodesOf(buffer, at, size) {
-  const [x, y, z, dx, dy, dz] = new Float32Array(buffer, at, 6), steps = new Uint16Array(buffer, at + 24, (size - 24) / 2)
-  const nodes = new Float32Array(steps.length)
-  for (let i = 0; i < steps.length; i += 3) {
-    nodes[i] = x + dx * steps[i]; nodes[i + 1] = y + dy * steps[i + 1]; nodes[i + 2] = z + dz * steps[i + 2]
+  const head = new Float32Array(buffer, at, 6), steps = new Uint16Array(buffer, at + 24, (size - 24) / 2)
+  const count = steps.length / 3, nodes = new Float32Array(steps.length)
+  for (let axis = 0; axis < 3; axis++) {
+    const low = head[axis], step = head[3 + axis], from = axis * count
+    for (let i = 0; i < count; i++) nodes[3 * i + axis] = low + step * steps[from + i]
   }
   return nodes
 }
