@@ -66,7 +66,7 @@ class Depth {
     Object.assign(this, { name, recorded })
     this.contacts = new Contacts()
     this.element = document.createElement("div")
-    this.element.className = "plot"
+    this.element.className = "depth"
     this.element.hidden = true // until something is touched
     this.element.innerHTML = `<div class="plot-head"><strong></strong><span class="unit">N, mm</span></div><canvas role="img"></canvas>`
     this.element.querySelector("strong").textContent = `${name} · force against depth`

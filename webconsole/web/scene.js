@@ -27,6 +27,7 @@ export class Scene {
     this.camera.layers.enable(FORCES)
     this.choice = "work"
     this.orbit = new Orbit(canvas, (moved) => {
+      this.touched ||= moved
       if (moved && this.choice === "endoscope") this.choose("work")
       this.dirty()
     })
@@ -72,7 +73,7 @@ export class Scene {
     this.places = new Map() // a group of each frame in which markers may be, by its name on /tf
     this.markers = new Markers((frame) => this.place(frame))
     this.placed = false
-    this.focused = false
+    this.focused = this.touched = false
   }
 
   // `buffer` is what /scene answers: webconsole/stage.py, `geometry`.
@@ -170,6 +171,7 @@ export class Scene {
       surface.mesh = new THREE.Mesh(made, material([...surface.colour, 1], THREE.DoubleSide))
       surface.mesh.frustumCulled = false
       this.own(surface.mesh)
+      this.focused &&= this.touched // the work is where the organ is, unless somebody looks elsewhere
     }
     const { position, normal } = surface.mesh.geometry.attributes
     gathered(positions, surface.origin, position.array)
