@@ -1,6 +1,6 @@
 """What a session costs beside its bare participants: every scenario of `configs`.
 
-    python -m bench.live                                  # all scenarios, 2 s of simulated time each
+    python -m bench.live                                  # all scenarios, from begin to end, 20 s at most
     python -m bench.live table palpation --seconds 1
     python -m bench.live --output live.json --docs        # and redraw the table in docs/live.md
 
@@ -8,6 +8,9 @@
 hub, no wire, no hashes, no devices. Session and bare run in turns, in the same program; the medians are
 reported. Wall time and processor time are those between the first and the last step: starting is left out.
 Before it is timed, a bare run must reach the session's state hashes: it is the same work.
+
+The first seconds of a scenario tell little: in those of `palpation` nothing is touched, and tissue that is
+pressed costs twice as much. So scenarios run to their ends, or for `LONGEST_S`.
 
 At pace `fast` cameras are in lock-step. Where they are observers in real time, the session runs at that pace
 too: simulated time over wall time without the waits for the wall clock is *attainable*.
@@ -44,6 +47,9 @@ LEFT_OUT = {
     "keys": "a person drives it by the keyboard",
 }
 """Scenarios that do not run by themselves."""
+
+LONGEST_S = 20.0
+"""Simulated time of a run where a scenario is longer, or has no end."""
 
 DOCS = Path(__file__).parent.parent / "docs" / "live.md"
 BEGIN, END = "<!-- bench/live.py -->", "<!-- end -->"
@@ -101,6 +107,11 @@ class Capture:
 
         setattr(participant, "configure", noting_configure)  # noqa: B010
         setattr(participant, "step", noting_step)  # noqa: B010
+
+    @property
+    def end_s(self) -> float:
+        """When the last step ended: a scenario may end before its duration."""
+        return max(call.t + call.h for call in self.calls) / 1e9
 
     def take(self, planned: PlannedParticipant, ack: Ack) -> None:
         """Note the state hashes of an ack."""
@@ -165,7 +176,7 @@ def run_bare(scenario: str, seconds: float, captured: Capture, *, check: bool = 
         cpu, begun = process_time(), perf_counter()
         for step, t, h, inputs in calls:
             step(t, h, inputs)
-        return Cost(seconds, perf_counter() - begun, process_time() - cpu)
+        return Cost(captured.end_s, perf_counter() - begun, process_time() - cpu)
     finally:
         for participant in stepped.values():
             participant.close()
@@ -236,6 +247,13 @@ def run_attainable(case: Case, seconds: float) -> float | None:
     return session.plan.step_ns / 1e9 / step_s
 
 
+def simulated_s(scenario: str, seconds: float | None) -> float:
+    """Return how long a scenario is run, in simulated seconds: `seconds`, or as long as it lasts."""
+    duration = load(scenario).scenario.duration
+    whole = LONGEST_S if duration is None else min(duration / 1e9, LONGEST_S)
+    return whole if seconds is None else min(seconds, whole)
+
+
 def cases(scenarios: Sequence[str]) -> list[Case]:
     """Return the rows of these scenarios, by default of all."""
     names = scenarios or [name for name in sorted(installed_scenarios()) if name not in LEFT_OUT]
@@ -259,6 +277,7 @@ def measure(case: Case, captured: Capture, seconds: float, runs: int) -> dict[st
 
     return {
         "name": case.name,
+        "seconds": round(captured.end_s, 3),
         "real_time_factor": median(ours.sim_s / ours.wall_s for ours, _ in pairs),
         "attainable_real_time_factor": median(attainable) if attainable else None,
         "bare_real_time_factor": median(bare.sim_s / bare.wall_s for _, bare in pairs),
@@ -273,14 +292,15 @@ def measure(case: Case, captured: Capture, seconds: float, runs: int) -> dict[st
 def table(result: Mapping[str, Any]) -> str:
     """Return the table of a result, in markdown."""
     lines = [
-        "| scenario | real time | attainable | bare | wall, of bare | processor, of bare"
+        "| scenario | s | real time | attainable | bare | wall, of bare | processor, of bare"
         " | core-seconds per s | bare |",
-        "|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for row in result["rows"]:
         attainable = row["attainable_real_time_factor"]
         cells = (
             row["name"],
+            f"{row['seconds']:g}",
             f"{row['real_time_factor']:.2f}",
             "" if attainable is None else f"{attainable:.2f}",
             *(f"{row[name]:.2f}" for name in ("bare_real_time_factor", "wall_ratio", "core_ratio")),
@@ -290,7 +310,7 @@ def table(result: Mapping[str, Any]) -> str:
     begin, end = (" ".join(f"{load:.1f}" for load in result[name]) for name in ("load_begin", "load_end"))
     left_out = "; ".join(f"`{name}`: {why}" for name, why in result["left_out"].items())
     facts = (
-        f"- {result['cores']} cores, {result['seconds']:g} s of simulated time",
+        f"- {result['cores']} cores",
         f"- medians of {result['runs']} runs",
         f"- load (1, 5, 15 min) at the begin {begin}, at the end {end}",
         f"- left out: {left_out}",
@@ -308,10 +328,9 @@ def redraw(result: Mapping[str, Any]) -> None:
     DOCS.write_text(f"{head}{BEGIN}\n{table(result)}\n\n{END}{tail}", encoding="utf-8")
 
 
-def measured(scenarios: Sequence[str], seconds: float, runs: int) -> dict[str, Any]:
+def measured(scenarios: Sequence[str], seconds: float | None, runs: int) -> dict[str, Any]:
     """Measure scenarios, and return all figures."""
     result: dict[str, Any] = {
-        "seconds": seconds,
         "runs": runs,
         "cores": len(os.sched_getaffinity(0)),
         "load_begin": os.getloadavg(),
@@ -320,10 +339,11 @@ def measured(scenarios: Sequence[str], seconds: float, runs: int) -> dict[str, A
     }
     captured: tuple[str, Capture] | None = None
     for case in cases(scenarios):
+        time_s = simulated_s(case.scenario, seconds)
         if captured is None or captured[0] != case.scenario:
-            captured = case.scenario, capture(case.scenario, seconds)
-            run_bare(case.scenario, seconds, captured[1], check=True)
-        row = measure(case, captured[1], seconds, runs)
+            captured = case.scenario, capture(case.scenario, time_s)
+            run_bare(case.scenario, time_s, captured[1], check=True)
+        row = measure(case, captured[1], time_s, runs)
         result["rows"].append(row)
         print({name: value for name, value in row.items() if name != "runs"}, file=sys.stderr)
     return result | {"load_end": os.getloadavg()}
@@ -337,7 +357,7 @@ def main() -> None:
     parser.add_argument(
         "scenarios", nargs="*", metavar="SCENARIO", help="default: all that run by themselves"
     )
-    parser.add_argument("--seconds", type=float, default=2.0, help="simulated time of a run")
+    parser.add_argument("--seconds", type=float, help="simulated time of a run, at most")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--output", type=Path, metavar="FILE", help="write all figures as JSON")
     parser.add_argument("--input", type=Path, metavar="FILE", help="measure nothing; read such figures")

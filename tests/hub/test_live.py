@@ -71,6 +71,13 @@ def test_what_a_session_could_reach_is_measured_where_cameras_only_look(scenario
     assert attainable > 0.0
 
 
+def test_a_scenario_runs_to_its_end_or_for_as_long_as_is_asked(scenario):
+    assert live.simulated_s(scenario, None) == 0.03
+    assert live.simulated_s(scenario, 2.0) == 0.03
+    assert live.simulated_s("teleop", None) == live.simulated_s("ros", None) == live.LONGEST_S
+    assert live.simulated_s("teleop", 2.0) == 2.0
+
+
 def test_every_scenario_has_a_row_or_a_reason():
     rows = live.cases([])
     assert {row.scenario for row in rows} | live.LEFT_OUT.keys() == set(live.installed_scenarios())
@@ -87,13 +94,12 @@ def test_the_table_is_redrawn_from_the_figures(tmp_path, monkeypatch, capsys):
     }
     unwatched = {**row, "attainable_real_time_factor": None}
     figures = {
-        "seconds": 2.0,
         "runs": 3,
         "cores": 2,
         "load_begin": [1.0, 2.0, 3.0],
         "load_end": [4.0, 5.0, 6.0],
         "left_out": {"keys": "why"},
-        "rows": [{"name": "short", **row}, {"name": "blind", **unwatched}],
+        "rows": [{"name": "short", "seconds": 2.0, **row}, {"name": "blind", "seconds": 20.0, **unwatched}],
     }
     (tmp_path / "live.json").write_text(json.dumps(figures))
     live.DOCS.write_text(f"before\n{live.BEGIN}\nold\n{live.END}\nafter\n")
@@ -102,8 +108,8 @@ def test_the_table_is_redrawn_from_the_figures(tmp_path, monkeypatch, capsys):
     page = live.DOCS.read_text()
     assert page.startswith("before\n")
     assert page.endswith(f"{live.END}\nafter\n")
-    assert "| short | 1.25 | 1.25 | 1.25 | 1.25 | 1.25 | 1.250 | 1.250 |" in page
-    assert "| blind | 1.25 |  | 1.25 |" in page
+    assert "| short | 2 | 1.25 | 1.25 | 1.25 | 1.25 | 1.25 | 1.250 | 1.250 |" in page
+    assert "| blind | 20 | 1.25 |  | 1.25 |" in page
     assert "at the end 4.0 5.0 6.0" in page
     assert "old" not in page
     assert "| short |" in capsys.readouterr().out
