@@ -110,7 +110,7 @@ def test_a_recording_is_shown(person, served_scene):
 
     one.page.get_by_label("Add a port").fill("robot.qpos")
     one.page.get_by_label("Add a port").press("Enter")
-    one.sees("document.querySelectorAll('.plot').length === 2")
+    one.sees("document.querySelectorAll('.plot').length === 3")
     assert one.page.get_by_text("robot.qpos").is_visible()
     assert {re.sub(r"(:\d+)/.*", r"\1", url) for url in one.requested} == {
         f"http://127.0.0.1:{served_scene.port}"
