@@ -177,6 +177,11 @@ class Started:
                 self._ready = Ready(modules)
 
     @property
+    def waiting(self) -> tuple[subprocess.Popen[bytes], ...]:
+        """The processes that are ready for a session."""
+        return () if self._ready is None else (self._ready.hub.process, self._ready.page.process)
+
+    @property
     def _full(self) -> bool:
         return sum(not one.ended for one in self._sessions) >= _MOST
 

@@ -3,12 +3,12 @@
 import asyncio
 import json
 import struct
-from contextlib import ExitStack, asynccontextmanager, suppress
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, suppress
 
 import numpy as np
 import pytest
 from websockets.asyncio.client import connect
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from tests.webconsole.conftest import finish
 from tests.webconsole.test_gate import Visitor
@@ -142,6 +142,17 @@ def test_a_page_that_sends_too_much_is_closed(console_of_recording):
             async for _ in socket:
                 pass
         assert socket.close_code == 1008
+
+    run(body, console_of_recording)
+
+
+def test_a_seventeenth_page_is_refused(console_of_recording):
+    async def body(_):
+        async with AsyncExitStack() as stack:
+            for _ in range(15):
+                await stack.enter_async_context(opened(console_of_recording))
+            with pytest.raises(InvalidStatus, match="403"):
+                await stack.enter_async_context(opened(console_of_recording))
 
     run(body, console_of_recording)
 
