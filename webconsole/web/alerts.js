@@ -32,7 +32,7 @@ export class Alerts {
     said.textContent = text
     const button = document.createElement("button")
     button.textContent = "✕"
-    button.setAttribute("aria-label", `Dismiss: ${text}`)
+    button.setAttribute("aria-label", `Dismiss the warning of ${what.split(":")[0]}`)
     button.onclick = () => this.drop(what)
     element.append(said, button)
     this.shown.set(what, { element, said, count: 1 })

@@ -204,7 +204,7 @@ function draw(now) {
     drawnAt = now
   } else if (!headset.worn) {
     drawing = false
-    if (now - drawnAt > STILL_MS) scene?.settle()
+    if (now - drawnAt > STILL_MS) scene?.settle(pilot.leading)
   }
   last = now
   if (now - refreshed > REFRESH_MS) { refreshed = now; plots.refresh(); depths.refresh() }

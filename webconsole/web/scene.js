@@ -334,10 +334,12 @@ export class Scene {
     this.renderer.setPixelRatio(ratio)
   }
 
-  // Nothing moves: draw once with more pixels than there are, so that edges are smooth.
-  settle() {
-    if (this.renderer.getPixelRatio() === SMOOTH) return
-    this.renderer.setPixelRatio(SMOOTH)
+  // Nothing moves: draw once with more pixels than there are, so that edges are smooth; `quick`: for somebody whose
+  // hands must not wait for that.
+  settle(quick = false) {
+    const ratio = quick ? this.finest : SMOOTH
+    if (this.renderer.getPixelRatio() === ratio) return
+    this.renderer.setPixelRatio(ratio)
     this.draw()
   }
 
