@@ -281,11 +281,6 @@ class Host:
         self._note_users()
         self._step(one, self.step, time_ns)
 
-    def drain(self) -> None:
-        """Receive what has arrived from other hosts and was not read, for the listener."""
-        if self._wire is not None:
-            self._wire.drain()
-
     def close(self) -> None:
         """Close every participant, the last first; an error in one does not keep the others open."""
         every = [(one.name, one.participant) for one in self._hosted]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 from hub.hosting.hosted_participant import HostedParticipant, hosted
 from hub.hosting.outputs import DueOutputs, Listener, Output, VectorsListener
 from hub.participant import Stepped
 from hub.planning.plan import Plan, PlannedConnection, PlannedParticipant
 from hub.transport.bundle import Bundle, bundled
-from hub.transport.cells import INITIAL, Cell, RemoteCell
-from hub.transport.lane import has_lane
+from hub.transport.cells import Cell, RemoteCell
 from hub.transport.port_codec import PortCodec, codec_of
 from hub.transport.reader import DeviceInputs, Queue, Reader, as_messages
 from hub.transport.wire import Wire
@@ -224,28 +223,13 @@ class HostLayout:
             if self._wire is None:
                 raise ValueError(f"'{source}' is in another process, and this host has no wire")
             planned = self._plan.participants[source]
-            declared = planned.port(port)
             self.remote_cells[source, port] = self._wire.cell(
-                planned,
-                declared,
-                self._plan.stride(source, port),
-                self._depth(source, port),
-                self._lane_listener(planned, declared),
+                planned, planned.port(port), self._plan.stride(source, port), self._depth(source, port)
             )
         return self.remote_cells[source, port]
 
     def _vectors_listener(self, planned: PlannedParticipant, ports: Sequence[Port]) -> VectorsListener | None:
         return None if self._listeners is None else self._listeners.vectors_listener(planned, ports)
-
-    def _lane_listener(self, planned: PlannedParticipant, port: Port) -> Callable[[int, Any], None] | None:
-        """Return what calls the listener with the vectors of another host that arrive by a lane."""
-        lane = has_lane(port, planned.host, self._name)
-        listener, step_ns = self._vectors_listener(planned, [port]) if lane else None, self._plan.step_ns
-        if listener is None:
-            return None
-        return lambda tag, value: listener(
-            tag, (tag + planned.period) * step_ns if tag > INITIAL else 0, value.tobytes()
-        )
 
     def _seldom_read(
         self, of_devices: Collection[Cell]

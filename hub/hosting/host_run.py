@@ -20,6 +20,7 @@ from hub.hosting.host_profile import HostProfile
 from hub.hosting.hub_channel import HubChannel, LinkChannel, ZenohChannel
 from hub.hosting.low_priority import lower_priority
 from hub.hosting.observing import Observing
+from hub.hosting.sent_vectors import VectorsToSend
 from hub.participant import Device, Stepped
 from hub.planning.plan import PlannedParticipant
 from hub.planning.renewal import made
@@ -81,11 +82,13 @@ class HostRun:
         self._profile = HostProfile(session, keys, host, plan, reply.run) if reply.profile else None
         if self._profile is not None:
             self._profile.process.prepare(stepped, wire)
+        self._vectors = VectorsToSend(reply.sent_with_acks)
         self._host = Host(
             host,
             plan,
             stepped,
             wire=wire,
+            listeners=self._vectors,
             place=None if link is None else link.place,
             successors={name: later for name, (_, later) in ready.items()},
         )
@@ -111,7 +114,7 @@ class HostRun:
         if not names:
             return None
         if link is not None:
-            return LinkChannel(link, names, self._check)
+            return LinkChannel(link, names, self._check, self._vectors)
         return ZenohChannel(self._session, self._keys, names, ack_key, self._refusals, self._check)
 
     def _attach_devices(
@@ -145,7 +148,9 @@ class HostRun:
         except ParticipantError as error:
             self._report_failure(error.participant, error.cause)
             raise
-        ready = self._request.model_copy(update={"ready": True, "bonds": bonds})
+        ready = self._request.model_copy(
+            update={"ready": True, "bonds": bonds, "vectors": self._vectors.groups}
+        )
         self._send_to_hub(ready)
         if self._observing is not None:
             self._observe(self._observing, ready)

@@ -8,6 +8,7 @@ from typing import Protocol
 import zenoh
 from zenoh.handlers import FifoChannel
 
+from hub.hosting.sent_vectors import VectorsToSend
 from hub.transport.envelope import signature
 from hub.transport.host_link import HostLink
 from hub.transport.refusals import Refusals
@@ -86,10 +87,15 @@ class ZenohChannel:
 
 
 class LinkChannel:
-    """A channel by the link to the hub that has started this host: all acks of a grant in one message."""
+    """A channel by the link to the hub that has started this host: all of a grant in one message.
 
-    def __init__(self, link: HostLink, names: Sequence[str], check: CheckGrant) -> None:
-        self._link, self._check = link, check
+    It has the acks of all participants, and the `vectors` that the hub records or measures.
+    """
+
+    def __init__(
+        self, link: HostLink, names: Sequence[str], check: CheckGrant, vectors: VectorsToSend
+    ) -> None:
+        self._link, self._check, self._vectors = link, check, vectors
         self._places = {name: place for place, name in enumerate(names)}
         self._acks: list[tuple[int, bytes]] = []
 
@@ -103,6 +109,6 @@ class LinkChannel:
         self._acks.append((self._places[name], pack_ack(ack)))
 
     def flush(self) -> None:
-        """Send the acks."""
-        self._link.send_acks(self._acks)
+        """Send the acks and vectors."""
+        self._link.send_report(self._acks, self._vectors.take())
         self._acks.clear()

@@ -21,7 +21,7 @@ from hub.recording.chunk import Queued
 from hub.recording.recorder import Recorder
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
-from hub.transport.lane import has_lane
+from hub.transport.host_link import has_link
 from hub.transport.port_codec import PortCodec
 from hub.transport.refusals import Refusals
 from schemas.codec import encode
@@ -95,28 +95,34 @@ class Monitor:
 
     @property
     def away(self) -> dict[str, tuple[str, str]]:
-        """Participant and port of every watched output of another process, by key."""
-        away = {
-            key: w
-            for key, w in self._watched.items()
-            if w.planned.host != "hub" and w.planned.role != "device" and not self._comes_by_lane(w)
-        }
-        measured = set(self.measures.ports)
+        """Participant and port of every watched output of another process, by key.
+
+        Those that are sent with acks are left out.
+        """
+        sent = set(self.sent_with_acks)
+        return {key: output for key, output in self._of_others.items() if output not in sent}
+
+    @property
+    def sent_with_acks(self) -> list[tuple[str, str]]:
+        """Participant and port of the vectors that other hosts send with their acks."""
+        return [
+            (name, port)
+            for name, port in self._of_others.values()
+            if (watched := self._by_port[name, port]).codec.vector is not None
+            and watched.planned.in_step
+            and has_link(watched.planned.host)
+        ]
+
+    @property
+    def _of_others(self) -> dict[str, tuple[str, str]]:
+        """Participant and port of every output of another process that is recorded or measured, by key."""
         return {
             key: (w.planned.name, w.port.name)
-            for key, w in away.items()
-            if self._recorder is not None or (w.planned.name, w.port.name) in measured
+            for key, w in self._watched.items()
+            if w.planned.host != "hub"
+            and w.planned.role != "device"
+            and self.watches(w.planned.name, w.port.name)
         }
-
-    def _comes_by_lane(self, watched: _Watched) -> bool:
-        """Return whether the hub's own host receives the value past Zenoh, and passes it on."""
-        name, port = watched.planned.name, watched.port
-        readers = {
-            self._plan.participants[connection.target].host
-            for connection in self._plan.connections
-            if (connection.source, connection.source_port) == (name, port.name)
-        }
-        return "hub" in readers and has_lane(port, watched.planned.host, "hub")
 
     def linked(self) -> bool:
         """Return whether the value at time 0 of every watched output of another process was received.
@@ -132,7 +138,7 @@ class Monitor:
     def vectors_listener(
         self, planned: PlannedParticipant, ports: Sequence[Port]
     ) -> Callable[[int, int, bytes], None] | None:
-        """Return what receives vectors of a participant in this process, or one from a lane.
+        """Return what receives vectors of a participant in this process, or of a host that sends them.
 
         It is called with step, time (ns) at which they are valid, and their bytes, one after the other. None:
         nothing receives them.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from hmac import compare_digest
 
@@ -11,7 +11,7 @@ from zenoh.handlers import FifoChannel
 
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.transport.envelope import signature
-from hub.transport.host_link import HubLink
+from hub.transport.host_link import HubLink, SentVectors
 from hub.transport.refusals import Refusals
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
@@ -42,6 +42,7 @@ class AckReceiver:
         refusals: Counts the messages that are refused.
         ack_keys: By host, the key with which it signs.
         links: By host, its link.
+        take_vectors: Is called with a host and the vectors that it has sent with its acks.
     """
 
     def __init__(
@@ -53,15 +54,14 @@ class AckReceiver:
         refusals: Refusals,
         ack_keys: Mapping[str, bytes],
         links: Mapping[str, HubLink],
+        take_vectors: Callable[[str, Sequence[SentVectors]], None],
     ) -> None:
         self._session, self._keys, self._run, self._refusals = session, keys, run, refusals
         self._wake_key = keys.ack("hub")
         self._planned = {keys.ack(name): plan.participants[name] for name in plan.order}
-        self._ack_keys, self._links = ack_keys, links
-        self._link_of = {
-            name: links[planned.host]
-            for name in plan.order
-            if (planned := plan.participants[name]).host in links
+        self._ack_keys, self._links, self._take_vectors = ack_keys, links, take_vectors
+        self._linked_host = {
+            name: planned.host for name in plan.order if (planned := plan.participants[name]).host in links
         }
         self._last: dict[str, bytes] = {}
         """The last ack of each participant."""
@@ -77,19 +77,19 @@ class AckReceiver:
         a message reports a failure.
         """
         self._step, self._steps = grant.step, steps
-        links = list(dict.fromkeys(self._link_of[name] for name in waiting if name in self._link_of))
-        if not links:
+        hosts = list(dict.fromkeys(self._linked_host[name] for name in waiting if name in self._linked_host))
+        if not hosts:
             yield from self._from_zenoh(self._subscriber.recv(), waiting)
             return
         yield from self.look(waiting)
         # the last in step order first: when it has answered, most others have, and this process wakes up once
-        for link in reversed(links):
-            yield from self._from_link(link, waiting, wait=link is links[-1])
+        for host in reversed(hosts):
+            yield from self._from_link(host, waiting, wait=host == hosts[-1])
 
     def ready(self, waiting: Sequence[str]) -> Iterator[str]:
         """Yield those of `waiting` that report to be ready; raises ParticipantError if one has failed."""
-        for link in self._links.values():
-            for planned, *_ in self._from_link(link, waiting, wait=False):
+        for host in self._links:
+            for planned, *_ in self._from_link(host, waiting, wait=False):
                 yield planned.name
         for planned, *_ in self.look(waiting):
             yield planned.name
@@ -99,8 +99,10 @@ class AckReceiver:
         while (sample := self._subscriber.try_recv()) is not None:
             yield from self._from_zenoh(sample, waiting)
 
-    def _from_link(self, link: HubLink, waiting: Sequence[str], *, wait: bool) -> Iterator[Accepted]:
-        for name, payload in link.acks(wait=wait):
+    def _from_link(self, host: str, waiting: Sequence[str], *, wait: bool) -> Iterator[Accepted]:
+        report = self._links[host].report(wait=wait)
+        self._take_vectors(host, report.vectors)
+        for name, payload in report.acks:
             key = self._keys.ack(name)
             try:
                 accepted = self._accept(self._planned[key], payload, waiting, signed=True)
@@ -184,7 +186,7 @@ class AckReceiver:
     def _arrived(self) -> Iterator[tuple[str, bytes]]:
         """Yield the participant and the payload of every message of a host that has arrived."""
         for link in self._links.values():
-            while acks := link.acks(wait=False):
+            while acks := link.report(wait=False).acks:
                 yield from acks
         while (sample := self._subscriber.try_recv()) is not None:
             with suppress(MessageError):

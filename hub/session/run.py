@@ -30,6 +30,7 @@ from hub.session.bookkeeping import Bookkeeping
 from hub.session.clock import Clock
 from hub.session.control_server import ControlServer
 from hub.session.first_failure import FirstFailure
+from hub.session.host_vectors import HostVectors
 from hub.session.joined_hosts import JoinedHosts
 from hub.session.observer_reports import ObserverReports
 from hub.session.past import Past
@@ -125,8 +126,9 @@ class Run:
         self.clock = _clock(scenario, plan, spec.live_from or 0)
         self.monitor = Monitor(plan, keys, self.number, Measures(scenario, plan), recorder)
         ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
+        vectors = HostVectors(plan, self.monitor, lambda host: self.joined_hosts.vectors(host))
         self.acks = AckReceiver(
-            session, keys, plan, self.number, self.refusals, ack_keys, self.processes.links
+            session, keys, plan, self.number, self.refusals, ack_keys, self.processes.links, vectors.take
         )
         self.profile = self._profile() if spec.profiled else None
         self.host = self._host()
@@ -147,13 +149,13 @@ class Run:
             self.devices,
             self.observer_reports,
         )
-        watched = list(self.monitor.away.values())
         self.joined_hosts = JoinedHosts(
             scenario,
             plan,
             spec.directory,
             self.number,
-            watched,
+            list(self.monitor.away.values()),
+            self.monitor.sent_with_acks,
             self.fail,
             self.end,
             ack_keys=ack_keys,

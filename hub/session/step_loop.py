@@ -90,7 +90,6 @@ class StepLoop:
                 run.status.publish()
         run.bookkeeping.stop()
         run.acks.end(clock.step)
-        run.host.drain()
         self._wait_for_values()
         self.book_acks()
         if progress is not None:

@@ -6,7 +6,6 @@ for a tag, never for "the newest", so that the result does not depend on timing 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -83,22 +82,11 @@ class Cell:
 
 
 class RemoteCell(Cell):
-    """The values of an output port of a participant in another process; `get` waits for them to arrive.
+    """The values of an output port of a participant in another process; `get` waits for them to arrive."""
 
-    `listener` is called with each of them and its tag, once and in order.
-    """
-
-    def __init__(
-        self,
-        period: int,
-        stride: int,
-        depth: int,
-        receiver: Receiver,
-        listener: Callable[[int, Any], None] | None = None,
-    ) -> None:
+    def __init__(self, period: int, stride: int, depth: int, receiver: Receiver) -> None:
         super().__init__(period, stride, depth)
         self._receiver = receiver
-        self._listener = listener
         self._newest = INITIAL - 1
         self.waiting = False
         """Whether `get` waits for a value now."""
@@ -114,8 +102,6 @@ class RemoteCell(Cell):
         if tag > self._newest:
             self._newest = tag
             self.put(tag, value)
-            if self._listener is not None:
-                self._listener(tag, value)
 
     def take_until(self, tag: int) -> None:
         """Receive what has arrived up to the value of step `tag`, the next one that is read.
@@ -123,11 +109,6 @@ class RemoteCell(Cell):
         A sender waits while too many of its values are not received.
         """
         while self._newest < tag and (arrived := self._receiver.poll()) is not None:
-            self._keep(*arrived)
-
-    def drain(self) -> None:
-        """Receive what has arrived and was not read."""
-        while (arrived := self._receiver.poll()) is not None:
             self._keep(*arrived)
 
     def get(self, tag: int) -> Any:

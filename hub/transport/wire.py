@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import zenoh
 
@@ -117,18 +116,8 @@ class Wire:
         self._publishers.append(publisher)
         return publisher
 
-    def cell(
-        self,
-        planned: PlannedParticipant,
-        port: Port,
-        stride: int,
-        depth: int,
-        listener: Callable[[int, Any], None] | None = None,
-    ) -> RemoteCell:
-        """Return the cell of an output of a participant in another process.
-
-        `listener` is called with each value.
-        """
+    def cell(self, planned: PlannedParticipant, port: Port, stride: int, depth: int) -> RemoteCell:
+        """Return the cell of an output of a participant in another process."""
         if has_lane(port, planned.host, self.host):
             receiver = LaneReceiver(
                 lane_address(self.run, planned.name, port.name, self.host), port, spin=self._spin
@@ -142,18 +131,13 @@ class Wire:
                 self.refusals,
             )
         self._receivers.append(receiver)
-        cell = RemoteCell(planned.period, stride, depth, receiver, listener)
+        cell = RemoteCell(planned.period, stride, depth, receiver)
         self._cells.append(cell)
         return cell
 
     def linked(self) -> bool:
         """Return whether the initial value of every remote cell has arrived."""
         return all(cell.primed() for cell in self._cells)
-
-    def drain(self) -> None:
-        """Receive the values that have arrived and were not read."""
-        for cell in self._cells:
-            cell.drain()
 
     def close(self) -> None:
         """Stop publishing and receiving; the session stays open."""

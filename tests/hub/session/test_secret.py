@@ -224,13 +224,14 @@ def acks(prepare, request):
     with open_session("router", listen=[free_endpoint()]) as session:
         refusals = Refusals()
         links = {"other": HubLink(["there"])} if request.param == "link" else {}
-        receiver = AckReceiver(session, KEYS, plan, 5, refusals, dict.fromkeys(plan.hosts(), HOSTS), links)
+        keys = dict.fromkeys(plan.hosts(), HOSTS)
+        receiver = AckReceiver(session, KEYS, plan, 5, refusals, keys, links, lambda host, vectors: None)
         host = HostLink(*map(os.dup, links["other"].inherited)) if links else None
 
         def publish(hash_, step=3):
             payload = pack_ack(Ack(5, 0, step, (hash_,), (0,), ()))
             if host is not None:
-                host.send_acks([(0, payload)])
+                host.send_report([(0, payload)])
             else:
                 session.put(KEYS.ack("there"), payload, attachment=signature(payload, HOSTS))
 
