@@ -196,6 +196,7 @@ function draw(now) {
   if (dirty && !headset.worn) {
     dirty = false
     if (drawing) scene?.pace(now - last)
+    else scene?.resume()
     if (moved && scene && $("pictures").checked) eyes.look((side, canvas) => scene.look(side, canvas))
     moved = false
     scene?.draw()

@@ -334,6 +334,9 @@ export class Scene {
     this.renderer.setPixelRatio(ratio)
   }
 
+  // It moves again: the many pixels of what stood still would delay the first picture.
+  resume() { this.renderer.setPixelRatio(this.ratio) }
+
   // Nothing moves: draw once with more pixels than there are, so that edges are smooth; `quick`: for somebody whose
   // hands must not wait for that.
   settle(quick = false) {
