@@ -205,7 +205,7 @@ function draw(now) {
     drawnAt = now
   } else if (!headset.worn) {
     drawing = false
-    if (now - drawnAt > STILL_MS) scene?.settle(pilot.leading)
+    if (now - drawnAt > STILL_MS) scene?.settle(session?.kind !== "recording")
   }
   last = now
   if (now - refreshed > REFRESH_MS) { refreshed = now; plots.refresh(); depths.refresh() }

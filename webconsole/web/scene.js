@@ -337,8 +337,8 @@ export class Scene {
   // It moves again: the many pixels of what stood still would delay the first picture.
   resume() { this.renderer.setPixelRatio(this.ratio) }
 
-  // Nothing moves: draw once with more pixels than there are, so that edges are smooth; `quick`: for somebody whose
-  // hands must not wait for that.
+  // Nothing moves: draw once with more pixels than there are, so that edges are smooth; `quick`: not of what runs,
+  // where somebody's hands would wait for that.
   settle(quick = false) {
     const ratio = quick ? this.finest : SMOOTH
     if (this.renderer.getPixelRatio() === ratio) return
