@@ -1,6 +1,6 @@
 """What the page of `trocar view` costs: its server, its size, its frames, and to look an instant up.
 
-python -m bench.webconsole [server] [page] [seek] [step] [--seconds 6] [--minutes 2] [--output FILE]
+python -m bench.webconsole [server] [page] [seek] [step] [--seconds 6] [--minutes 10] [--output FILE]
 
 `server`: processor time of a server process whose source is fed with the whole cart at 60 Hz, an organ of
 1024 nodes and two pictures of 320 x 288 at 30 Hz, for one page and for four, which acknowledge each frame;
@@ -184,10 +184,10 @@ async def _page(port: int, cookie: str, pictures: bool, seconds: float) -> tuple
 def bench_server(seconds: float) -> dict[str, Any]:
     rows: dict[str, Any] = {}
     with served() as server:
-        idle = _share(server, lambda: sleep(seconds / 2))
-        rows["no page"] = {"core_percent": round(idle, 1)}
         cookies = [server.cookie() for _ in range(4)]
         asyncio.run(_page(server.port, cookies[0], True, 3.0))  # the model is built
+        idle = _share(server, lambda: sleep(seconds / 2))
+        rows["no page"] = {"core_percent": round(idle, 1)}
         for pages, pictures in ((1, True), (1, False), (4, True)):
 
             async def look(pages: int = pages, pictures: bool = pictures) -> list[tuple[int, int]]:
@@ -364,7 +364,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*", default=["server", "page", "seek", "step"])
     parser.add_argument("--seconds", type=float, default=6.0)
-    parser.add_argument("--minutes", type=float, default=2.0)
+    parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--output", type=Path)
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()

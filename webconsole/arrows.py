@@ -22,9 +22,19 @@ class BondArrows(NamedTuple):
     force: str
     """A wrench, or the forces at the points."""
 
+    @property
+    def name(self) -> str:
+        """Name of the bond: its motion side."""
+        return self.place.rpartition("/")[0]
+
+    @property
+    def at_one_point(self) -> bool:
+        """Whether there is one point and one force."""
+        return self.place.endswith("/pose")
+
     def rows(self, place: Vector, force: Vector) -> NDArray[np.float32]:
         """Return point (m) and force (N) of each arrow, shape (points, 6), frame `world`."""
-        points = place[:3].reshape(1, 3) if self.place.endswith("/pose") else place.reshape(-1, 3)
+        points = place[:3].reshape(1, 3) if self.at_one_point else place.reshape(-1, 3)
         forces = force[:3].reshape(1, 3) if self.force.endswith("/wrench") else force.reshape(-1, 3)
         return np.hstack([points, forces]).astype(np.float32)
 

@@ -9,7 +9,7 @@ from importlib.resources import files
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
-__all__ = ["asset", "compressed"]
+__all__ = ["asset", "compress_all", "compressed"]
 
 _TYPES = {
     "html": "text/html; charset=utf-8",
@@ -33,6 +33,12 @@ def compressed(content: bytes, kind: str, *, cache: bool = False) -> Response:
     if cache:
         headers["Cache-Control"] = "private, max-age=86400"
     return Response(content, media_type=kind, headers=headers)
+
+
+def compress_all() -> None:
+    """Compress all files of the page before the first request."""
+    for name in _names():
+        _content(name)
 
 
 @cache

@@ -47,6 +47,9 @@ def view(
     read_only: Annotated[
         bool, typer.Option("--read-only", help="The link is that of a viewer, who steers and leads nothing.")
     ] = False,
+    foxglove: Annotated[
+        bool, typer.Option("--foxglove", help="Let Foxglove look at the running session too, read-only.")
+    ] = False,
     with_parent: Annotated[int | None, typer.Option(hidden=True)] = None,
 ) -> None:
     """Show a running session or a recording on a page in the browser.
@@ -56,6 +59,13 @@ def view(
     for package in ("starlette", "uvicorn", "websockets"):
         if find_spec(package) is None:
             raise MissingExtraError("trocar view", "web", package)
+    if foxglove and recording is not None:
+        raise ScenarioError(
+            f"--foxglove is for a running session; Foxglove opens the file of '{recording}' itself"
+        )
+    for package in ("foxglove", "cryptography") if foxglove else ():
+        if find_spec(package) is None:
+            raise MissingExtraError("trocar view --foxglove", "foxglove", package)
     if listen is not None and port is not None:
         raise ScenarioError("--port is on loopback, and the endpoint after --listen has a port of its own")
     from webconsole.serve import serve
@@ -68,6 +78,7 @@ def view(
         listen=listen,
         certificates=certs,
         browse=open_,
+        foxglove=foxglove,
         role="viewer" if read_only else "operator",
         parent=with_parent,
     )

@@ -19,6 +19,7 @@ __all__ = [
     "Lead",
     "Leave",
     "Network",
+    "Prepare",
     "Show",
     "Start",
     "Watch",
@@ -101,6 +102,12 @@ class _Begun(_Command):
     record: bool = True
 
 
+class Prepare(_Command):
+    """Have processes ready: the form of a new session or of a fork is open."""
+
+    do: Literal["prepare"]
+
+
 class Start(_Begun):
     """Start an installed scenario."""
 
@@ -164,7 +171,7 @@ class Hand(_Command):
 
 
 Command = Annotated[
-    Show | At | Control | Network | Watch | Invite | Start | Fork | End | Lead | Leave | Hand,
+    Show | At | Control | Network | Watch | Invite | Prepare | Start | Fork | End | Lead | Leave | Hand,
     Field(discriminator="do"),
 ]
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Command)

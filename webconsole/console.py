@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from hub.devices.network_link_control import NetworkLinkRequest
+from hub.planning import registry
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError, ScenarioError
+from schemas.trocar_msgs import ScoreCard
 from webconsole.commands import Control, Fork, Network, Start
 from webconsole.fork import fork_arguments
-from webconsole.frame import Section, SectionKind
+from webconsole.frame import Section, SectionKind, pose_content
 from webconsole.live import Live
 from webconsole.log import card_of
 from webconsole.pilot import Pilots
@@ -48,7 +50,7 @@ class Console:
                 return None
             if generation != self._generation:
                 self._stage = await asyncio.to_thread(Stage, scenario, self.source.outlets)
-                await asyncio.to_thread(lambda: self._stage and self._stage.geometry)
+                await asyncio.to_thread(lambda: self._stage and self._stage.packed)
                 self._generation, self._made = generation, {}
             return self._stage
 
@@ -72,8 +74,8 @@ class Console:
         (value,) = [*values.values()][-1:]
         held = self._made.get(participant)
         if held is None or held[0] is not value:
-            poses = stage.poses(participant, values).astype("<f4")
-            section = Section(SectionKind.POSES, [*stage.scenes].index(participant), poses.tobytes())
+            content = pose_content(stage.poses(participant, values))
+            section = Section(SectionKind.POSES, [*stage.scenes].index(participant), content)
             held = self._made[participant] = value, section
         return held[1]
 
@@ -90,6 +92,14 @@ class Console:
         whole_ns = {key: f"{given[key] * 1e9:.0f} ns" for key in ("delay", "jitter") if key in given}
         request = NetworkLinkRequest.model_validate(given | whole_ns)
         await asyncio.to_thread(live.change_link, request)
+
+    async def prepare(self) -> None:
+        """Have processes ready for a session that is about to be started from here."""
+        kinds: set[str] = set()
+        if isinstance(self.source, Recorded) and self.source.scenario is not None:
+            kinds = {one.kind for one in self.source.scenario.participants.values()} & set(registry.kinds())
+        modules = ["hub.fork", *sorted(registry.find(kind).entry.module for kind in kinds)]
+        await asyncio.to_thread(self.started.prepare, modules)
 
     async def fork(self, order: Fork) -> int:
         """Start a fork of the recording and return its number; raises MessageError or ScenarioError."""
@@ -123,7 +133,8 @@ class Console:
             raise MessageError("this page shows a running session; its recording has a timeline")
         return self.source
 
-    def card(self) -> dict[str, Any] | None:
-        """Return the newest score card, ready for JSON; None if there is none."""
-        card = self.source.card if isinstance(self.source, Live) else None
+    def card(self, time_ns: int | None) -> dict[str, Any] | None:
+        """Return the newest score card at a simulated time, ready for JSON; None if there is none."""
+        names = [one.name for one in self.source.outlets if one.port.type == ScoreCard.ros_type]
+        card = self.source.newest(names[0], time_ns) if names else None
         return None if card is None else card_of(card)

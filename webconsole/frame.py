@@ -14,12 +14,24 @@ from collections.abc import Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from schemas.errors import MessageError
 
-__all__ = ["VERSION", "Section", "SectionKind", "acknowledged", "frame", "sections"]
+__all__ = [
+    "VERSION",
+    "Section",
+    "SectionKind",
+    "acknowledged",
+    "frame",
+    "node_content",
+    "pose_content",
+    "sections",
+]
 
 MAGIC = b"TRCF"
-VERSION = 1
+VERSION = 2
 _HEAD = struct.Struct("<4sHHqII")
 _SECTION = struct.Struct("<HHI")
 _ACK = struct.Struct("<I")
@@ -30,11 +42,11 @@ class SectionKind(IntEnum):
     """What a section holds; its index counts what the page knows of that kind."""
 
     POSES = 1
-    """f32 (bodies, 7): position and quaternion (x, y, z, w), of a scene."""
+    """Of the bodies of a scene: `pose_content`."""
     SURFACE = 2
     """u32 (f, 3): triangles of a soft surface, before its first nodes."""
     NODES = 3
-    """f32 (n, 3): the nodes of a soft surface."""
+    """The nodes of a soft surface: `node_content`."""
     PICTURE = 4
     """A compressed picture as it was published."""
     SAMPLE = 5
@@ -54,6 +66,27 @@ class Section(NamedTuple):
     place: int
     """Its index."""
     content: bytes
+
+
+def pose_content(poses: NDArray[np.float32]) -> bytes:
+    """Return positions, f32 (bodies, 3), and quaternions (x, y, z, w), i16 (bodies, 4), 32767 being 1.
+
+    A part 1 m from the origin of its body is drawn 30 um aside at most. `poses`: shape (bodies, 7).
+    """
+    turns: NDArray[np.int16] = np.rint(32767.0 * poses[:, 3:]).astype("<i2")
+    return poses[:, :3].astype("<f4").tobytes() + turns.tobytes()
+
+
+def node_content(nodes: NDArray[np.float32]) -> bytes:
+    """Return least node and step, f32 (3,) each, and the steps from there to each node, u16 (3, n).
+
+    In an organ of 200 mm a node is 1.5 um aside at most. `nodes`: shape (n, 3).
+    """
+    columns = np.ascontiguousarray(nodes.T)
+    low, high = columns.min(axis=1, keepdims=True), columns.max(axis=1, keepdims=True)
+    step = np.maximum((high - low) / np.float32(65535.0), np.float32(1e-12))
+    steps: NDArray[np.uint16] = np.rint((columns - low) / step).astype("<u2")
+    return low.astype("<f4").tobytes() + step.astype("<f4").tobytes() + steps.tobytes()
 
 
 def frame(number: int, time_ns: int, parts: Sequence[Section]) -> bytes:

@@ -62,6 +62,8 @@ class Gate:
         self._cookie = f"{'__Host-' if self._secure else ''}trocar_{urlsplit(origins[0]).port or ''}"
         self._invited: dict[str, Role] = {}
         self._in: dict[str, Role] = {}
+        self._links: dict[str, str] = {}
+        """By the path of a WebSocket: the token that opens it without a cookie."""
         self._log = TokenBucket(_LOGGED_PER_S)
 
     def invite(self, role: Role) -> str:
@@ -70,14 +72,25 @@ class Gate:
         self._invited[token] = role
         return f"/?token={token}"
 
+    def link(self, path: str) -> str:
+        """Return a path, with its token, of a WebSocket that programs without cookies may open to look.
+
+        The token is the whole of the secret, so such a link works again and again, and whatever the origin.
+        """
+        token = self._links.setdefault(path, secrets.token_urlsafe(_TOKEN_BYTES))
+        return f"{path}?token={token}"
+
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Check a request, and pass it on or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        problem = self._foreign(scope, headers)
         token = parse_qs(scope["query_string"].decode("ascii", "replace")).get("token", [""])[0]
+        if scope["type"] == "websocket" and scope["path"] in self._links:
+            await self._linked(token, headers, scope, receive, send)
+            return
+        problem = self._foreign(scope, headers)
         if not problem and token and scope["type"] == "http":
             await self._admit(token, self._role(headers), scope, receive, send)
             return
@@ -97,11 +110,26 @@ class Gate:
 
         await self._app(scope, receive, with_headers if scope["type"] == "http" else send)
 
+    async def _linked(
+        self, token: str, headers: Mapping[str, str], scope: Scope, receive: Receive, send: Send
+    ) -> None:
+        """Let a program in by a link."""
+        known = secrets.compare_digest(self._links[scope["path"]].encode(), token.encode())
+        why = self._not_this_host(headers) or ("" if known else "this link is not this server's")
+        if why:
+            await self._refuse(why, scope, receive, send)
+            return
+        scope.setdefault("state", {})["role"] = "viewer"
+        await self._app(scope, receive, send)
+
+    def _not_this_host(self, headers: Mapping[str, str]) -> str:
+        host = headers.get("host", "")
+        return "" if host in self._hosts else f"host {host[:80]!r} is not this server's"
+
     def _foreign(self, scope: Scope, headers: Mapping[str, str]) -> str:
         """Return why a request does not come from this server's page; empty if it does."""
-        host = headers.get("host", "")
-        if host not in self._hosts:
-            return f"host {host[:80]!r} is not this server's"
+        if elsewhere := self._not_this_host(headers):
+            return elsewhere
         origin = headers.get("origin")
         if origin is None and scope["type"] == "websocket":
             return "no origin: this is for the page alone"

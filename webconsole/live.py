@@ -37,7 +37,8 @@ from schemas.keys import Keys, topic
 from schemas.network_link import NetworkLinkSpec
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import ScoreCard, SessionStatus
-from webconsole.log import LOGGED, Entry, entries_of
+from webconsole.gauges import HUB, hub_outlets
+from webconsole.log import LOGGED, Entries, Entry
 from webconsole.past import Past
 from webconsole.source import Outlet, Value
 
@@ -76,7 +77,7 @@ class Live:
         self._links: dict[str, NetworkLinkSpec] = {}
         self._entries: deque[tuple[int, Entry]] = deque(maxlen=_ENTRIES_KEPT)
         self._numbered = 0
-        self.card: Value | None = None
+        self._lines = Entries()
         self.joined: Callable[[str, Plan], None] = lambda _endpoint, _plan: None
         """Is called with endpoint and plan of each session that is reached."""
         self.left_out: Callable[[], set[int]] = set
@@ -90,6 +91,8 @@ class Live:
         self._run = self._late = 0
         self._late_s = 0.0
         self._device_keys: set[str] = set()
+        self._untagged: set[str] = set()
+        """Participants whose messages do not say of which simulated time they are."""
         self._session: zenoh.Session | None = None
         self._keys = Keys("none")
         self._subscribers: dict[str, zenoh.Subscriber[None]] = {}
@@ -255,20 +258,24 @@ class Live:
 
     def _begin(self, session: zenoh.Session, keys: Keys, described: DescribeReply, *, here: bool) -> None:
         self._values, self._firsts = {}, {}
-        self._status, self.card, self._late = None, None, 0
+        self._status, self._late, self._lines = None, 0, Entries()
         self._run, self._keys = described.run, keys
         self.scenario, self.recording = described.scenario, described.recording
         self.past = Past(Path(described.recording)) if described.recording and here else None
-        self.outlets = tuple(
-            Outlet(planned.name, port, live=planned.role != "device" or not planned.simulated_time)
-            for planned in described.plan.participants.values()
-            for port in planned.ports
-            if port.causality == "output"
+        self.outlets = (
+            *(
+                Outlet(planned.name, port, live=planned.role != "device" or not planned.simulated_time)
+                for planned in described.plan.participants.values()
+                for port in planned.ports
+                if port.causality == "output"
+            ),
+            *hub_outlets(described.scenario),
         )
         self._by_name = {one.name: one for one in self.outlets}
         self._device_keys = {
             planned.name for planned in described.plan.participants.values() if planned.role == "device"
         }
+        self._untagged = self._device_keys | {HUB}
         self._links = {
             name: described.plan.participants[name].network_link or NetworkLinkSpec()
             for name in sorted(self._device_keys)
@@ -293,13 +300,15 @@ class Live:
             outlet = self._by_name[name]
             key = (
                 self._output_key(outlet)
-                if outlet.participant in self._device_keys
+                if outlet.participant in self._untagged
                 else self._keys.view(outlet.participant, outlet.port.name)
             )
             take = Callback(partial(self._take, outlet), indirect=False)
             self._subscribers[name] = session.declare_subscriber(key, take)
 
     def _output_key(self, outlet: Outlet) -> str:
+        if outlet.participant == HUB:
+            return f"{self._keys.prefix}/{HUB}/{outlet.port.name}"
         role = "device" if outlet.participant in self._device_keys else "engine"
         return self._keys.output(role, outlet.participant, outlet.port.name)
 
@@ -311,7 +320,7 @@ class Live:
     def _take(self, outlet: Outlet, sample: zenoh.Sample) -> None:
         """Keep a value; it is decoded when a frame needs it."""
         payload = sample.payload.to_bytes()
-        if outlet.participant in self._device_keys:
+        if outlet.participant in self._untagged:
             status = self._status
             value = Value(0 if status is None else status.sim_time_ns, payload)
         else:
@@ -327,11 +336,9 @@ class Live:
                 if outlet.name in self._values:
                     return
         self._values[outlet.name] = value
-        if outlet.port.type == ScoreCard.ros_type:
-            self.card = value
-        elif outlet.port.type in LOGGED:
+        if outlet.port.type in LOGGED:
             try:
-                for entry in entries_of(outlet, value):
+                for entry in self._lines.of(outlet, value):
                     self._note(entry)
             except MessageError as error:
                 self._note(Entry(value.time_ns / 1e9, "warn", outlet.name, f"not shown: {error}"))

@@ -11,7 +11,7 @@ from schemas.ros import DiagnosticStatus
 from schemas.trocar_msgs import ScoreCard, TaskEvent, TissueGrasp
 from webconsole.source import Outlet, Value
 
-__all__ = ["LOGGED", "Entry", "card_of", "entries_of"]
+__all__ = ["LOGGED", "Entries", "Entry", "card_of"]
 
 Level = Literal["info", "warn", "error"]
 
@@ -37,8 +37,24 @@ class Entry(NamedTuple):
         return {"time": self.time_s, "level": self.level, "source": self.source, "text": self.text}
 
 
-def entries_of(outlet: Outlet, value: Value) -> Iterator[Entry]:
-    """Yield the lines of one message, none if its type has none; raises MessageError if it is not valid."""
+class Entries:
+    """Makes lines of messages, in the order in which they were published."""
+
+    def __init__(self) -> None:
+        self._states: dict[str, str] = {}
+        """Of each state that is published again and again: its last line."""
+
+    def of(self, outlet: Outlet, value: Value) -> Iterator[Entry]:
+        """Yield the lines of one message that say something new; raises MessageError if it is not valid."""
+        for entry in _entries(outlet, value):
+            if outlet.port.type == OperatingState.ros_type:
+                if self._states.get(outlet.name) == entry.text:
+                    continue
+                self._states[outlet.name] = entry.text
+            yield entry
+
+
+def _entries(outlet: Outlet, value: Value) -> Iterator[Entry]:
     if outlet.port.type not in LOGGED:
         return
     message, at = decode(message_type(outlet.port.type), value.payload), value.time_ns / 1e9

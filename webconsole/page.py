@@ -24,6 +24,7 @@ from webconsole.commands import (
     Lead,
     Leave,
     Network,
+    Prepare,
     Show,
     Start,
     Watch,
@@ -154,6 +155,8 @@ class Page:
             case Network():
                 await self._console.network(order)
                 return {}
+            case Prepare():
+                await self._console.prepare()
             case Fork():
                 return {"number": await self._console.fork(order)}
             case Start():
@@ -205,13 +208,13 @@ class Page:
                 "is": "state",
                 **source.state,
                 "pilots": self._console.pilots.state(self),
+                "card": self._console.card(self._at_ns),
             }
             if self._role == "operator":  # their links are an operator's
                 content["started"] = self._console.started.as_json()
             if isinstance(source, Live):
                 self._lines, lines = source.entries_after(self._lines)
                 content["log"] = [entry.as_json() for entry in lines]
-                content["card"] = self._console.card()
             await self._tell(content)
             await asyncio.sleep(_STATE_S)
 
@@ -239,7 +242,7 @@ class Page:
         stage = self._stage
         if stage is not None:
             pictures = stage.pictures if self._show.pictures else ()
-            numbers = (name for name in self._show.numbers if name in stage.numbers)
+            numbers = (name for name in self._show.numbers if stage.is_numeric(name))
             self._console.want(self, stage.shown.union(pictures, numbers))
 
     async def _frames(self) -> None:
@@ -294,7 +297,7 @@ class Page:
         for name in stage.pictures if self._show.pictures else ():
             yield from self._changed_section(stage, name)
         for index, name in enumerate(self._show.numbers):
-            value = self._newest(name) if name in stage.numbers else None
+            value = self._newest(name) if stage.is_numeric(name) else None
             if value is not None and self._are_new({name: value}):
                 yield stage.sample(index, name, value)
 

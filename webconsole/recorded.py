@@ -19,7 +19,10 @@ from schemas.ports import Port
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import SessionStatus
 from schemas.vectors import Vector
-from webconsole.log import LOGGED, Entry, entries_of
+from webconsole.arrows import BondArrows
+from webconsole.gauges import GAUGES, HUB, hub_outlets
+from webconsole.log import LOGGED, Entries, Entry
+from webconsole.pyramid import Pyramid
 from webconsole.source import Outlet, Value
 
 __all__ = ["Recorded"]
@@ -44,6 +47,7 @@ class Recorded:
         self._topics: dict[str, str] = {}
         self.outlets = tuple(self._find_outlets())
         self._series = lru_cache(maxsize=_SERIES_KEPT)(self._read_series)
+        self._pyramid = lru_cache(maxsize=_SERIES_KEPT)(self._read_pyramid)
 
     def _find_outlets(self) -> Iterator[Outlet]:
         """Yield the recorded outputs: as they were declared, else as their first messages show them."""
@@ -63,6 +67,10 @@ class Recorded:
             if port is None or port.type != type_name:
                 port = output_port(port_name, type_name, first.payload)
             yield Outlet(participant, port)
+        for outlet in hub_outlets(self.scenario) if self.scenario else ():
+            if (name := f"/{HUB}/{outlet.port.name}") in recorded.topics:
+                self._topics[outlet.name] = name
+                yield outlet
 
     @cached_property
     def state(self) -> Mapping[str, Any]:
@@ -103,14 +111,21 @@ class Recorded:
         greatest of each column in each bucket are kept, so that no peak is lost. Raises RecordingError.
         """
         with self._lock:
-            series = self._series(name)
-            times, values = series.time, series.values
-        if not len(times):
-            return [], np.zeros((0, 1))
-        columns = list(series.columns) if values.shape[1] > 1 else [""]
-        first, last = np.searchsorted(times, [start_s, end_s])
-        first, last = max(0, int(first) - 1), min(len(times), int(last) + 1)  # lines go on beyond the plot
-        return columns, reduced(times[first:last], values[first:last], buckets)
+            columns, pyramid = self._pyramid(name)
+        return columns, pyramid.rows(start_s, end_s, buckets)
+
+    def pressed(self, bond: BondArrows, most: int) -> Vector:
+        """Return rows of time (s), point (m) and force (N) of a bond that acts at one point, shape (n, 7).
+
+        Of more than `most`, each second, third, ... one. Raises RecordingError.
+        """
+        with self._lock:
+            place, force = self._series(bond.place), self._series(bond.force)
+        at = np.searchsorted(place.time, force.time, "right") - 1
+        every = slice(None, None, -(-len(at) // most) or 1)
+        at, times, forces = at[every], force.time[every], force.values[every, :3]
+        known = at >= 0
+        return np.column_stack([times, place.values[at, :3], forces])[known]
 
     def _read_series(self, name: str) -> Series:
         if name not in self.recording:
@@ -119,18 +134,30 @@ class Recorded:
         series.values  # noqa: B018  # read it here, within the lock
         return series
 
+    def _read_pyramid(self, name: str) -> tuple[list[str], Pyramid]:
+        participant, _, port = name.partition(".")
+        if participant != HUB or name not in self._topics:
+            series = self._series(name)
+            columns = list(series.columns) if series.values.shape[1] > 1 else [""]
+            return columns, Pyramid(series.time, series.values)
+        gauge = GAUGES[self.recording.topics[self._topics[name]]]
+        messages = [*self.recording.messages(f"/{HUB}/{port}")]
+        times, values = [one.time_ns / 1e9 for one in messages], [gauge.read(one.payload) for one in messages]
+        return list(gauge.columns), Pyramid(np.array(times), np.array(values))
+
     @cached_property
     def events(self) -> list[Entry]:
         """What happened: in tasks, with tissue, to devices, and when inputs were lost; by time."""
-        found = [*self._messages(), *self._contacts(), *self._stale()]
+        found = [*self._messages(), *self._contacts(), *self._stale(), *self._statuses()]
         return sorted(found, key=lambda one: one.time_s)
 
     def _messages(self) -> Iterator[Entry]:
+        lines = Entries()
         for outlet in self.outlets:
             if outlet.port.type not in LOGGED:
                 continue
             for message in self.recording.messages(self._topics[outlet.name]):
-                yield from entries_of(outlet, Value(message.time_ns, message.payload))
+                yield from lines.of(outlet, Value(message.time_ns, message.payload))
 
     def _contacts(self) -> Iterator[Entry]:
         """Yield when something was touched and let go: the wrench of a bond's force side."""
@@ -156,19 +183,16 @@ class Recorded:
                     text = "is stale: the arm holds" if sample.stale else "is there again"
                     yield Entry(grant.start_ns / 1e9, "warn" if sample.stale else "info", name, text)
 
+    def _statuses(self) -> Iterator[Entry]:
+        """Yield late steps and refused messages, at the status before which they were."""
+        late = refused = 0
+        for time_ns, status in self.recording.statuses():
+            more_late, more_refused = status.late_steps - late, status.dropped_messages - refused
+            if more_late > 0:
+                yield Entry(time_ns / 1e9, "warn", "session", f"{more_late} late steps")
+            if more_refused > 0:
+                yield Entry(time_ns / 1e9, "warn", "session", f"{more_refused} messages refused")
+            late, refused = status.late_steps, status.dropped_messages
+
     def close(self) -> None:
         """Files are opened for each look alone."""
-
-
-def reduced(times: Vector, values: Vector, buckets: int) -> Vector:
-    """Return rows of time and values, shape (n, 1 + columns), with least and greatest of each bucket."""
-    count = len(times)
-    if count <= 2 * buckets:
-        return np.column_stack([times, values])
-    edges = np.linspace(0, count, buckets + 1).astype(np.int64)[:-1]
-    low, high = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
-    rows = np.empty((2 * buckets, 1 + values.shape[1]))
-    middles = np.append(edges[1:], count)
-    rows[0::2, 0], rows[1::2, 0] = times[edges], times[(edges + middles) // 2]
-    rows[0::2, 1:], rows[1::2, 1:] = low, high
-    return rows

@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 import webbrowser
 from contextlib import ExitStack
+from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from hub.command_line.display import console as terminal
 from hub.hosting.end_with_parent import end_with_parent
@@ -23,7 +25,13 @@ from webconsole.server import Server
 
 __all__ = ["opened_recording", "serve"]
 
+if TYPE_CHECKING:
+    from webconsole.foxglove.face import Face
+
 log = logging.getLogger(__name__)
+
+_FOXGLOVE = "/foxglove"
+"""Path of its WebSocket."""
 
 
 def serve(
@@ -35,6 +43,7 @@ def serve(
     listen: str | None = None,
     certificates: Path | None = None,
     browse: bool = True,
+    foxglove: bool = False,
     role: Role = "operator",
     parent: int | None = None,
 ) -> None:
@@ -48,6 +57,7 @@ def serve(
         listen: Where to listen to other machines, such as tls/0.0.0.0:8470; None: on loopback alone.
         certificates: For that, the hub's certificate or its directory; None: the directory of this user.
         browse: Open the page in a browser.
+        foxglove: Let Foxglove look too, by a link of its own.
         role: What the holder of the printed link may do.
         parent: The process of the hub, with which this one ends.
 
@@ -60,7 +70,7 @@ def serve(
         listening = on_loopback(port) if listen is None else with_tls(listen, certificates)
         stack.enter_context(listening.socket)
         source = Live(endpoint, session, parent) if recording is None else opened_recording(recording, stack)
-        _serve(source, listening, role, browse=browse)
+        _serve(source, listening, role, browse=browse, foxglove=foxglove)
 
 
 def opened_recording(recording: Path, stack: ExitStack) -> Recorded:
@@ -74,9 +84,13 @@ def opened_recording(recording: Path, stack: ExitStack) -> Recorded:
         return Recorded(whole)
 
 
-def _serve(source: Live | Recorded, listening: Listening, role: Role, *, browse: bool) -> None:
+def _serve(
+    source: Live | Recorded, listening: Listening, role: Role, *, browse: bool, foxglove: bool
+) -> None:
     pilots = Pilots()
-    server = Server(Console(source, pilots), listening)
+    console = Console(source, pilots)
+    face = _foxglove(console) if foxglove else None
+    server = Server(console, listening, {} if face is None else {_FOXGLOVE: face.relay})
     link = f"{listening.origins[0]}{server.gate.invite(role)}"
     hosted = HostedDevices(pilots)
     if isinstance(source, Live):
@@ -91,6 +105,10 @@ def _serve(source: Live | Recorded, listening: Listening, role: Role, *, browse:
                 f"a browser warns unless it knows {authority}; go on only if it shows this SHA-256:"
                 f" {fingerprint(listening.certificate)}"
             )
+        if face is not None:
+            address = f"{listening.origins[0].replace('http', 'ws', 1)}{server.gate.link(_FOXGLOVE)}"
+            _say(f"Foxglove: open a connection to {address}")
+            _say(f"and import the layout {files('webconsole.foxglove') / 'layout.json'}")
         if browse:
             webbrowser.open(link)
 
@@ -98,6 +116,15 @@ def _serve(source: Live | Recorded, listening: Listening, role: Role, *, browse:
         server.run(started)
     finally:
         hosted.close()
+        if face is not None:
+            face.close()
+
+
+def _foxglove(console: Console) -> Face:
+    """Return the door to Foxglove, of which the packages may be missing where nobody asks for it."""
+    from webconsole.foxglove.face import Face
+
+    return Face(console)
 
 
 def _say(text: str) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import gzip
-from collections.abc import Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
 from math import isfinite
 
 import uvicorn
@@ -17,8 +17,8 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from hub.planning.scenario_file import installed_scenarios
 from hub.recording.recording import Recording
-from schemas.errors import TrocarError
-from webconsole.assets import asset, compressed
+from schemas.errors import MessageError, TrocarError
+from webconsole.assets import asset, compress_all, compressed
 from webconsole.commands import MOST_BYTES
 from webconsole.console import Console
 from webconsole.fork import fork_form, tree_of
@@ -30,6 +30,7 @@ from webconsole.start import start_form
 __all__ = ["Server"]
 
 _MOST_PAGES = 16
+_AHEAD_S = 0.2
 _MOST_BUCKETS = 4000
 _BINARY = "application/octet-stream"
 
@@ -43,25 +44,39 @@ class _WebSocket(WebSocketsSansIOProtocol):
 
 
 class Server:
-    """Serves the pages of one console."""
+    """Serves the pages of one console.
 
-    def __init__(self, console: Console, listening: Listening) -> None:
+    Args:
+        console: What the pages show.
+        listening: Where.
+        others: What serves other programs, by the path of its WebSocket.
+    """
+
+    def __init__(
+        self,
+        console: Console,
+        listening: Listening,
+        others: Mapping[str, Callable[[WebSocket], Awaitable[None]]] | None = None,
+    ) -> None:
         self._console, self._socket = console, listening.socket
         self.port = listening.port
         self._pages = 0
         app = Starlette(
+            lifespan=self._ahead,
             routes=[
                 Route("/", asset),
                 Route("/web/{name:path}", asset),
                 Route("/scene", self._scene),
                 Route("/series", self._series),
+                Route("/pressed", self._pressed),
                 Route("/events", self._events),
                 Route("/sessions", self._sessions),
                 Route("/start", self._start),
                 Route("/fork", self._fork),
                 Route("/forks", self._forks),
                 WebSocketRoute("/page", self._page),
-            ]
+                *(WebSocketRoute(path, serve) for path, serve in (others or {}).items()),
+            ],
         )
         self.gate = Gate(app, listening.origins)
         self._uvicorn = uvicorn.Server(
@@ -69,7 +84,7 @@ class Server:
                 self.gate,
                 log_level="warning",
                 access_log=False,
-                lifespan="off",
+                lifespan="on",
                 ws=_WebSocket,
                 ws_max_size=MOST_BYTES,
                 ws_per_message_deflate=False,
@@ -95,6 +110,22 @@ class Server:
         """Let `run` return soon; from any thread."""
         self._uvicorn.should_exit = True
 
+    @asynccontextmanager
+    async def _ahead(self, _app: Starlette) -> AsyncGenerator[None]:
+        """Make what can be drawn of each session before the first page asks for it."""
+
+        async def make() -> None:
+            await asyncio.to_thread(compress_all)
+            while True:
+                await self._console.stage()
+                await asyncio.sleep(_AHEAD_S)
+
+        making = asyncio.create_task(make())
+        try:
+            yield
+        finally:
+            making.cancel()
+
     async def _page(self, websocket: WebSocket) -> None:
         if self._pages >= _MOST_PAGES:
             await websocket.close(1013, f"{_MOST_PAGES} pages are open already")
@@ -109,7 +140,7 @@ class Server:
         stage = await self._console.stage()
         if stage is None:
             return PlainTextResponse("no session\n", status_code=404)
-        return compressed(gzip.compress(stage.geometry, 5, mtime=0), _BINARY)
+        return compressed(stage.packed, _BINARY)
 
     async def _series(self, request: Request) -> Response:
         """Answer with the rows of a numeric port of a recording, f64; their columns are in a header."""
@@ -128,6 +159,19 @@ class Server:
         return Response(
             rows.astype("<f8").tobytes(), media_type=_BINARY, headers={"X-Width": str(len(columns) + 1)}
         )
+
+    async def _pressed(self, request: Request) -> Response:
+        """Answer with time, point and force of a bond of a recording, rows of seven f64."""
+        try:
+            recorded, stage = self._console.recorded(), await self._console.stage()
+            name = request.query_params.get("bond")
+            found = [one for one in (stage.arrows if stage else ()) if one.name == name and one.at_one_point]
+            if not found:
+                raise MessageError("no bond of this name acts at one point")
+            rows = await asyncio.to_thread(recorded.pressed, found[0], _MOST_BUCKETS)
+        except TrocarError as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)
+        return Response(rows.astype("<f8").tobytes(), media_type=_BINARY)
 
     async def _events(self, _request: Request) -> Response:
         """Answer with what happened in a recording."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import logging
 import struct
@@ -21,7 +22,8 @@ from schemas.trocar_msgs import ShownMarkers, SoftBodyState
 from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
 from webconsole.felt import felt_wrenches
-from webconsole.frame import Section, SectionKind
+from webconsole.frame import Section, SectionKind, node_content
+from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
 from webconsole.source import Outlet, Value
 
@@ -65,6 +67,8 @@ class Stage:
         self.pictures = tuple(one.name for one in outlets if one.port.type == CompressedImage.ros_type)
         self.numbers = {one.name: VectorCodec(one.port) for one in signals if has_vector(one.port.type)}
         """The numeric outlets."""
+        self.gauges = {one.name: GAUGES[one.port.type] for one in signals if one.port.type in GAUGES}
+        """The outlets of the hub that can be plotted too."""
         self._codecs = {
             f"{participant}.{port}": self.numbers[f"{participant}.{port}"]
             for participant, scene in self.scenes.items()
@@ -113,8 +117,9 @@ class Stage:
     def section(self, name: str, value: Value) -> Section:
         """Return what a frame has of an outlet that is a surface, markers or a picture."""
         if name in self.surfaces:
-            nodes = decode(SoftBodyState, value.payload).nodes_m
-            return Section(SectionKind.NODES, [*self.surfaces].index(name), nodes.astype("<f4").tobytes())
+            nodes = decode(SoftBodyState, value.payload).nodes_m.reshape(-1, 3)
+            content = node_content(nodes) if nodes.size else b""
+            return Section(SectionKind.NODES, [*self.surfaces].index(name), content)
         if name in self.markers:
             content = marker_content(decode(ShownMarkers, value.payload))
             return Section(SectionKind.MARKERS, self.markers.index(name), content)
@@ -130,9 +135,14 @@ class Stage:
             SectionKind.SURFACE, [*self.surfaces].index(name), state.triangles.astype("<u4").tobytes()
         )
 
+    def is_numeric(self, name: str) -> bool:
+        """Return whether an outlet can be plotted."""
+        return name in self.numbers or name in self.gauges
+
     def sample(self, index: int, name: str, value: Value) -> Section:
         """Return time (s) and numbers of a numeric outlet; raises MessageError if they are not valid."""
-        numbers = self.numbers[name].decode(value.payload)
+        gauge = self.gauges.get(name)
+        numbers = self.numbers[name].decode(value.payload) if gauge is None else gauge.read(value.payload)
         row = np.concatenate([[value.time_ns / 1e9], numbers])
         return Section(SectionKind.SAMPLE, index, row.astype("<f8").tobytes())
 
@@ -168,9 +178,28 @@ class Stage:
                     "live": self._outlets[name].live,
                 }
                 for name, codec in self.numbers.items()
+            ]
+            + [
+                {
+                    "name": name,
+                    "columns": gauge.columns,
+                    "units": gauge.units,
+                    "unit": "",
+                    "type": self._outlets[name].port.type,
+                    "frame": "",
+                    "text": gauge.text,
+                    "live": True,
+                }
+                for name, gauge in self.gauges.items()
             ],
+            "bonds": [{"name": bond.name, "one": bond.at_one_point} for bond in self.arrows],
             "notes": self.notes,
         }
+
+    @cached_property
+    def packed(self) -> bytes:
+        """The geometry, compressed by gzip."""
+        return gzip.compress(self.geometry, 5, mtime=0)
 
     @cached_property
     def geometry(self) -> bytes:

@@ -6,31 +6,69 @@ import logging
 import re
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from importlib.metadata import entry_points
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import sleep
-from typing import IO, Any
+from typing import Any
 
-from hub.remote.live_sessions import live_sessions
+import zenoh
+
+from hub.remote.hub_connection import listens, reach
+from hub.security.credentials import OBSERVER
 from hub.transport.hub_files import running_hubs
-from schemas.errors import MessageError
+from schemas.codec import decode
+from schemas.errors import ConnectError, MessageError
+from schemas.keys import Keys
 from schemas.scenario import Scenario
+from schemas.trocar_msgs import SessionStatus
+from webconsole.ready import ReadyProcess
+from webconsole.stage import GROUP
 
 __all__ = ["Started", "StartedSession", "page_devices", "recorded_in"]
 
 log = logging.getLogger(__name__)
 
-_TROCAR = (sys.executable, "-P", "-m", "trocar")
+_COMMAND = "hub.command_line"
 _MOST = 4
 """Sessions that may run at once: each takes a core and more."""
-_LOOK_S = 0.25
+_LOOK_S = 0.1
 _PATIENCE_S = 5.0
 _MOST_SAID = 4000
 _PAGE_DEVICE = "{kind: browser, host: remote}"
 _LINK = re.compile(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+")
+
+
+class Ready:
+    """The processes of a session to come, hub and page, which wait for their arguments.
+
+    Args:
+        modules: What the hub's process imports meanwhile.
+    """
+
+    def __init__(self, modules: Sequence[str]) -> None:
+        self._directory = TemporaryDirectory()
+        with self.said("hub").open("wb") as hub, self.said("page").open("wb") as page:
+            self.hub = ReadyProcess((_COMMAND, *modules), hub)
+            self.page = ReadyProcess((_COMMAND, "webconsole.serve", *_scenes()), page)
+
+    def said(self, process: str) -> Path:
+        """Return the file with what `hub` or `page` says."""
+        return Path(self._directory.name, process)
+
+    def close(self) -> None:
+        """Let those end that did not get arguments."""
+        for one in (self.hub, self.page):
+            one.close()
+        self._directory.cleanup()
+
+
+def _scenes() -> list[str]:
+    """Return the modules of the scenes that a page may draw."""
+    return sorted({entry.module for entry in entry_points(group=GROUP)})
 
 
 class StartedSession:
@@ -41,17 +79,19 @@ class StartedSession:
         title: What it is, for people.
         arguments: Those of `trocar`, checked.
         live_from_s: Simulated time from which on it is live: before, a past is simulated again.
+        ready: The processes, which wait for their arguments.
     """
 
-    def __init__(self, number: int, title: str, arguments: Sequence[str], live_from_s: float) -> None:
+    def __init__(
+        self, number: int, title: str, arguments: Sequence[str], live_from_s: float, ready: Ready
+    ) -> None:
         self.number, self.title, self.live_from_s = number, title, live_from_s
+        self._ready = ready
         self.time_s = 0.0
         self.error = self.link = ""
         self._asked_to_end = False
-        self._directory = TemporaryDirectory()
         self._viewer: subprocess.Popen[bytes] | None = None
-        with self._said("hub").open("wb") as said:
-            self._hub = _process(arguments, said)
+        self._hub = ready.hub.run(arguments)
         self._thread = threading.Thread(target=self._follow, name=f"session {number}", daemon=True)
         self._thread.start()
 
@@ -93,31 +133,33 @@ class StartedSession:
 
     def _follow(self) -> None:
         """Open the session's page once its hub listens, and watch it to its end."""
-        while not self.ended:
-            hub = next((one for one in running_hubs() if one.pid == self._hub.pid), None)
-            if hub is not None:
-                self._look(hub.endpoint)
-            sleep(_LOOK_S)
+        with ExitStack() as stack:
+            client: zenoh.Session | None = None
+            while not self.ended:
+                hub = next((one for one in running_hubs() if one.pid == self._hub.pid), None)
+                if hub is not None and client is None and listens(hub.endpoint):
+                    with suppress(ConnectError, MessageError, zenoh.ZError):  # it has only begun to listen
+                        client = stack.enter_context(reach(hub.endpoint, OBSERVER))
+                        self._viewer = self._ready.page.run(("view", "--connect", hub.endpoint, "--no-open"))
+                if client is not None:
+                    self._look(client)
+                sleep(_LOOK_S)
         if self._hub.returncode and not self._asked_to_end:
-            said = self._said("hub").read_text(encoding="utf-8", errors="replace")[-_MOST_SAID:]
+            said = self._ready.said("hub").read_text(encoding="utf-8", errors="replace")[-_MOST_SAID:]
             self.error = said.partition("error: ")[2].strip() or said.strip() or "it ended without a word"
         if self._viewer is not None:
             self._viewer.terminate()
             _wait(self._viewer)
-        self._directory.cleanup()
+        self._ready.close()
 
-    def _look(self, endpoint: str) -> None:
-        if self._viewer is None:
-            with self._said("page").open("wb") as said:
-                self._viewer = _process(("view", "--connect", endpoint, "--no-open"), said)
-        if not self.link and (found := _LINK.search(self._said("page").read_text(encoding="utf-8"))):
+    def _look(self, client: zenoh.Session) -> None:
+        if not self.link and (found := _LINK.search(self._ready.said("page").read_text(encoding="utf-8"))):
             self.link = found[0]
         if self.time_s < self.live_from_s:
-            for status in live_sessions([endpoint]):
-                self.time_s = status.sim_time_ns / 1e9
-
-    def _said(self, process: str) -> Path:
-        return Path(self._directory.name, process)
+            for reply in client.get(Keys("*").status, timeout=_PATIENCE_S):
+                if reply.ok is not None:
+                    status = decode(SessionStatus, reply.ok.payload.to_bytes())
+                    self.time_s = status.sim_time_ns / 1e9
 
 
 class Started:
@@ -125,14 +167,31 @@ class Started:
 
     def __init__(self) -> None:
         self._sessions: list[StartedSession] = []
+        self._ready: Ready | None = None
         self._lock = threading.Lock()
+
+    def prepare(self, modules: Sequence[str]) -> None:
+        """Have processes ready for a session that somebody is about to start; `modules`: of its hub."""
+        with self._lock:
+            if self._ready is None and not self._full:
+                self._ready = Ready(modules)
+
+    @property
+    def waiting(self) -> tuple[subprocess.Popen[bytes], ...]:
+        """The processes that are ready for a session."""
+        return () if self._ready is None else (self._ready.hub.process, self._ready.page.process)
+
+    @property
+    def _full(self) -> bool:
+        return sum(not one.ended for one in self._sessions) >= _MOST
 
     def start(self, title: str, arguments: Sequence[str], live_from_s: float = 0.0) -> StartedSession:
         """Start `trocar` with arguments that were checked; raises MessageError if too many run already."""
         with self._lock:
-            if sum(not one.ended for one in self._sessions) >= _MOST:
+            if self._full:
                 raise MessageError(f"{_MOST} sessions that were started here are running: end one first")
-            made = StartedSession(len(self._sessions) + 1, title, arguments, live_from_s)
+            ready, self._ready = self._ready or Ready(()), None
+            made = StartedSession(len(self._sessions) + 1, title, arguments, live_from_s, ready)
             self._sessions.append(made)
         log.info("%s: started from a page", title)
         return made
@@ -157,6 +216,8 @@ class Started:
             one.end()
         for one in self._sessions:
             one.close()
+        if self._ready is not None:
+            self._ready.close()
 
 
 def page_devices(scenario: Scenario, names: Sequence[str]) -> list[str]:
@@ -170,12 +231,6 @@ def recorded_in(parent: Path, stem: str) -> Path:
     """Return a directory for a recording that is not there yet: the stem, or the stem and a number."""
     names = (stem, *(f"{stem}-{number}" for number in range(2, 1000)))
     return next(place for name in names if not (place := parent / name).exists())
-
-
-def _process(arguments: Sequence[str], said: IO[bytes]) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [*_TROCAR, *arguments], stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True
-    )
 
 
 def _wait(process: subprocess.Popen[bytes]) -> None:

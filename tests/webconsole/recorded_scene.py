@@ -44,7 +44,7 @@ SIZES = {
 """Of markers, m, where it is not 5 mm."""
 
 
-def write_scene(directory: Path, steps: int = 60) -> None:
+def write_scene(directory: Path, steps: int = 60, *, pictures: bool = True) -> None:
     """Record `palpation` with an arm that goes down by 1 mm a step from the fifth, and a top that follows.
 
     A page leads the arm, and the force of the block is on its instrument. An endoscope has published one
@@ -53,7 +53,9 @@ def write_scene(directory: Path, steps: int = 60) -> None:
     file = load("palpation", [])
     plan, _ = plan_of(file.scenario, file.params)
     robot, tissue, keys = plan.participants["robot"], plan.participants["tissue"], Keys("palpation")
-    qpos, tip = (VectorCodec(robot.port(name)) for name in ("qpos", "PSM1/tip_wrench"))
+    qpos, tip, pose = (
+        VectorCodec(robot.port(name)) for name in ("qpos", "PSM1/tip_wrench", "PSM1/probe/pose")
+    )
     wrench = VectorCodec(tissue.port("probe/wrench"))
     led = file.scenario.participants | {"hand": ParticipantSpec(kind="browser", host="remote")}
     connections = [*file.scenario.connections, Connection.model_validate("hand.pose -> teleop.master")]
@@ -68,11 +70,12 @@ def write_scene(directory: Path, steps: int = 60) -> None:
             for name, type_ in (
                 ("robot.qpos", qpos.port.type),
                 ("robot.PSM1/tip_wrench", tip.port.type),
+                ("robot.PSM1/probe/pose", pose.port.type),
                 ("tissue.probe/wrench", wrench.port.type),
                 ("tissue.block/nodes", SoftBodyState.ros_type),
             )
         }
-        for eye, colour in EYES.items():
+        for eye, colour in EYES.items() if pictures else ():
             image = recorder.channel(
                 topic(keys.output("engine", "endoscope", f"{eye}/image_raw/compressed")),
                 CompressedImage.ros_type,
@@ -90,6 +93,8 @@ def write_scene(directory: Path, steps: int = 60) -> None:
             force = np.array([0, 0, 50 * depth, 0, 0, 0])
             recorder.write(channels["tissue.probe/wrench"], at, wrench.encode(force, at))
             recorder.write(channels["robot.PSM1/tip_wrench"], at, tip.encode(force, at))
+            place = np.array([0, 0, -depth, 0, 0, 0, 1])
+            recorder.write(channels["robot.PSM1/probe/pose"], at, pose.encode(place, at))
             nodes = CUBE - np.array([0, 0, depth], np.float32) * (CUBE[:, 2:] >= 0)
             state = SoftBodyState(
                 header=Header(stamp=Time.from_ns(at), frame_id="world"),

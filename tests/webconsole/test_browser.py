@@ -110,7 +110,7 @@ def test_a_recording_is_shown(person, served_scene):
 
     one.page.get_by_label("Add a port").fill("robot.qpos")
     one.page.get_by_label("Add a port").press("Enter")
-    one.sees("document.querySelectorAll('.plot').length === 2")
+    one.sees("document.querySelectorAll('.plot').length === 3")
     assert one.page.get_by_text("robot.qpos").is_visible()
     assert {re.sub(r"(:\d+)/.*", r"\1", url) for url in one.requested} == {
         f"http://127.0.0.1:{served_scene.port}"
@@ -132,6 +132,15 @@ def test_both_eyes_are_one_picture_for_red_and_cyan_glasses(person):
     assert one.errors == []
 
 
+PRESSED = """
+async () => {
+  const { Contacts } = await import("/web/depth.js")
+  const contacts = new Contacts(), answer = await fetch("/pressed?bond=robot.PSM1/probe")
+  const rows = new Float64Array(await answer.arrayBuffer())
+  for (let at = 0; at < rows.length; at += 7) contacts.push(...rows.subarray(at, at + 7))
+  return [contacts.lines.length, Math.max(...contacts.lines[0].map(([depth, force]) => force))]
+}
+"""
 MARKED = """
 shape => {
   const box = trocar.scene.robotBox().makeEmpty()
@@ -446,3 +455,34 @@ def still(person):
 
     until(stands, 60.0)
     return place[0]
+
+
+def test_force_against_depth_and_pictures_that_the_page_draws(browser, tmp_path):
+    """Of a recording without pictures; a block is pressed 54 mm deep with 50 N/m."""
+    write_scene(tmp_path / "pressed", pictures=False)
+    with served(Recorded(tmp_path / "pressed")) as server:
+        one = Person(browser, f"http://127.0.0.1:{server.port}{server.gate.invite('viewer')}")
+        one.sees("Boolean(trocar.scene?.placed)")
+        one.page.get_by_role("img", name="force against depth").wait_for()
+        assert one.page.evaluate(PRESSED) == [1, pytest.approx(0.05 * 53, abs=0.2)]
+        assert not one.page.get_by_role("img", name="Picture of").first.is_visible(), "it has no endoscope"
+        assert one.errors == []
+        one.context.close()
+
+
+def test_a_warning_stays_above_the_scene_until_it_is_dismissed(person):
+    one = person()
+    one.sees("Boolean(trocar.session)")
+    one.page.evaluate(
+        """async () => {
+          const { Alerts } = await import("/web/alerts.js")
+          const alerts = new Alerts(document.getElementById("alerts"))
+          const late = (n, time) => ({ time, level: "warn", source: "session", text: `${n} late steps` })
+          alerts.add([late(2, 1), { time: 1, level: "info", source: "task", text: "grasped" }, late(5, 9)])
+        }"""
+    )
+    shown = one.page.locator(".alert")
+    assert shown.count() == 1
+    assert "5 late steps (2 times, last at 9.00 s)" in shown.inner_text()
+    one.page.get_by_role("button", name="Dismiss").click()
+    assert shown.count() == 0

@@ -15,6 +15,7 @@ from tests.webconsole.test_page import answer, run
 from webconsole.commands import Fork
 from webconsole.fork import fork_arguments, fork_form, tree_of
 from webconsole.recorded import Recorded
+from webconsole.started import Started
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +83,20 @@ def test_a_viewer_forks_nothing(table):
         run(body, server, role="viewer")
 
 
+def test_processes_that_wait_for_nothing_end_with_the_server():
+    started = Started()
+    started.prepare(["no.such.module"])
+    started.prepare(["no.such.module"])
+    hub, page = started.waiting
+    started.close()
+    assert (hub.returncode, page.returncode) == (0, 0)
+
+
 def test_a_page_forks_and_follows(table):
     """One fork fails with the words of the command line; another one is live until it is ended."""
 
     async def body(socket):
+        await socket.send('{"do": "prepare"}')  # the form is open
         for changes in (["teleop.scal=0.1"], ["teleop.scale=0.1"]):
             order = {"do": "fork", "time": 0.02, "changes": changes, "duration": 600.0, "pace": "realtime"}
             await socket.send(json.dumps(order))

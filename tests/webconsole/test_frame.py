@@ -11,7 +11,15 @@ from hypothesis import strategies as st
 from schemas.errors import MessageError
 from schemas.ros import Header
 from tests.webconsole.recorded_scene import markers
-from webconsole.frame import Section, SectionKind, acknowledged, frame, sections
+from webconsole.frame import (
+    Section,
+    SectionKind,
+    acknowledged,
+    frame,
+    node_content,
+    pose_content,
+    sections,
+)
 from webconsole.markers import marker_content
 
 PARTS = st.lists(
@@ -25,6 +33,26 @@ def test_a_frame_comes_back(number, time_ns, parts):
     data = frame(number, time_ns, parts)
     assert sections(data) == (number, time_ns, parts)
     assert len(data) % 8 == 0
+
+
+def test_poses_and_nodes_are_as_exact_as_they_say():
+    rng = np.random.default_rng(0)
+    poses = rng.normal(size=(50, 7)).astype(np.float32)
+    poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    data = pose_content(poses)
+    assert np.array_equal(np.frombuffer(data, "<f4", 150).reshape(50, 3), poses[:, :3])
+    turns = np.frombuffer(data, "<i2", offset=600).reshape(50, 4) / 32767.0
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    angle = 2.0 * np.arccos(np.minimum(np.abs((turns * poses[:, 3:]).sum(axis=1)), 1.0))
+    assert angle.max() < 1e-3
+    assert np.abs(turns - poses[:, 3:]).max() < 3e-5
+    nodes = (0.2 * rng.random((300, 3))).astype(np.float32)
+    data = node_content(nodes)
+    low, step = np.frombuffer(data, "<f4", 6).reshape(2, 3)
+    back = low + step * np.frombuffer(data, "<u2", offset=24).reshape(3, 300).T
+    assert np.abs(back - nodes).max() < 1.6e-6
+    flat = np.frombuffer(node_content(np.zeros((2, 3), np.float32)), "<u2", offset=24)
+    assert not flat.any()
 
 
 @settings(max_examples=40)

@@ -3,17 +3,17 @@
 import asyncio
 import json
 import struct
-from contextlib import ExitStack, asynccontextmanager, suppress
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, suppress
 
 import numpy as np
 import pytest
 from websockets.asyncio.client import connect
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from tests.webconsole.conftest import finish
 from tests.webconsole.test_gate import Visitor
 from webconsole.frame import SectionKind, sections
-from webconsole.recorded import Recorded, reduced
+from webconsole.recorded import Recorded
 from webconsole.serve import opened_recording
 
 
@@ -146,6 +146,17 @@ def test_a_page_that_sends_too_much_is_closed(console_of_recording):
     run(body, console_of_recording)
 
 
+def test_a_seventeenth_page_is_refused(console_of_recording):
+    async def body(_):
+        async with AsyncExitStack() as stack:
+            for _ in range(15):
+                await stack.enter_async_context(opened(console_of_recording))
+            with pytest.raises(InvalidStatus, match="403"):
+                await stack.enter_async_context(opened(console_of_recording))
+
+    run(body, console_of_recording)
+
+
 def test_a_message_that_is_too_long_ends_the_connection(console_of_recording):
     async def body(socket):
         await socket.send("x" * 20_000)
@@ -153,15 +164,6 @@ def test_a_message_that_is_too_long_ends_the_connection(console_of_recording):
         assert socket.close_code == 1009
 
     run(body, console_of_recording)
-
-
-def test_reduced_rows_keep_every_peak():
-    times, values = np.arange(10_000) * 0.001, np.zeros((10_000, 2))
-    values[4321, 0], values[777, 1] = 5.0, -3.0
-    rows = reduced(times, values, 100)
-    assert rows.shape == (200, 3)
-    assert (rows[:, 1].max(), rows[:, 2].min()) == (5.0, -3.0)
-    assert np.array_equal(reduced(times[:150], values[:150], 100)[:, 0], times[:150])
 
 
 def test_a_recording_that_was_cut_short_is_shown_as_far_as_it_goes(recording, tmp_path, caplog):

@@ -17,9 +17,11 @@ export class Eyes {
     mode.onchange = () => this.show()
   }
 
-  begin(names) {
+  // `drawn`: none were published, and the page draws them itself, of the scene.
+  begin(names, drawn = false) {
+    this.drawn = drawn
     this.section.hidden = !names.length
-    this.all = names.map((name) => ({ name, ...figure(name.replace("/image_raw/compressed", "")), drawn: 0 }))
+    this.all = names.map((name) => ({ name, ...figure(drawn ? `${name} eye, drawn by this page` : name.replace("/image_raw/compressed", "")), drawn: 0 }))
     this.both = figure("both eyes, for red and cyan glasses")
     this.row.replaceChildren(...this.all.map((eye) => eye.figure), this.both.figure)
     this.mode.hidden = !SIDES.every((side) => names.some((name) => name.includes(side)))
@@ -49,6 +51,16 @@ export class Eyes {
     const next = eye.next
     eye.next = null
     if (next) this.take(index, next)
+  }
+
+  // Draw the pictures that were not published; `look` draws one onto a canvas.
+  look(look) {
+    if (!this.drawn || this.section.hidden) return
+    for (const eye of this.all) {
+      look(eye.name, eye.canvas)
+      eye.drawn++
+    }
+    this.combine()
   }
 
   // Red of the left picture, green and blue of the right one.

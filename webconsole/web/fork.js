@@ -23,6 +23,7 @@ export class Forks {
     $("fork-time").max = this.timeline.end
     this.error("")
     $("fork").showModal()
+    this.link.send({ do: "prepare" })
     if (!this.offered) await this.offer()
     await this.tree()
   }

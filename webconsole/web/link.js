@@ -7,7 +7,7 @@ export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS 
 
 export function parseFrame(buffer) {
   const view = new DataView(buffer)
-  if (buffer.byteLength < HEAD || view.getUint32(0, true) !== MAGIC || view.getUint16(4, true) !== 1) return null
+  if (buffer.byteLength < HEAD || view.getUint32(0, true) !== MAGIC || view.getUint16(4, true) !== 2) return null
   const sections = []
   let at = HEAD
   for (let left = view.getUint16(6, true); left > 0; left--) {
@@ -16,6 +16,17 @@ export function parseFrame(buffer) {
     at += 8 + size + ((8 - (size % 8)) % 8)
   }
   return { time: Number(view.getBigInt64(8, true)) / 1e9, number: view.getUint32(16, true), sections, buffer }
+}
+
+// Nodes of a surface: least and step (f32, 3 each), then the steps (u16) of all x, all y and all z.
+export function nodesOf(buffer, at, size) {
+  const head = new Float32Array(buffer, at, 6), steps = new Uint16Array(buffer, at + 24, (size - 24) / 2)
+  const count = steps.length / 3, nodes = new Float32Array(steps.length)
+  for (let axis = 0; axis < 3; axis++) {
+    const low = head[axis], step = head[3 + axis], from = axis * count
+    for (let i = 0; i < count; i++) nodes[3 * i + axis] = low + step * steps[from + i]
+  }
+  return nodes
 }
 
 export class Link {

@@ -1,6 +1,8 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
-import { ARROWS, FELT, Link, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { ARROWS, FELT, Link, nodesOf, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { Alerts } from "./alerts.js"
+import { Depths } from "./depth.js"
 import { Eyes } from "./eyes.js"
 import { Feel } from "./feel.js"
 import { Head } from "./head.js"
@@ -34,7 +36,7 @@ const link = new Link({
   session: begin,
   state(state) {
     head.show(state)
-    log.add(state.log)
+    warn(state.log)
     showCard($("card"), state.card)
     headset.show(state.pilots, session?.role)
     pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one), session?.role)
@@ -44,23 +46,24 @@ const link = new Link({
     else if (session) timeline.grow(state, pilot.leading || headset.worn)
   },
   answer(answer) {
-    if (answer.error) log.add([{ time: lastTime, level: "warn", source: `page: ${answer.to || "message"}`, text: answer.error }])
+    if (answer.error) said(`page: ${answer.to || "message"}`, answer.error)
     else if (answer.path) share(answer)
     if (!headset.owns(answer.device)) pilot.answered(answer)
     forks.answered(answer)
     start.answered(answer)
   },
-  trouble({ text }) { log.add([{ time: lastTime, level: "warn", source: "page", text }]) },
+  trouble({ text }) { said("page", text) },
 })
 let lastTime = 0
 const head = new Head(link)
 const feel = new Feel()
 const pilot = new Pilot($("lead"), link, feel)
 const headset = new Headset($("headset"), link, feel, { scene: () => scene, eyes: () => eyes.all, frames: takeFrames,
-  said: (text) => log.add([{ time: lastTime, level: "warn", source: "headset", text }]) })
+  said: (text) => said("headset", text) })
 const log = new Log($("lines"), $("worst"), (time) => { timeline.pause(); timeline.go(time) })
 const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
-  () => log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]))
+  () => said("pictures", "a picture cannot be read"))
+const alerts = new Alerts($("alerts")), depths = new Depths($("depth-list"))
 const network = new Network($("network"), $("links"), link)
 const notices = new Notices($("notice"))
 let past = false // no samples for the plots: an instant of a recording, or of the running session's past
@@ -78,6 +81,13 @@ const plots = new Plots($("plot-list"), $("add"), $("ports"), ask)
 $("pictures").onchange = ask
 $("frames").onchange = () => scene?.frames($("frames").checked)
 
+function warn(entries) {
+  log.add(entries)
+  alerts.add(entries)
+}
+
+function said(source, text) { warn([{ time: lastTime ?? 0, level: "warn", source, text }]) }
+
 function ask(again = false) {
   link.send({ do: "show", numbers: past ? [] : plots.names, pictures: $("pictures").checked, again: again === true })
 }
@@ -90,12 +100,15 @@ async function begin(described) {
   forks.begin(described)
   start.begin(described)
   log.clear()
-  for (const text of described.notes ?? []) log.add([{ time: 0, level: "warn", source: "scene", text }])
+  alerts.clear()
+  for (const text of described.notes ?? []) said("scene", text)
   if (!described.numbers) return
-  eyes.begin(described.pictures)
   notices.clear()
   plots.begin(described.numbers, described.kind === "recording")
+  depths.begin(described.bonds, described.kind === "recording")
   await stage(described)
+  const missing = described.kind === "recording" && !described.pictures.length && scene?.cameras.length
+  eyes.begin(missing ? ["left", "right"] : described.pictures, Boolean(missing))
   ask(true)
   if (timeline.begun && !timeline.live) timeline.go(timeline.time)
 }
@@ -145,15 +158,18 @@ function apply(frame) {
   for (const { kind, index, at, size } of frame.sections) {
     if (kind === SAMPLE) plots.sample(plots.names[index], new Float64Array(frame.buffer, at, size / 8))
     else if (kind === PICTURE) eyes.take(index, new Uint8Array(frame.buffer, at, size))
-    else if (kind === FELT) feel.take(session.felt[index], new Float32Array(frame.buffer, at, 1)[0])
+    else if (kind === ARROWS) {
+      const rows = new Float32Array(frame.buffer, at, size / 4)
+      scene?.arrows(index, rows)
+      if (!past || session.kind === "recording") depths.take(index, frame.time, rows)
+    } else if (kind === FELT) feel.take(session.felt[index], new Float32Array(frame.buffer, at, 1)[0])
     else if (kind === MARKERS) {
       const markers = notices.take(index, markersOf(frame.buffer, at))
       scene?.marked(index, markers)
     } else if (!scene) continue
-    else if (kind === POSES) scene.poses(index, new Float32Array(frame.buffer, at, size / 4))
+    else if (kind === POSES) scene.poses(index, frame.buffer, at, size)
     else if (kind === SURFACE) scene.surface(index, new Uint32Array(frame.buffer, at, size / 4))
-    else if (kind === ARROWS) scene.arrows(index, new Float32Array(frame.buffer, at, size / 4))
-    else if (kind === NODES) scene.nodes(index, new Float32Array(frame.buffer, at, size / 4))
+    else if (kind === NODES) size && scene.nodes(index, nodesOf(frame.buffer, at, size))
   }
 }
 
@@ -169,10 +185,10 @@ function takeFrames() {
   const frames = waiting
   waiting = []
   for (const frame of frames) apply(frame)
-  if (frames.length) { link.acknowledge(frames.at(-1).number); counted += frames.length }
+  if (frames.length) { link.acknowledge(frames.at(-1).number); counted += frames.length; moved = true }
 }
 
-let counted = 0, since = performance.now(), last = since, moved = since, drawing = false
+let counted = 0, since = performance.now(), last = since, drawnAt = since, drawing = false, moved = false
 function draw(now) {
   requestAnimationFrame(draw)
   timeline.tick(now)
@@ -180,16 +196,19 @@ function draw(now) {
   if (dirty && !headset.worn) {
     dirty = false
     if (drawing) scene?.pace(now - last)
+    else scene?.resume()
+    if (moved && scene && $("pictures").checked) eyes.look((side, canvas) => scene.look(side, canvas))
+    moved = false
     scene?.draw()
     drawn++
     drawing = true
-    moved = now
+    drawnAt = now
   } else if (!headset.worn) {
     drawing = false
-    if (now - moved > STILL_MS) scene?.settle()
+    if (now - drawnAt > STILL_MS) scene?.settle(session?.kind !== "recording")
   }
   last = now
-  if (now - refreshed > REFRESH_MS) { refreshed = now; plots.refresh() }
+  if (now - refreshed > REFRESH_MS) { refreshed = now; plots.refresh(); depths.refresh() }
   if (now - since > 1000) {
     $("fps").textContent = String(Math.round((counted * 1000) / (now - since)))
     counted = 0

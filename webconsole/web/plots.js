@@ -128,7 +128,7 @@ class Plot {
       scales: { x: { time: false, range: widened }, y: { range: spread } },
       axes: [{ ...axis, size: 24 }, { ...axis, size: 52, values: (_, ticks) => ticks.map(short) }],
       series: [{}, ...this.columns.map((_, i) => ({ stroke: colour(`--s${i}`), width: 1.25, points: { show: false } }))],
-      hooks: { draw: [(chart) => this.mark(chart, colour("--accent"))], setCursor: [(chart) => this.read(chart.cursor.idx)] },
+      hooks: { setScale: [(chart, key) => { if (key === "x") this.enlarged(chart) }], draw: [(chart) => this.mark(chart, colour("--accent"))], setCursor: [(chart) => this.read(chart.cursor.idx)] },
     }, this.data, this.element.querySelector(".chart"))
     const canvas = this.chart.root.querySelector("canvas")
     canvas.setAttribute("role", "img")
@@ -160,15 +160,40 @@ class Plot {
   }
 
   async load() {
-    const query = new URLSearchParams({ port: this.entry.name, from: "0", to: "1e12", buckets: "1000" })
+    this.whole = await this.between(0, 1e12)
+    if (!this.whole) return
+    this.data = this.whole
+    this.chart?.setData(this.data)
+    this.at(this.instant)
+  }
+
+  // Columns of the recording between two times (s), with least and greatest of each part; null if there are none.
+  async between(from, to) {
+    const query = new URLSearchParams({ port: this.entry.name, from, to, buckets: "1000" })
     const answer = await fetch(`/series?${query}`)
-    if (!answer.ok) { this.element.querySelector(".unit").textContent = await answer.text(); return }
+    if (!answer.ok) { this.element.querySelector(".unit").textContent = await answer.text(); return null }
     const width = Number(answer.headers.get("X-Width")), rows = new Float64Array(await answer.arrayBuffer())
     const count = rows.length / width
     const column = (at) => Array.from({ length: count }, (_, i) => rows[i * width + at])
-    this.data = [column(0), ...this.columns.map(({ at }) => column(at + 1).map(drawable))]
-    this.chart?.setData(this.data)
-    this.at(this.instant)
+    return [column(0), ...this.columns.map(({ at }) => column(at + 1).map(drawable))]
+  }
+
+  // A part of a recording fills the plot: it is read again, in its own detail, and put in place of that part.
+  enlarged({ scales: { x: { min, max } } }) {
+    const times = this.whole?.[0]
+    if (!times || min == null || `${min} ${max}` === this.part || max - min >= times.at(-1) - times[0]) return
+    this.part = `${min} ${max}`
+    clearTimeout(this.reading)
+    this.reading = setTimeout(async () => {
+      const fine = await this.between(min, max)
+      if (!fine || !this.chart || this.part !== `${min} ${max}`) return
+      const [first, last] = [fine[0][0], fine[0].at(-1)]
+      const before = times.findLastIndex((time) => time < first) + 1, after = times.findIndex((time) => time > last)
+      this.data = fine.map((column, i) =>
+        [...this.whole[i].slice(0, before), ...column, ...after < 0 ? [] : this.whole[i].slice(after)])
+      this.chart.setData(this.data, false)
+      this.chart.redraw()
+    }, 100)
   }
 
   at(time) {
@@ -219,8 +244,8 @@ function fields(columns) {
   return found
 }
 
-function unit({ unit: given, type, field }) {
-  if (given) return given
+function unit({ unit: given, units, type, field }) {
+  if (given || units) return given || (units[field] ?? "")
   const kind = type.split("/").at(-1)
   const known = { WrenchStamped: { force: "N", torque: "N m" }, TwistStamped: { linear: "m/s", angular: "rad/s" },
     PoseStamped: { position: "m" }, JointState: { position: "rad, m", velocity: "rad/s, m/s", effort: "N m, N" } }

@@ -5,9 +5,13 @@ import { Orbit } from "./orbit.js"
 import { Markers } from "./markers.js"
 import { creased, gathered, smooth } from "./mesh.js"
 
+const ASIDE_M = 0.1, ASIDE_RAD = 0.5
 const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
-const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5
-const FORCE = 0xf2b705, M_PER_N = 0.02, LONGEST_M = 0.08, LEAST_N = 0.005
+const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5, SMOOTH = 2
+const FORCE = 0xf2b705, M_PER_N = 0.05, LONGEST_M = 0.1, LEAST_N = 0.005
+export const FORCES = 3 // layer of what no endoscope sees; 1 and 2 are the eyes of a headset
+const PICTURE = [320, 256] // of an eye that the page draws itself: the field of view of 5:4, as on the page
+const POINT = new THREE.SphereGeometry(0.0012, 12, 8) // where a force acts
 const LEFT_EYE = "_left_optical" // after a camera's name: controllers and ROS programs name its frame so
 const FLIP = new THREE.Quaternion(1, 0, 0, 0) // from an optical frame (y down, z ahead) to three's camera (y up, -z ahead)
 
@@ -20,14 +24,16 @@ export class Scene {
     this.renderer.setPixelRatio(this.ratio)
     this.interval = 0
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.002, 50)
+    this.camera.layers.enable(FORCES)
     this.choice = "work"
     this.orbit = new Orbit(canvas, (moved) => {
+      this.touched ||= moved
       if (moved && this.choice === "endoscope") this.choose("work")
       this.dirty()
     })
     this.world = new THREE.Scene()
-    this.world.add(new THREE.HemisphereLight(0xffffff, 0x8899a6, 1.7))
-    this.lamp = new THREE.DirectionalLight(0xffffff, 1.6)
+    this.world.add(new THREE.HemisphereLight(0xffffff, 0x6f7f8c, 1.5))
+    this.lamp = new THREE.DirectionalLight(0xffffff, 2)
     this.world.add(this.lamp, this.lamp.target)
     this.clear()
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.ground())
@@ -35,8 +41,19 @@ export class Scene {
   }
 
   ground() {
-    const colour = getComputedStyle(document.documentElement).getPropertyValue("--stage").trim()
-    this.world.background = new THREE.Color(colour)
+    const style = getComputedStyle(document.documentElement), canvas = document.createElement("canvas")
+    const colour = (name) => style.getPropertyValue(name).trim()
+    Object.assign(canvas, { width: 2, height: 64 })
+    const onto = canvas.getContext("2d"), shade = onto.createLinearGradient(0, 0, 0, canvas.height)
+    shade.addColorStop(0, colour("--sky"))
+    shade.addColorStop(1, colour("--stage"))
+    onto.fillStyle = shade
+    onto.fillRect(0, 0, canvas.width, canvas.height)
+    this.world.background?.dispose()
+    this.world.background = new THREE.CanvasTexture(canvas)
+    this.world.background.colorSpace = THREE.SRGBColorSpace
+    this.line = new THREE.Color(colour("--floor"))
+    this.grid?.material.color.copy(this.line)
     this.dirty()
   }
 
@@ -44,7 +61,7 @@ export class Scene {
     this.markers?.clear()
     for (const old of this.owned ?? []) {
       this.world.remove(old)
-      old.traverse((one) => { one.geometry?.dispose(); one.material?.dispose() })
+      old.traverse((one) => { if (one.geometry !== POINT) one.geometry?.dispose(); one.material?.dispose() })
     }
     this.owned = []
     this.bodies = [] // by scene: a group for each body
@@ -56,7 +73,7 @@ export class Scene {
     this.places = new Map() // a group of each frame in which markers may be, by its name on /tf
     this.markers = new Markers((frame) => this.place(frame))
     this.placed = false
-    this.focused = false
+    this.focused = this.touched = false
   }
 
   // `buffer` is what /scene answers: webconsole/stage.py, `geometry`.
@@ -122,12 +139,15 @@ export class Scene {
     return ["work", "robot", ...(this.cameras.length ? ["endoscope"] : []), ...arms]
   }
 
-  poses(index, numbers) {
+  // In a buffer: positions (f32), then quaternions (i16, 32767 is 1).
+  poses(index, buffer, at, size) {
     const groups = this.bodies[index]
-    if (!groups || numbers.length !== 7 * groups.length) return
+    if (!groups || size !== 20 * groups.length) return
+    const places = new Float32Array(buffer, at, 3 * groups.length)
+    const turns = new Int16Array(buffer, at + 12 * groups.length, 4 * groups.length)
     groups.forEach((group, body) => {
-      group.position.fromArray(numbers, 7 * body)
-      group.quaternion.fromArray(numbers, 7 * body + 3)
+      group.position.fromArray(places, 3 * body)
+      group.quaternion.fromArray(turns, 4 * body).normalize()
       group.visible = true
     })
     this.placed = true
@@ -151,6 +171,7 @@ export class Scene {
       surface.mesh = new THREE.Mesh(made, material([...surface.colour, 1], THREE.DoubleSide))
       surface.mesh.frustumCulled = false
       this.own(surface.mesh)
+      this.focused &&= this.touched // the work is where the organ is, unless somebody looks elsewhere
     }
     const { position, normal } = surface.mesh.geometry.attributes
     gathered(positions, surface.origin, position.array)
@@ -166,6 +187,10 @@ export class Scene {
         arrows[i] = new THREE.ArrowHelper(undefined, undefined, 1, FORCE)
         for (const { material } of [arrows[i].line, arrows[i].cone]) material.depthTest = false // inside of organs, too
         arrows[i].line.renderOrder = arrows[i].cone.renderOrder = 1
+        const point = new THREE.Mesh(POINT, arrows[i].cone.material)
+        point.renderOrder = 1
+        arrows[i].add(point)
+        arrows[i].traverse((one) => one.layers.set(FORCES))
         this.own(arrows[i])
       }
       const [x, y, z, fx, fy, fz] = rows.subarray(6 * i, 6 * i + 6), force = Math.hypot(fx, fy, fz)
@@ -191,10 +216,34 @@ export class Scene {
     if (tip) this.orbit.look(tip.axes.getWorldPosition(new THREE.Vector3()).toArray(), 0.12)
     else if (name !== "endoscope" && !box.isEmpty()) {
       const sphere = box.getBoundingSphere(new THREE.Sphere())
+      if (name === "work") this.turnToWork(sphere.center)
       this.orbit.look(sphere.center.toArray(), Math.max(sphere.radius, 0.03) * (name === "robot" ? 2.4 : 3.2))
     }
+    this.floor(name === "robot" ? box : this.surfaceBox())
     this.chosen?.(name)
     this.dirty()
+  }
+
+  // Look from where the robot does not stand: its arms would hide the work.
+  turnToWork(center) {
+    const robot = this.robotBox().getCenter(new THREE.Vector3()).sub(center).negate()
+    if (Math.hypot(robot.x, robot.y) > ASIDE_M) this.orbit.azimuth = Math.atan2(robot.y, robot.x) + ASIDE_RAD
+  }
+
+  // A grid of 10 mm, or of 100 mm, below what is seen: it shows where up is, and how large things are.
+  floor(box) {
+    this.grid?.removeFromParent()
+    this.grid?.dispose()
+    this.grid = null
+    if (box.isEmpty()) return
+    const sphere = box.getBoundingSphere(new THREE.Sphere()), cell = sphere.radius > 0.3 ? 0.1 : 0.01
+    const cells = 2 * Math.ceil((2.5 * sphere.radius) / cell)
+    this.grid = new THREE.GridHelper(cells * cell, cells, 0xffffff, 0xffffff)
+    this.grid.material.color.copy(this.line)
+    this.grid.rotation.x = Math.PI / 2
+    const round = (value) => Math.round(value / cell) * cell
+    this.grid.position.set(round(sphere.center.x), round(sphere.center.y), box.min.z - 0.0005)
+    this.world.add(this.grid)
   }
 
   robotBox() {
@@ -224,6 +273,33 @@ export class Scene {
     return box
   }
 
+  // Draw what an eye (`left`, `right`) of the endoscope sees onto a canvas, in the size of its pictures.
+  look(side, canvas) {
+    const eye = this.cameras[0], [width, height] = PICTURE
+    if (!eye || !this.placed) return
+    if (this.grid) this.grid.visible = false
+    const own = this.renderer.domElement, ratio = this.renderer.getPixelRatio()
+    const scale = Math.min(1, own.width / width, own.height / height), size = [width * scale, height * scale]
+    this.camera.aspect = width / height
+    this.follow(eye, (side === "left" ? -0.5 : 0.5) * eye.baseline)
+    this.camera.updateProjectionMatrix()
+    this.light()
+    this.camera.layers.disable(FORCES)
+    this.renderer.setViewport(0, 0, size[0] / ratio, size[1] / ratio)
+    this.renderer.render(this.world, this.camera)
+    this.camera.layers.enable(FORCES)
+    this.renderer.setViewport(0, 0, own.width / ratio, own.height / ratio)
+    if (canvas.width !== width) Object.assign(canvas, { width, height })
+    canvas.getContext("2d").drawImage(own, 0, own.height - size[1], ...size, 0, 0, width, height)
+  }
+
+  // The lamp is over the left shoulder of whoever looks: what it does not meet has a shape.
+  light() {
+    const way = (x, y, z) => new THREE.Vector3(x, y, z).applyQuaternion(this.camera.quaternion).add(this.camera.position)
+    this.lamp.position.copy(way(-0.7, 0.9, 0))
+    this.lamp.target.position.copy(way(0, 0, -1))
+  }
+
   draw() {
     if (!this.focused && (this.placed || this.surfaces.some(({ mesh }) => mesh))) {
       this.focused = true
@@ -235,14 +311,14 @@ export class Scene {
     if (size.x !== width || size.y !== height) this.renderer.setSize(width, height, false)
     this.camera.aspect = width / height
     const endoscope = this.choice === "endoscope" && this.cameras[0]
+    if (this.grid) this.grid.visible = !endoscope
     if (endoscope) this.follow(endoscope)
     else {
       this.camera.fov = 40
       this.orbit.place(this.camera)
     }
     this.camera.updateProjectionMatrix()
-    this.lamp.position.copy(this.camera.position)
-    this.lamp.target.position.set(0, 0, -1).applyQuaternion(this.camera.quaternion).add(this.camera.position)
+    this.light()
     this.renderer.render(this.world, this.camera)
   }
 
@@ -258,17 +334,24 @@ export class Scene {
     this.renderer.setPixelRatio(ratio)
   }
 
-  // Nothing moves: draw once with all pixels.
-  settle() {
-    if (this.renderer.getPixelRatio() === this.finest) return
-    this.renderer.setPixelRatio(this.finest)
+  // It moves again: the many pixels of what stood still would delay the first picture.
+  resume() { this.renderer.setPixelRatio(this.ratio) }
+
+  // Nothing moves: draw once with more pixels than there are, so that edges are smooth; `quick`: not of what runs,
+  // where somebody's hands would wait for that.
+  settle(quick = false) {
+    const ratio = quick ? this.finest : SMOOTH
+    if (this.renderer.getPixelRatio() === ratio) return
+    this.renderer.setPixelRatio(ratio)
     this.draw()
   }
 
-  follow({ group, pose: [x, y, z, ...q], fieldOfView }) {
+  // `aside`: along the camera's x (m).
+  follow({ group, pose: [x, y, z, ...q], fieldOfView }, aside = 0) {
     this.camera.fov = (2 * Math.atan(Math.tan(fieldOfView / 2) / this.camera.aspect) * 180) / Math.PI
     this.camera.position.set(x, y, z).applyQuaternion(group.quaternion).add(group.position)
     this.camera.quaternion.copy(group.quaternion).multiply(new THREE.Quaternion(...q)).multiply(FLIP)
+    this.camera.translateX(aside)
   }
 }
 

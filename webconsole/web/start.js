@@ -17,6 +17,7 @@ export class Start {
 
   async open() {
     $("start").showModal()
+    this.link.send({ do: "prepare" })
     if ($("start-scenario").options.length) return
     const names = await this.get("/start")
     $("start-scenario").replaceChildren(...(names ?? []).map((name) => new Option(name, name)))

@@ -3,6 +3,7 @@
 
 import * as THREE from "./vendor/three.module.js"
 import { pairOf } from "./eyes.js"
+import { FORCES } from "./scene.js"
 
 const DISTANCE_M = 1, HEIGHT_M = 0.8 // a picture 44 degrees high
 const LEFT = 1, RIGHT = 2 // layers that three.js shows to one eye alone
@@ -13,6 +14,7 @@ export class Theatre {
     this.renderer = scene.renderer
     this.rig = new THREE.Group()
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.01, 50)
+    this.camera.layers.enable(FORCES)
     this.rig.add(this.camera)
     this.screens = [LEFT, RIGHT].map((layer) => {
       const screen = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), new THREE.MeshBasicMaterial({ toneMapped: false }))

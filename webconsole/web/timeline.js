@@ -19,7 +19,8 @@ export class Timeline {
     $("previous").onclick = () => this.jump(-1)
     $("next").onclick = () => this.jump(1)
     $("now").onclick = () => this.now()
-    addEventListener("hashchange", () => this.fromUrl())
+    // by now the page itself may have named another instant
+    addEventListener("hashchange", ({ newURL }) => this.fromUrl(new URL(newURL).hash))
     addEventListener("keydown", (event) => this.key(event))
     new ResizeObserver(() => this.marks()).observe($("marks"))
   }
@@ -77,9 +78,9 @@ export class Timeline {
     this.scrub.setAttribute("aria-valuetext", this.past ? `${this.time.toFixed(3)} seconds` : "now")
   }
 
-  fromUrl() {
+  fromUrl(hash = location.hash) {
     if (this.live) return false
-    const given = Number(new URLSearchParams(location.hash.slice(1)).get("t") ?? NaN)
+    const given = Number(new URLSearchParams(hash.slice(1)).get("t") ?? NaN)
     if (!this.begun || Number.isNaN(given) || Math.abs(given - this.time) < 5e-4) return !Number.isNaN(given)
     this.go(given)
     return true

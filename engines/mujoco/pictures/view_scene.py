@@ -87,7 +87,7 @@ class ViewScene:
             )
         data.qpos[:] = positions
         mujoco.mj_kinematics(self._model, data)
-        return np.hstack([data.xpos, np.roll(data.xquat, -1, axis=1)]).astype(np.float32)
+        return np.hstack([data.xpos, data.xquat[:, 1:], data.xquat[:, :1]]).astype(np.float32)
 
     def _shown(self) -> Iterator[int]:
         for geom in range(self._model.ngeom):

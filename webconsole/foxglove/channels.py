@@ -1,0 +1,189 @@
+"""What Foxglove gets of a session: its outputs as they were published, and what the page draws as a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import foxglove
+import numpy as np
+from foxglove.messages import (
+    Color,
+    FrameTransform,
+    FrameTransforms,
+    Point3,
+    Quaternion,
+    SceneEntity,
+    SceneUpdate,
+    Timestamp,
+    TriangleListPrimitive,
+    Vector3,
+)
+from numpy.typing import NDArray
+
+from hub.participant.view import Scene
+from schemas.codec import decode, ros2msg_definition
+from schemas.trocar_msgs import SoftBodyState
+from webconsole.source import Outlet, Source, Value
+from webconsole.stage import Stage
+
+__all__ = ["Channel", "channels_of"]
+
+WORLD = "world"
+Newest = Callable[[str], Value | None]
+
+
+class Channel:
+    """One topic, made of `outlets`.
+
+    Args:
+        topic: Its name.
+        outlets: By name, as in `Source.newest`.
+        schema: Of its messages.
+        encoding: Of its messages.
+        context: That of the server.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        outlets: Sequence[str],
+        schema: foxglove.Schema,
+        encoding: str,
+        context: foxglove.Context,
+    ) -> None:
+        self.topic, self.outlets = topic, frozenset(outlets)
+        self._channel = foxglove.Channel(topic, schema=schema, message_encoding=encoding, context=context)
+        self._sent: dict[str, Value] | None = None
+
+    @property
+    def wanted(self) -> bool:
+        """Whether a client subscribes."""
+        return self._channel.has_sinks()
+
+    def put(self, newest: Newest) -> None:
+        """Send what is new, if a client subscribes; raises MessageError if it is not valid."""
+        if not self.wanted:
+            self._sent = None
+            return
+        values = {name: value for name in sorted(self.outlets) if (value := newest(name))}
+        if values == self._sent:
+            return
+        for payload in self._messages(values):
+            self._channel.log(payload, log_time=max((one.time_ns for one in values.values()), default=0))
+        self._sent = values
+
+    def _messages(self, values: dict[str, Value]) -> Iterator[bytes]:
+        """Yield what is sent of new values: here as they were published."""
+        return (value.payload for value in values.values())
+
+    def again(self) -> None:
+        """Send what there is once more: somebody has only now subscribed."""
+        self._sent = None
+
+    def close(self) -> None:
+        """Offer the topic no longer."""
+        self._channel.close()
+
+
+class _Bodies(Channel):
+    """Where the bodies of a scene are."""
+
+    def __init__(self, stage: Stage, participant: str, context: foxglove.Context) -> None:
+        outlets = stage.inputs(participant)
+        super().__init__(f"/{participant}/tf", outlets, FrameTransforms.get_schema(), "protobuf", context)
+        self._stage, self._participant = stage, participant
+
+    def _messages(self, values: dict[str, Value]) -> Iterator[bytes]:
+        if not self.outlets <= values.keys():
+            return
+        at = _stamp(max(value.time_ns for value in values.values()))
+        names = self._stage.scenes[self._participant].bodies
+        poses = self._stage.poses(self._participant, values).tolist()
+        yield FrameTransforms(
+            transforms=[
+                FrameTransform(
+                    timestamp=at,
+                    parent_frame_id=WORLD,
+                    child_frame_id=f"{self._participant}/{name}",
+                    translation=Vector3(x=x, y=y, z=z),
+                    rotation=Quaternion(x=qx, y=qy, z=qz, w=qw),
+                )
+                for name, (x, y, z, qx, qy, qz, qw) in zip(names, poses, strict=True)
+            ]
+        ).encode()
+
+
+class _Shapes(Channel):
+    """The meshes of a scene's bodies, in their frames."""
+
+    def __init__(self, participant: str, scene: Scene, context: foxglove.Context) -> None:
+        super().__init__(f"/{participant}/scene", (), SceneUpdate.get_schema(), "protobuf", context)
+        self._participant, self._scene = participant, scene
+
+    def _messages(self, values: dict[str, Value]) -> Iterator[bytes]:  # noqa: ARG002  # they never change
+        for number, part in enumerate(self._scene.parts):
+            shape = _triangles(part.vertices, part.faces, part.colour)
+            frame = f"{self._participant}/{self._scene.bodies[part.body]}"
+            yield _entity(f"{self._participant}/{number}", frame, shape, 0)
+
+
+class _Surface(Channel):
+    """A soft surface, in the world."""
+
+    def __init__(self, stage: Stage, name: str, source: Source, context: foxglove.Context) -> None:
+        topic = f"/{name.replace('.', '/')}/surface"
+        super().__init__(topic, (name,), SceneUpdate.get_schema(), "protobuf", context)
+        self._name, self._source, self._colour = name, source, stage.surfaces[name]
+
+    def _messages(self, values: dict[str, Value]) -> Iterator[bytes]:
+        first, value = self._source.first(self._name), values.get(self._name)
+        if first is None or value is None:
+            return
+        nodes = decode(SoftBodyState, value.payload).nodes_m.reshape(-1, 3)
+        faces = decode(SoftBodyState, first.payload).triangles.reshape(-1, 3)
+        if faces.size and faces.max() < len(nodes):
+            yield _entity(self._name, WORLD, _triangles(nodes, faces, (*self._colour, 1.0)), value.time_ns)
+
+
+def channels_of(
+    stage: Stage, outlets: Sequence[Outlet], source: Source, context: foxglove.Context
+) -> list[Channel]:
+    """Return the topics of a session."""
+    made = [
+        Channel(
+            f"/{one.name.replace('.', '/', 1)}",
+            (one.name,),
+            foxglove.Schema(
+                name=one.port.type, encoding="ros2msg", data=ros2msg_definition(one.port.type).encode()
+            ),
+            "cdr",
+            context,
+        )
+        for one in outlets
+        if one.live
+    ]
+    for participant, scene in stage.scenes.items():
+        made += [_Shapes(participant, scene, context), _Bodies(stage, participant, context)]
+    return made + [_Surface(stage, name, source, context) for name in stage.surfaces]
+
+
+def _stamp(time_ns: int) -> Timestamp:
+    return Timestamp(*divmod(time_ns, 10**9))
+
+
+def _entity(name: str, frame: str, shape: TriangleListPrimitive, time_ns: int) -> bytes:
+    made = SceneEntity(
+        timestamp=_stamp(time_ns), frame_id=frame, id=name, frame_locked=True, triangles=[shape]
+    )
+    return SceneUpdate(entities=[made]).encode()
+
+
+def _triangles(
+    vertices: NDArray[np.float32], faces: NDArray[np.uint32], colour: tuple[float, float, float, float]
+) -> TriangleListPrimitive:
+    red, green, blue, opacity = colour
+    return TriangleListPrimitive(
+        points=[Point3(x=x, y=y, z=z) for x, y, z in vertices.tolist()],
+        indices=faces.ravel().tolist(),
+        color=Color(r=red, g=green, b=blue, a=opacity),
+    )
