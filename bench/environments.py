@@ -52,8 +52,9 @@ def cost(name: str, rounds: int) -> dict[str, Any]:
         action[:] = 0.3 * rng.uniform(-1.0, 1.0, action.shape)
         env.step(action)
 
+    copy = mujoco.MjData(model)
+
     def bare() -> None:
-        copy = mujoco.MjData(model)
         mujoco.mj_copyData(copy, model, data)
         mujoco.mj_step(model, copy, sub_steps)
 

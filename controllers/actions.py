@@ -47,6 +47,9 @@ class ActionsParams(Params):
     action_step: Duration = Field(
         default=200_000_000, gt=0, description="time between two actions; a multiple of the period"
     )
+    first_action: Duration = Field(
+        default=0, ge=0, description="when the first action is due; the arms stay until then"
+    )
     displacement: Annotated[Length, Field(gt=0.0)] = Field(
         default=10e-3, description="of a tip by an action of 1, along each axis of the world"
     )
@@ -182,18 +185,22 @@ class Actions(Controller):
                 f"action_step {self.params.action_step} ns is no multiple of the period {setup.period_ns} ns",
                 path=("participants", self.name, "action_step"),
             )
+        self._wait = -(-self.params.first_action // setup.period_ns)
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Take the action when one is due, and go a part of the way."""
-        part = self._progress.periods % self._count
+        periods = self._progress.periods - self._wait
+        self._progress.periods += 1
+        if periods < 0:
+            return self._outputs
+        part = periods % self._count
         if part == 0:
             action = np.clip(inputs["action"], -1.0, 1.0).reshape(-1, _NUMBERS)
             for hand, own in zip(self._hands, action, strict=True):
                 hand.act(own)
         for hand in self._hands:
             hand.go((part + 1) / self._count)
-        self._progress.periods += 1
         return self._outputs
 
 

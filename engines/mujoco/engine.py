@@ -97,6 +97,7 @@ class MujocoEngine(Stepped):
         from engines.mujoco.interaction import holding
         from engines.mujoco.interaction.rigid_contact import RigidContact
         from engines.mujoco.model import ties
+        from engines.mujoco.model.lean import lean
 
         # else MuJoCo writes MUJOCO_LOG.TXT into the working directory
         mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
@@ -104,7 +105,12 @@ class MujocoEngine(Stepped):
         ties.add(spec, self.params)
         holding.prepare(spec, self.params)
         spec.option.timestep = timestep * 1e-9
-        self._mujoco, self._model = mujoco, spec.compile()
+        positions = None
+        if self.params.lean:
+            self._model, positions = lean(spec, self.params)
+        else:
+            self._model = spec.compile()
+        self._mujoco = mujoco
         self._data = mujoco.MjData(self._model)
         model.place(self._model, self._data, self.params.arms)
         self._servos = Servos(self._model, self._data, self.params.arms, period * 1e-9)
@@ -114,6 +120,7 @@ class MujocoEngine(Stepped):
             self._data,
             self.params.arms,
             self._servos,
+            positions,
             weighs=self.params.measured_effort == "motor",
         )
         self._brakes = brakes.Brakes(self._model, self._data, self.params)
@@ -139,6 +146,7 @@ class MujocoEngine(Stepped):
             *(touching.motion for touching in self._touching),
             *([] if self._rigid is None or self._rigid.collisions is None else [self._rigid.collisions]),
         ]
+        self._no_sensors = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
         trouble = mujoco.mjtWarning
         self._trouble = self._data.warning.number.data[trouble.mjWARN_BADQPOS : trouble.mjWARN_BADCTRL + 1]
         self._signature = self._what_is_state()
@@ -234,11 +242,16 @@ class MujocoEngine(Stepped):
                 place(self._model, self._data, thing, cast("PoseStamped", message))
 
     def _sub_steps(self, count: int) -> None:
-        """Take sub-steps between which nothing is read or renewed."""
-        model, data = self._model, self._data
+        """Take sub-steps between which nothing is read or renewed; sensors only at their end."""
+        model, data, option = self._model, self._data, self._model.opt
         self._mujoco.mj_step2(model, data)
+        if count > 2:
+            sensing = option.disableflags
+            option.disableflags = sensing | self._no_sensors
+            self._mujoco.mj_step(model, data, count - 2)
+            option.disableflags = sensing
         if count > 1:
-            self._mujoco.mj_step(model, data, count - 1)
+            self._mujoco.mj_step(model, data)
         self._mujoco.mj_step1(model, data)
 
     def _watched_sub_steps(self, h: int, inputs: Inputs) -> None:

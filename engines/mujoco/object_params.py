@@ -176,3 +176,11 @@ class TableParams(Params):
             " that lies on it well inside its fingers"
         ),
     )
+    friction: float | None = Field(
+        default=None,
+        gt=0.0,
+        description=(
+            "coefficient with which things slide on it; without twisting friction; by default their own,"
+            " with which a closing jaw sometimes throws a needle (docs/decisions/0090)"
+        ),
+    )

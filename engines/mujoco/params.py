@@ -161,6 +161,13 @@ class MujocoParams(SceneParams):
             " without bonds all sub-steps of a step are one call"
         ),
     )
+    lean: bool = Field(
+        default=False,
+        description=(
+            "less physics, for learning: the leading joint carries the inertia of its linkage, whose links"
+            " stand still in the model, and the covers of arms touch nothing"
+        ),
+    )
 
 
 def has_jaw(params: MountedPsm | MountedEcm) -> bool:

@@ -28,6 +28,8 @@ Observation = dict[str, NDArray[Any]]
 
 _FAR = 2.0
 """m; coordinates are clipped to this, so that spaces are bounded."""
+_SETTLING_NS = 20_000_000
+"""Until the first action is due: the period at which the scenes report where things are."""
 _EYES = ("left", "right")
 
 
@@ -75,6 +77,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         duration = f"{step:g} s"
         own = {
             "participants.actions.action_step": duration,
+            "participants.actions.first_action": f"{_SETTLING_NS / 1e6:g} ms",
             "participants.task.period": duration,
             "participants.camera.width": width,
             "participants.camera.height": height,
@@ -88,6 +91,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise ValueError(
                 f"step {step:g} s is no multiple of the scenario's {self._session.plan.step_ns / 1e9:g} s"
             )
+        self._settling = -(-_SETTLING_NS // self._session.plan.step_ns)
         self.exercise = exercise(cast("Task", self._session.participant("task")))
         self._view = self._new_view()
         self._describe(len(self._view.vector()), (height, width, 3))
@@ -130,7 +134,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode; the `seed` decides where things start, and the goal.
 
-        `options`: none are known. The scene settles for one step before the first observation.
+        `options`: none are known. Things are put and seen before the first action is due, after 20 ms.
         """
         super().reset(seed=seed)
         if options:
@@ -140,7 +144,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._view = self._new_view() if not self._session.restores else self._view
         self._seen.clear()
         inputs = {f"robot.{thing}/place": (_stamped(pose),) for thing, pose in starts.items()}
-        self._session.advance(self._count, inputs)
+        self._session.advance(self._settling, inputs)
         observation = self._observe()
         return observation, self._info(observation, 0.0)
 

@@ -39,11 +39,17 @@ class Readings:
         data: mujoco.MjData,
         arms: Mapping[CartArm, MountedPsm | MountedEcm],
         servos: Servos,
+        positions: Vector | None = None,
         *,
         weighs: bool = False,
     ) -> None:
-        """Report on `arms`; `weighs`: by the whole efforts of their motors."""
-        self._sensors, self._qpos = data.sensordata, np.empty(model.nq)
+        """Report on `arms`; `weighs`: by the whole efforts of their motors.
+
+        `positions` is the matrix to the positions of the whole model, where this one is lean.
+        """
+        self._whole = positions
+        self._sensors = data.sensordata
+        self._qpos = np.empty(model.nq if positions is None else len(positions))
         self._positions = data.qpos
         self._jaws: list[tuple[Vector, Vector, Vector]] = []
         self._motors = Motors(model, data) if weighs else None
@@ -86,4 +92,7 @@ class Readings:
     def refresh(self) -> None:
         """Update what is published less often: the tips' poses and the model's positions."""
         self._sensors.take(self._where, None, self._poses, "clip")  # three times as fast as the default mode
-        self._qpos[:] = self._positions
+        if self._whole is None:
+            self._qpos[:] = self._positions
+        else:
+            self._whole.dot(self._positions, self._qpos)

@@ -89,6 +89,8 @@ def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
     x, y, z = params.position
     half = [extent / 2.0 for extent in params.size]
     bits = _PAD if params.soft else LEVEL
+    if params.friction is not None:  # before that of things, and with sliding friction alone
+        bits = bits | _rubbing(params.friction) | {"condim": 3, "priority": CONTACT["priority"] + 1}
     body = spec.worldbody.add_body(name="table", pos=[x, y, z - half[2]])
     body.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, rgba=_RGBA["table"], **bits)
 

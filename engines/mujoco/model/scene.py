@@ -56,7 +56,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
 def place(
     model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, MountedPsm | MountedEcm]
 ) -> None:
-    """Put the joints of `arms`, with linkages and fingers, where they start."""
+    """Put the joints of `arms`, with fingers and, unless the model is lean, linkages, where they start."""
     for name, params in arms.items():
         start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
         if isinstance(params, MountedPsm) and (hand := params.tool.hand) is not None:
@@ -75,7 +75,9 @@ def place(
                 q = params.jaw / 2.0
             else:
                 q = start[link.name]
-            data.qpos[int(model.joint(f"{name}/{link.name}").qposadr[0])] = q
+            joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{name}/{link.name}")
+            if joint >= 0:
+                data.qpos[int(model.jnt_qposadr[joint])] = q
 
 
 def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:

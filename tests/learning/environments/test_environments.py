@@ -111,7 +111,7 @@ def test_a_recorded_episode_verifies(tmp_path):
         place = tmp_path / f"episode-{number:05d}"
         found = trocar.verify(place)
         assert found.same
-        assert found.steps == 10 * (STEPS + 1)
+        assert found.steps == 10 * STEPS + 1
         recording = trocar.Recording(place)
         assert {"robot.needle/pose", "task.score", "actions.PSM1/goal_cp"} <= set(recording)
         assert state_hash
