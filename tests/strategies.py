@@ -14,6 +14,7 @@ from schemas.codec import message_types
 from schemas.message import Message, msg_text
 from schemas.ports import Port
 from schemas.ros import Time
+from schemas.visualization import DurationMessage
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12)
@@ -39,8 +40,8 @@ def vectors(size: int | st.SearchStrategy[int], dtype: Any = np.float64) -> st.S
 
 def messages(model: type[Message]) -> st.SearchStrategy[Message]:
     """Valid messages of a type, drawn field by field from its .msg text."""
-    if model is Time:
-        return st.builds(Time.from_ns, st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1))
+    if issubclass(model, Time | DurationMessage):
+        return st.builds(model.from_ns, st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1))
     rows = (line.split() for line in msg_text(model).splitlines())
     return st.builds(model, **{name: _field(model, ros_type, name) for ros_type, name in rows})
 

@@ -1,8 +1,8 @@
 """A process of `trocar` that has imported what it needs, and waits for its arguments.
 
 `python -P -m webconsole.ready MODULE ...`: a line of its standard input has the arguments, a list in JSON; at
-the end of the input without one it ends. To import takes more than a second, for which nobody waits who is
-still reading the form of a fork.
+the end of the input without one it ends. To import takes more than a second, which is done while a
+person still reads the form of a fork.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class ReadyProcess:
     def run(self, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
         """Let it run `trocar` with these arguments, and return it."""
         assert self.process.stdin is not None
-        with suppress(BrokenPipeError):  # it has ended: whoever waits for it sees its exit code
+        with suppress(BrokenPipeError):  # it has ended: its exit code tells how
             self.process.stdin.write(json.dumps([*arguments]).encode() + b"\n")
             self.process.stdin.close()
         return self.process

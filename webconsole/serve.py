@@ -121,7 +121,7 @@ def _serve(
 
 
 def _foxglove(console: Console) -> Face:
-    """Return the door to Foxglove, of which the packages may be missing where nobody asks for it."""
+    """Return the door to Foxglove, of which the packages may be missing where it is not asked for."""
     from webconsole.foxglove.face import Face
 
     return Face(console)

@@ -2,7 +2,7 @@
 
 A wire is brighter on the side of the lamp, so what is seen of it is drawn aside, by the same way in both eyes
 and from picture to picture; a filter that takes such errors for independent ones becomes too sure. Here they
-are common errors of a picture, told by few numbers, which are not estimated. A share of the wire's width that
+are common errors of a picture, few numbers, which are not estimated. A share of the wire's width that
 is not seen says by how much more the middle of the rest may be aside.
 """
 

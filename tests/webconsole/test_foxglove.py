@@ -76,26 +76,41 @@ class Client:
     """A client of Foxglove's WebSocket protocol (https://github.com/foxglove/ws-protocol)."""
 
     def __init__(self, socket):
-        self.socket, self.channels = socket, {}
+        self.socket, self.channels, self.subscribed = socket, {}, []
+
+    def take(self, text):
+        """Take what the server says; return the topics that it offers now."""
+        said = json.loads(text)
+        offered = {one["topic"]: one for one in said["channels"]} if said["op"] == "advertise" else {}
+        self.channels |= offered
+        return offered.keys()
 
     async def offered(self, *topics):
         """Read until these topics are offered; return each one's description by name."""
         while not {*topics} <= self.channels.keys():
-            said = json.loads(await self.socket.recv())
-            if said["op"] == "advertise":
-                self.channels |= {one["topic"]: one for one in said["channels"]}
+            self.take(await self.socket.recv())
         return self.channels
 
+    async def subscribe(self, topics):
+        wanted = []
+        for topic in topics:
+            self.subscribed.append(topic)
+            wanted.append({"id": len(self.subscribed) - 1, "channelId": self.channels[topic]["id"]})
+        if wanted:
+            await self.socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+
     async def values(self, *topics):
-        """Subscribe, and return the first message of each, as time (ns) and bytes."""
-        wanted = [{"id": i, "channelId": self.channels[one]["id"]} for i, one in enumerate(topics)]
-        await self.socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+        """Subscribe, also to what is offered anew, and return the first message of each: time (ns), bytes."""
+        await self.subscribe(topics)
         found = {}
         while len(found) < len(topics):
             data = await self.socket.recv()
-            if isinstance(data, bytes) and data[0] == MESSAGE_DATA:
+            if isinstance(data, str):
+                offered = self.take(data)
+                await self.subscribe([topic for topic in topics if topic in offered])
+            elif data[0] == MESSAGE_DATA:
                 subscription, time_ns = struct.unpack_from("<IQ", data, 1)
-                found.setdefault(topics[subscription], (time_ns, data[13:]))
+                found.setdefault(self.subscribed[subscription], (time_ns, data[13:]))
         return found
 
 

@@ -120,7 +120,7 @@ class Face:
                 await asyncio.gather(*ways, return_exceptions=True)
         except WebSocketException as error:  # it offered no protocol of Foxglove
             log.warning("a client of Foxglove is refused: %s", error)
-        with suppress(RuntimeError):  # it is closed already
+        with suppress(RuntimeError, WebSocketDisconnect):  # it is closed already
             await websocket.close()
 
     async def _feed(self) -> None:
@@ -182,7 +182,7 @@ async def _out(websocket: WebSocket, inside: ClientConnection) -> None:
 
 
 def _certificate() -> tuple[bytes, bytes]:
-    """Return certificate and key of loopback, in PEM, that nobody else knows."""
+    """Return certificate and key of loopback, in PEM, that are known to no other process."""
     key = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "Trocar, for itself alone")])
     now = datetime.now(UTC)
