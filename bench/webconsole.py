@@ -18,6 +18,7 @@ import argparse
 import asyncio
 import http.client
 import json
+import math
 import os
 import shutil
 import struct
@@ -33,6 +34,7 @@ from time import clock_gettime, monotonic, perf_counter, process_time, pthread_g
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from websockets.asyncio.client import connect
 
 from hub.planning.scenario_file import load
@@ -74,10 +76,8 @@ class Fed:
             Outlet("tissue", Port(name="liver/nodes", causality="output", type=SoftBodyState.ros_type)),
             *(Outlet("endoscope", Port(name=f"{eye}/image", **picture)) for eye in ("left", "right")),
         )
-        rng = np.random.default_rng(0)
-        self._grid = rng.normal(0.0, 0.02, (NODES, 3)).astype(np.float32)
-        self._faces = rng.integers(0, NODES, (2 * NODES, 3)).astype(np.uint32)
-        self._jpeg = rng.integers(0, 255, PICTURE_BYTES).astype(np.uint8)
+        self._nodes, self._faces = _ring()
+        self._jpeg = np.random.default_rng(0).integers(0, 255, PICTURE_BYTES).astype(np.uint8)
         self._values: dict[str, Value] = {}
         self.state: dict[str, Any] = {"session": "bench", "state": "running", "time": 0.0}
         self._ending = threading.Event()
@@ -96,7 +96,7 @@ class Fed:
             at = round(tick * 1e9 / 60)
             self._values["robot.qpos"] = Value(at, self.qpos.encode(np.full(self.qpos.size, 1e-4 * tick), at))
             if tick % 2 == 0:
-                nodes = self._grid + np.float32(1e-3 * np.sin(tick / 20))
+                nodes = self._nodes * np.float32(1.0 + 0.05 * np.sin(tick / 20))
                 state = SoftBodyState(header={}, body="liver", nodes_m=nodes.ravel())
                 self._values["tissue.liver/nodes"] = Value(at, encode(state))
                 for eye in ("left", "right"):
@@ -117,12 +117,25 @@ class Fed:
         """Return the organ with its surface."""
         faces = self._faces.ravel()
         return Value(
-            0, encode(SoftBodyState(header={}, body="", nodes_m=self._grid.ravel(), triangles=faces))
+            0, encode(SoftBodyState(header={}, body="", nodes_m=self._nodes.ravel(), triangles=faces))
         )
 
     def close(self) -> None:
         """Feed no more."""
         self._ending.set()
+
+
+def _ring() -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Return nodes (m) and triangles of a ring of 84 mm, which are as many as the figures are for."""
+    side = math.isqrt(NODES)
+    around, across = (2.0 * np.pi * angle / side for angle in np.divmod(np.arange(NODES), side))
+    reach = 0.03 + 0.012 * np.cos(across)
+    nodes = np.column_stack([reach * np.cos(around), reach * np.sin(around), 0.012 * np.sin(across)])
+    row, column = np.divmod(np.arange(NODES), side)
+    right, up = side * ((row + 1) % side) + column, side * row + (column + 1) % side
+    corner, opposite = side * row + column, side * ((row + 1) % side) + (column + 1) % side
+    faces = np.vstack([np.column_stack([corner, right, opposite]), np.column_stack([corner, opposite, up])])
+    return nodes.astype(np.float32), faces.astype(np.uint32)
 
 
 def serve() -> None:
