@@ -18,7 +18,9 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 OUTPUT = Path(__file__).parents[1] / "pictures" / "page.gif"
-SIZE, WIDTH, COLOURS = {"width": 1100, "height": 700}, 720, 96
+SIZE, WIDTH, COLOURS = {"width": 1100, "height": 700}, 720, 128
+ACCENTS, STRIPE = ("#f2b705", "#8a5200", "#b3261e", "#00695f", "#1b6e3c", "#0b62a4", "#b84a00"), 16
+"""Of arrows, warnings, what stops, what is chosen, and plots."""
 LIVE_FROM_S, LIVE_S, BACK_S = 4.0, 3.0, (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 TROCAR = (sys.executable, "-P", "-m", "trocar", "run", "palpation", "--open", "--set", "duration=2 min")
 
@@ -55,12 +57,13 @@ def film(page: Page) -> list[Image.Image]:
     return pictures
 
 
-def _beside(*pictures: Image.Image) -> Image.Image:
-    """Return one picture of several: before, in contact, and in the past."""
-    width, height = pictures[0].size
-    made = Image.new("RGB", (width, height * len(pictures)))
-    for row, one in enumerate(pictures):
-        made.paste(one, (0, row * height))
+def _colours(picture: Image.Image) -> Image.Image:
+    """Return a picture with stripes below it of the colours that must be in the palette, however few."""
+    width, height = picture.size
+    made = Image.new("RGB", (width, height + STRIPE * len(ACCENTS)))
+    made.paste(picture, (0, 0))
+    for row, colour in enumerate(ACCENTS):
+        made.paste(colour, (0, height + STRIPE * row, width, height + STRIPE * (row + 1)))
     return made
 
 
@@ -85,9 +88,7 @@ def main() -> None:
             run.send_signal(signal.SIGINT)
             run.wait()
     # one palette for all, so that what stands still stays the same and takes no bytes
-    palette = _beside(pictures[0], pictures[8], pictures[-len(BACK_S)]).quantize(
-        COLOURS, method=Image.Quantize.MAXCOVERAGE
-    )
+    palette = _colours(pictures[8]).quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
     frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]
     frames[0].save(OUTPUT, save_all=True, append_images=frames[1:], duration=350, loop=0, optimize=True)
 
