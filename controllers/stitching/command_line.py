@@ -19,6 +19,8 @@ Session = Annotated[
 ]
 Place = Annotated[tuple[float, float, float], typer.Option(metavar="X Y Z", help="In mm, in the frame.")]
 
+Pixel = Annotated[tuple[float, float], typer.Option(metavar="X Y", help="In pixels, right and down.")]
+
 
 @app.command()
 def pick(
@@ -38,6 +40,26 @@ def pick(
     for place in (entry, exit_):
         x, y, z = (each * 1e-3 for each in place)
         point = {"header": {"frame_id": frame}, "point": {"x": x, "y": y, "z": z}}
+        _set(lead, "pick", point, session, connect)
+    console.print("picked; what follows is on the participant's `status` and in the picture")
+
+
+@app.command()
+def click(
+    *,
+    entry: Pixel,
+    exit_: Annotated[
+        tuple[float, float], typer.Option("--exit", metavar="X Y", help="In pixels, right and down.")
+    ],
+    eye: Annotated[str, typer.Option(help="Whose picture: left or right.")] = "left",
+    camera: Annotated[str, typer.Option(metavar="NAME", help="The endoscope.")] = "endoscope",
+    lead: Lead = "lead",
+    session: Session = None,
+    connect: HubEndpoints = None,
+) -> None:
+    """Pick entry and exit by what is seen: the points of the pad under two pixels of a picture."""
+    for x, y in (entry, exit_):
+        point = {"header": {"frame_id": f"{camera}_{eye}_image"}, "point": {"x": x, "y": y, "z": 0.0}}
         _set(lead, "pick", point, session, connect)
     console.print("picked; what follows is on the participant's `status` and in the picture")
 

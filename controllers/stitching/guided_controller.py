@@ -17,10 +17,11 @@ from controllers.stitching.scene_frames import SceneFrames
 from controllers.stitching.stage import Stage
 from controllers.stitching.two_hands import TwoHands
 from hub.participant import Inputs, Outputs, Params, Record, Setup, array, integer
-from robots.dvrk.endoscope import BASELINE
+from robots.dvrk import endoscope
+from robots.dvrk.endoscope import BASELINE, StereoCamera
 from schemas.errors import MotionError
 from schemas.ports import Port
-from schemas.quantity import Length
+from schemas.quantity import Angle, Length
 from schemas.ros import BoolMessage, PointStamped, StringMessage
 from schemas.visualization import Marker, MarkerArray
 
@@ -33,6 +34,12 @@ class GuidedStitchingParams(StitchParams):
     """The scene, the two hands, and the camera in whose pictures the stitch is shown."""
 
     camera: str = Field(default="endoscope", description="whose pictures the banner is in")
+    width: int = Field(default=endoscope.WIDTH, ge=1, description="of its pictures, in pixels")
+    height: int = Field(default=endoscope.HEIGHT, ge=1, description="of its pictures, in pixels")
+    field_of_view: Angle = Field(
+        default=endoscope.FIELD_OF_VIEW, gt=0.0, lt=3.0, description="of it, horizontal"
+    )
+    baseline: Length = Field(default=BASELINE, ge=0.0, description="between its two eyes")
     banner: tuple[Length, Length, Length] = Field(
         default=(BASELINE / 2.0, -42e-3, 0.1),
         description="the middle of its text in the left camera's optical frame: right, down, ahead",
@@ -60,7 +67,8 @@ class GuidedStitching(TwoHands):
         self._surgeon = GuidedSurgeon(params, *self._hands)
         self.publish(self._surgeon)
         self._camera, self._banner = params.camera, params.banner
-        self._frames = SceneFrames(params, params.camera)
+        seen = StereoCamera(params.width, params.height, params.field_of_view, params.baseline)
+        self._frames = SceneFrames(params, params.camera, seen)
         self._seen = _Shown()
         self.keep(self._seen, self._surgeon.guided)
         self._outputs |= {"stage": self._seen.stage, "state": (), "markers": ()}

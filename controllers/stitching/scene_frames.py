@@ -1,4 +1,9 @@
-"""The frames of a scene in which a person may pick points, under the names of /tf. SI units."""
+"""The frames of a scene in which a person may pick points, under the names of /tf. SI units.
+
+A point may also be a pixel of the endoscope's pictures, in the frame `<camera>_left_image` or
+`<camera>_right_image`: x to the right and y down from the middle of the first pixel. It is then the point of
+the pad under that pixel.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +19,7 @@ from hub.participant import Inputs
 from robots.dvrk import crtk
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.ecm import tip
-from robots.dvrk.endoscope import BASELINE, optical_in_roll
+from robots.dvrk.endoscope import EYES, Eye, StereoCamera, optical_in_roll
 from robots.dvrk.mounted import MountedEcm
 from schemas.errors import MotionError, did_you_mean
 from schemas.ports import Port
@@ -27,8 +32,8 @@ __all__ = ["SceneFrames"]
 class SceneFrames:
     """Where the frames are: those that stand fast, the tips of the arms, the camera and the needle."""
 
-    def __init__(self, params: StitchParams, camera: str) -> None:
-        """`camera`: name of the endoscope, whose left optical frame is one of them."""
+    def __init__(self, params: StitchParams, name: str, camera: StereoCamera) -> None:
+        """`name`: of the endoscope, whose left optical frame is one of them; `camera`: what it sees with."""
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
         self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.driven}
         self._fixed = {crtk.WORLD_FRAME: np.eye(4)}
@@ -36,9 +41,13 @@ class SceneFrames:
             self._fixed[crtk.CART_FRAME] = np.eye(4)
         self._fixed |= {crtk.base_frame(arm): base for arm, base in self._bases.items()}
         self._fixed |= {name: fixture.pose for name, fixture in params.fixtures.items()}
-        self._needle, self._optical = params.needle[0], f"{camera}_left_optical"
+        self._needle, self._optical = params.needle[0], f"{name}_left_optical"
         ecm = params.arms.driven.get("ECM")
-        self._left = _left_in_tip(ecm) if isinstance(ecm, MountedEcm) else None
+        self._left = _left_in_tip(ecm, camera.baseline) if isinstance(ecm, MountedEcm) else None
+        self._camera, self._skin = camera, params.phantom.pose
+        self._pictures: dict[str, Eye] = (
+            {} if self._left is None else {f"{name}_{eye}_image": eye for eye in EYES}
+        )
         self.others = tuple(arm for arm in self._bases if arm not in (params.driver, params.puller))
         """Arms that do not stitch, whose tips are measured all the same."""
 
@@ -46,7 +55,7 @@ class SceneFrames:
     def names(self) -> tuple[str, ...]:
         """Of all frames."""
         camera = () if self._left is None else (self._optical,)
-        return (*self._fixed, *self._bases, *camera, self._needle)
+        return (*self._fixed, *self._bases, *camera, *self._pictures, self._needle)
 
     @property
     def ports(self) -> Iterator[Port]:
@@ -60,9 +69,31 @@ class SceneFrames:
             )
 
     def in_world(self, picked: PointStamped, inputs: Inputs) -> Vector:
-        """Return a point in the world, shape (3,). Raises MotionError if its frame is unknown."""
+        """Return a point in the world, shape (3,).
+
+        Raises MotionError if its frame is unknown, or if it is a pixel in which there is no pad.
+        """
         point = picked.point
+        if (eye := self._pictures.get(picked.header.frame_id)) is not None:
+            return self._under(eye, np.array([point.x, point.y]), self._pose(self._optical, inputs))
         return (self._pose(picked.header.frame_id, inputs) @ [point.x, point.y, point.z, 1.0])[:3]
+
+    def _under(self, eye: Eye, pixel: Vector, left: Vector) -> Vector:
+        """Return the point of the skin's plane under a pixel of an eye, m, shape (3,), in the world.
+
+        `left` is the left camera's optical frame in the world, shape (4, 4).
+        """
+        size = self._camera.width, self._camera.height
+        if not ((pixel >= -0.5) & (pixel < np.array(size) - 0.5)).all():
+            raise MotionError(f"pixel {pixel.tolist()} is not in a picture of {size[0]} x {size[1]} pixels")
+        projection = self._camera.projection(eye)
+        ahead = np.linalg.solve(projection[:, :3], [*pixel, 1.0])
+        start = -np.linalg.solve(projection[:, :3], projection[:, 3])
+        from_skin = inverse_pose(self._skin) @ left
+        origin, ray = from_skin[:3, :3] @ start + from_skin[:3, 3], from_skin[:3, :3] @ ahead
+        if origin[2] * ray[2] >= 0.0:
+            raise MotionError(f"pixel {pixel.tolist()} of the {eye} eye does not look at the pad")
+        return (self._skin @ [*(origin - ray * origin[2] / ray[2]), 1.0])[:3]
 
     def _pose(self, frame: str, inputs: Inputs) -> Vector:
         if (fixed := self._fixed.get(frame)) is not None:
@@ -79,8 +110,8 @@ class SceneFrames:
         )
 
 
-def _left_in_tip(arm: MountedEcm) -> Vector:
+def _left_in_tip(arm: MountedEcm, baseline: float) -> Vector:
     """Return the left camera's optical frame in that of the ECM's tip, shape (4, 4), as on /tf."""
     left = np.eye(4)
-    left[0, 3] = -0.5 * BASELINE
+    left[0, 3] = -0.5 * baseline
     return inverse_pose(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left

@@ -131,10 +131,10 @@ class MujocoEngine(Stepped):
         fixtures = tuple(self.params.fixtures)
         self._outputs.update({**self._readings.outputs, **self._holding.outputs})
         self._rigid = None
+        self._at_once = self.params.rigid_wrench is not True
         if self.params.rigid_wrench and (psms or fixtures):
-            self._rigid = RigidContact(
-                self._model, self._data, psms, fixtures=fixtures, substep=timestep * 1e-9
-            )
+            every = period if self._at_once else timestep
+            self._rigid = RigidContact(self._model, self._data, psms, fixtures=fixtures, every=every * 1e-9)
             self._outputs.update(self._rigid.outputs)
         self._couple(setup)
         self._readings.refresh()
@@ -221,8 +221,9 @@ class MujocoEngine(Stepped):
         self._brakes.set(on="ECM" in self._servos.off)
         if self._rigid is None and not self._touching:
             self._sub_steps(h // self.params.timestep)
+            self._mujoco.mj_step1(self._model, self._data)
         else:
-            self._watched_sub_steps(h, inputs)
+            self._coupled_sub_steps(h, inputs)
         self._readings.update()
         if (t + h) % self.params.publish_period == 0:
             self._readings.refresh()
@@ -242,7 +243,10 @@ class MujocoEngine(Stepped):
                 place(self._model, self._data, thing, cast("PoseStamped", message))
 
     def _sub_steps(self, count: int) -> None:
-        """Take sub-steps between which nothing is read or renewed; sensors only at their end."""
+        """Take sub-steps between which nothing is read or renewed, but for the last one's `mj_step1`.
+
+        Sensors are computed in the last one alone.
+        """
         model, data, option = self._model, self._data, self._model.opt
         self._mujoco.mj_step2(model, data)
         if count > 2:
@@ -252,14 +256,29 @@ class MujocoEngine(Stepped):
             option.disableflags = sensing
         if count > 1:
             self._mujoco.mj_step(model, data)
-        self._mujoco.mj_step1(model, data)
 
-    def _watched_sub_steps(self, h: int, inputs: Inputs) -> None:
-        """Take the sub-steps of `h` nanoseconds, and sum or renew between them what bonds and contacts do."""
-        model, data, step1, step2 = self._model, self._data, self._mujoco.mj_step1, self._mujoco.mj_step2
-        add_rigid = (lambda: None) if self._rigid is None else self._rigid.add
+    def _coupled_sub_steps(self, h: int, inputs: Inputs) -> None:
+        """Take the sub-steps of `h` nanoseconds, and sum what bonds and contacts do in them."""
         for touching in self._touching:
             touching.begin(inputs)
+        if self._at_once and not self._renewed:
+            self._sub_steps(h // self.params.timestep)
+            if self._rigid is not None:
+                self._rigid.add()
+            self._mujoco.mj_step1(self._model, self._data)
+        else:
+            self._watched_sub_steps(h)
+        if self._rigid is not None:
+            self._rigid.end()
+        for touching in self._touching:
+            touching.end()
+        if self._wires:
+            self._feel_needles()
+
+    def _watched_sub_steps(self, h: int) -> None:
+        """Take the sub-steps of `h` nanoseconds; between them renew bonds, and sum what contacts do."""
+        model, data, step1, step2 = self._model, self._data, self._mujoco.mj_step1, self._mujoco.mj_step2
+        add_rigid = (lambda: None) if self._rigid is None else self._rigid.add
         for tau in range(0, h, self.params.timestep):
             if tau:
                 for touching in self._renewed:
@@ -267,12 +286,6 @@ class MujocoEngine(Stepped):
             step2(model, data)
             add_rigid()
             step1(model, data)
-        if self._rigid is not None:
-            self._rigid.end()
-        for touching in self._touching:
-            touching.end()
-        if self._wires:
-            self._feel_needles()
 
     def _diagnosis(self, t: int, inputs: Inputs) -> str:
         bad = self._mujoco.mjtWarning(

@@ -154,11 +154,12 @@ class MujocoParams(SceneParams):
             " holds the arm against gravity included, as a real arm's currents tell"
         ),
     )
-    rigid_wrench: bool = Field(
+    rigid_wrench: bool | Literal["last"] = Field(
         default=True,
         description=(
-            "measure `rigid_wrench`, for which the contacts of every sub-step are summed; without it and"
-            " without bonds all sub-steps of a step are one call"
+            "measure `rigid_wrench`: true, the mean over the sub-steps of a step; last, that of the last one,"
+            " at less cost; false, not at all. Where it is not true, and no bond renews its force within a"
+            " step, all sub-steps are one call"
         ),
     )
     lean: bool = Field(

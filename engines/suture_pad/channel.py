@@ -19,7 +19,7 @@ needle can leave its channel only along the arc: nothing else makes what is miss
 from __future__ import annotations
 
 from enum import IntEnum
-from math import ceil, hypot, pi
+from math import acos, atan2, ceil, hypot, pi
 
 import numpy as np
 
@@ -81,13 +81,16 @@ class Channel:
         self._needle, self._tissue = needle, tissue
         self._most = ceil(2.0 * needle.length / SPACING)
         self.state = ChannelState(most=self._most)
-        self._arclengths = SPACING * np.arange(self._most)
+        self._arclengths = SPACING * np.arange(self._most, dtype=np.float64)
         stations = np.linspace(-needle.arc / 2.0, needle.arc / 2.0, ceil(needle.length / 1e-3) + 1)
         self._stations = needle.points(stations)
         self._share = needle.length / len(stations)
         self._tip = self._stations[-1]
         self._forward = np.array([-np.sin(needle.arc / 2.0), np.cos(needle.arc / 2.0), 0.0])
-        self._missing = np.zeros((0, 3))
+        self._followed: tuple[Vector, Vector, Vector, Vector] | None = None
+        """Of the last pose in a channel: rotation, points in the needle's frame (m), their distances from its
+        axis (m), and to which share the wire covers them.
+        """
         self._stretch = np.zeros(3)
 
     def advance(self, rotation: Vector, origin: Vector, *, over_pad: bool) -> tuple[Vector, Vector]:
@@ -103,13 +106,13 @@ class Channel:
         if lowest > self._needle.wire_radius and state.phase in (Phase.OUT, Phase.PRESSING):
             state.phase, state.tip = Phase.OUT, 0.0
             return np.zeros(3), np.zeros(3)
-        tip: Vector = rotation @ self._tip + origin
         if state.phase in (Phase.OUT, Phase.PRESSING):
+            tip: Vector = rotation @ self._tip + origin
             force = self._press(rotation, tip, origin, over_pad=over_pad)
             if not state.count:
                 lying, moment = self._lie(rotation, origin, 0, len(self._stations) - 1)
                 return force + lying, moment + cross(tip, force)
-        return self._follow(rotation, origin, tip)
+        return self._follow(rotation, origin)
 
     def displaced(self) -> tuple[Vector, Vector]:
         """Return places in the tissue at rest and their displacements, both m, shape (n, 3), frame `pad`.
@@ -121,8 +124,14 @@ class Channel:
             return np.zeros((0, 3)), np.zeros((0, 3))
         if state.phase is Phase.PRESSING:
             return state.touched[None], self._stretch[None]
-        displacements = self._missing.copy()
-        displacements[-1] += self._stretch
+        if self._followed is None:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        rotation, local, away, weights = self._followed
+        missing = local.copy()
+        missing[:, :2] *= (1.0 - self._needle.radius / away)[:, None]
+        displacements = -(weights[:, None] * missing) @ rotation.T
+        if state.tip:
+            displacements[-1] += max(0.0, state.length - state.cut) * (rotation @ self._forward)
         return state.points[: len(displacements)], displacements
 
     def _press(self, rotation: Vector, tip: Vector, origin: Vector, *, over_pad: bool) -> Vector:
@@ -157,11 +166,11 @@ class Channel:
 
         The height of the wire is A cos(angle - b) + origin_z; near the tip it falls when entering.
         """
-        lift = self._needle.radius * np.hypot(rotation[2, 0], rotation[2, 1])
-        peak = np.arctan2(rotation[2, 1], rotation[2, 0])
-        half = float(np.arccos(np.clip(-origin[2] / max(lift, 1e-12), -1.0, 1.0)))
+        along, across, _ = rotation[2].tolist()
+        lift = max(self._needle.radius * hypot(along, across), 1e-12)
+        half = acos(min(max(-float(origin[2]) / lift, -1.0), 1.0))
         end = self._needle.arc / 2.0
-        angle = float(peak) + (half if entering else -half)
+        angle = atan2(across, along) + (half if entering else -half)
         # of the turns of this angle that which is at most half a turn from the tip's
         return angle - 2.0 * pi * round((angle - end) / (2.0 * pi))
 
@@ -174,45 +183,63 @@ class Channel:
             state.points[state.count] = rotation @ self._needle.points(angle)[0] + origin
             state.count += 1
 
-    def _follow(self, rotation: Vector, origin: Vector, tip: Vector) -> tuple[Vector, Vector]:
-        """Return force and moment of channel and tip, with the tip `length` along the channel."""
-        state, needle, tissue = self.state, self._needle, self._tissue
-        points = state.points[: state.count]
-        local = (points - origin) @ rotation
-        away = np.hypot(local[:, 0], local[:, 1])
-        angles = np.arctan2(local[:, 1], local[:, 0])
-        # how far behind the tip, by whole turns nearest to what it was before
-        before = (state.length - self._arclengths[: state.count]) / needle.radius
-        behind = needle.arc / 2.0 - angles
-        on_wire = needle.radius * (behind + 2.0 * pi * np.rint((before - behind) / (2.0 * pi)))
-        weights = np.clip((needle.length - on_wire) / SPACING + 0.5, 0.0, 1.0)
-        weights *= np.clip(on_wire / SPACING + 0.5, 0.0, 1.0)
-        covered = float(weights.sum())
-        if covered > 0.0:
-            state.length = float(weights @ (on_wire + self._arclengths[: state.count])) / covered
-        else:  # only the end of the wire, or only the tip, is near the channel
-            nearest = int(np.argmin(np.abs(on_wire)))
-            state.length = float(on_wire[nearest] + self._arclengths[nearest])
-        state.covered = covered * SPACING
+    def _follow(self, rotation: Vector, origin: Vector) -> tuple[Vector, Vector]:
+        """Return force and moment of channel and tip, with the tip `length` along the channel.
+
+        Summed in the needle's frame: a point there is (p cos a, p sin a, z), and what the needle feels at it
+        is radial, along the arc, and normal to the arc's plane.
+        """
+        state, tissue, radius = self.state, self._tissue, self._needle.radius
+        local = (state.points[: state.count] - origin).dot(rotation)
+        x, y, z = local.T
+        away = np.maximum(np.hypot(x, y), 1e-9)
+        on_wire, weights = self._slide(np.arctan2(y, x))
         if self._has_left(on_wire):
             return np.zeros(3), np.zeros(3)
-        radial = np.zeros_like(local)
-        radial[:, :2] = local[:, :2] / np.maximum(away, 1e-9)[:, None]
-        missing = (away - needle.radius)[:, None] * radial
-        missing[:, 2] = local[:, 2]
-        state.swept = float(weights @ np.sqrt((missing * missing).sum(axis=1))) * SPACING
-        self._missing = -(weights[:, None] * missing) @ rotation.T
-        along = np.zeros_like(local)
-        along[:, 0], along[:, 1] = -radial[:, 1], radial[:, 0]
-        loads = tissue.compression * SPACING * missing - self._rub(covered) * along
-        loads *= weights[:, None]
-        forces = loads @ rotation.T
-        force, moment = forces.sum(axis=0), cross(points, forces).sum(axis=0)
-        forward = rotation @ self._forward
-        at_tip = -self._resist(rotation, origin) * forward
-        self._stretch = (max(0.0, state.length - state.cut) if state.tip else 0.0) * forward
+        self._followed = rotation, local, away, weights
+        missing = away - radius
+        state.swept = float(weights.dot(np.hypot(missing, z))) * SPACING
+        sums = np.empty((4, len(away)))
+        sums[0] = weights
+        np.multiply(weights, z, out=sums[1])
+        np.multiply(weights, missing, out=sums[2])
+        np.subtract(z * sums[2], away * sums[1], out=sums[3])
+        directions = local.T[:2] / away
+        (wx, zx, rx, mx), (wy, zy, ry, my) = directions.dot(sums.T).tolist()
+        press, rub = tissue.compression * SPACING, self._rub(state.covered)
+        at_tip = self._resist(rotation, origin)
+        force = np.array([press * rx + rub * wy, press * ry - rub * wx, press * float(weights.dot(z))])
+        moment = np.array([rub * zx - press * my, rub * zy + press * mx, -rub * float(weights.dot(away))])
+        force -= at_tip * self._forward
+        moment[2] -= at_tip * radius
+        force, moment = rotation.dot(force), rotation.dot(moment)
+        moment += cross(origin, force)
         lying, turning = self._lie(rotation, origin, *self._outside())
-        return force + at_tip + lying, moment + cross(tip, at_tip) + turning
+        return force + lying, moment + turning
+
+    def _slide(self, angles: Vector) -> tuple[Vector, Vector]:
+        """Move the tip along the channel to where the points are that lie at `angles` on the wire, rad.
+
+        Returns how far behind the tip each of them is along the wire, m, and to which share it covers them.
+        """
+        state, needle = self.state, self._needle
+        ways, middle = self._arclengths[: state.count], needle.length / 2.0
+        on_wire = state.length - ways  # by where the tip was; nearest to this by whole turns
+        turned = angles - needle.arc / 2.0 + on_wire / needle.radius
+        turned -= 2.0 * pi * np.rint(turned / (2.0 * pi))
+        on_wire -= needle.radius * turned
+        weights = np.abs(on_wire - middle)
+        weights *= -1.0 / SPACING
+        weights += middle / SPACING + 0.5
+        np.maximum(np.minimum(weights, 1.0, out=weights), 0.0, out=weights)
+        covered = float(weights.sum())
+        if covered > 0.0:
+            state.length = float(weights.dot(on_wire + ways)) / covered
+        else:  # only the end of the wire, or only the tip, is near the channel
+            nearest = int(np.argmin(np.abs(on_wire)))
+            state.length = float(on_wire[nearest] + ways[nearest])
+        state.covered = covered * SPACING
+        return on_wire, weights
 
     def _rub(self, covered: float) -> float:
         """Return the friction (N) at each covered point; let the wire slip where it is too large."""
@@ -254,12 +281,12 @@ class Channel:
     def _has_left(self, on_wire: Vector) -> bool:
         """Say whether the needle is out of its channel, at either end; it is then forgotten."""
         state = self.state
-        back, out = state.length <= 0.0, bool((on_wire > self._needle.length + SPACING).all())
+        back, out = state.length <= 0.0, float(on_wire.min()) > self._needle.length + SPACING
         if back or out:
             state.pulled_out = out
             state.phase, state.count, state.covered, state.swept, state.tip = Phase.OUT, 0, 0.0, 0.0, 0.0
             state.length = state.cut = state.slid = 0.0
-            self._missing = np.zeros((0, 3))
+            self._followed = None
         return back or out
 
     def _outside(self) -> tuple[int, int]:
@@ -269,11 +296,11 @@ class Channel:
 
     def _lie(self, rotation: Vector, origin: Vector, first: int, last: int) -> tuple[Vector, Vector]:
         """Return force and moment of the skin on those stations of the wire that press on it from above."""
-        places = self._stations[first:last] @ rotation.T + origin
-        depth = np.maximum(self._needle.wire_radius - places[:, 2], 0.0)
-        force, moment = np.zeros(3), np.zeros(3)
+        force, moment, stations = np.zeros(3), np.zeros(3), self._stations[first:last]
+        depth = self._needle.wire_radius - float(origin[2]) - stations.dot(rotation[2])
         if last > first and float(depth.max()) > 0.0:
-            loads = self._tissue.compression * self._share * depth
+            loads = self._tissue.surface * self._share * np.maximum(depth, 0.0)
+            places = stations.dot(rotation.T) + origin
             force[2] = float(loads.sum())
             moment[0], moment[1] = float(places[:, 1] @ loads), -float(places[:, 0] @ loads)
         return force, moment

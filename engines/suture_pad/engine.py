@@ -100,7 +100,7 @@ class SuturePad(Stepped):
             )
         phantom = params.phantom.measures
         self._holes, self._names = phantom.holes, phantom.names
-        self._half = np.array(phantom.skin[:2]) / 2.0
+        self._half = phantom.skin[0] / 2.0, phantom.skin[1] / 2.0
         self._skin = Skin(phantom.skin, phantom.holes[:, :3, 3])
         if plan := setup.bonds.get(BOND):
             self._side = ForceSide(bond_side(), plan)
@@ -154,10 +154,10 @@ class SuturePad(Stepped):
     def _push(self, position: Vector) -> Vector:
         """Return the forces (N) of the needle on the pad at its points (m), both in the world, shape (9,)."""
         rotation, shift = self._world_in_pad[:3, :3], self._world_in_pad[:3, 3]
-        points = position.reshape(3, 3) @ rotation.T + shift
+        points = position.reshape(3, 3).dot(rotation.T) + shift
         turned, origin = self._frame_of.frame(points)
-        self._tip = turned @ self._tip_in_needle + origin
-        over = bool((np.abs(self._tip[:2]) < self._half).all())
+        x, y, _ = (turned.dot(self._tip_in_needle) + origin).tolist()
+        over = abs(x) < self._half[0] and abs(y) < self._half[1]
         force, moment = self._channel.advance(turned, origin, over_pad=over)
         self._size = float(np.sqrt(force @ force))
         if self._thread is not None:
@@ -165,7 +165,7 @@ class SuturePad(Stepped):
             force, moment = force + pull, moment + cross(place, pull)
         if not (force.any() or moment.any()):
             return np.zeros(9)
-        return -(self._frame_of.forces(points, force, moment) @ rotation).ravel()
+        return self._frame_of.forces(points, -force, -moment).dot(rotation).ravel()
 
     def _report(self) -> None:
         channel, numbers = self._channel.state, self._numbers

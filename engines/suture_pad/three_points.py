@@ -14,7 +14,6 @@ from schemas.vectors import Vector
 
 __all__ = ["ThreePoints", "cross"]
 
-_ONE = np.eye(3)
 _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
@@ -49,21 +48,43 @@ class ThreePoints:
 
         Of all such forces they have the least sum of squares.
         """
-        middle = points.sum(axis=0) / 3.0
-        arms = points - middle
-        about_middle = moment - cross(middle, force)
-        inertia: Vector = float((arms * arms).sum()) * _ONE - arms.T @ arms
-        turning: Vector = np.linalg.inv(inertia) @ about_middle
-        spread: Vector = force / 3.0 + cross(turning, arms)
-        return spread
+        rows, (fx, fy, fz), (mx, my, mz) = points.tolist(), force.tolist(), moment.tolist()
+        cx, cy, cz = (sum(axis) / 3.0 for axis in zip(*rows, strict=True))
+        # the moment about the middle, and the inertia of three unit masses there
+        mx, my, mz = mx - (cy * fz - cz * fy), my - (cz * fx - cx * fz), mz - (cx * fy - cy * fx)
+        arms = [(x - cx, y - cy, z - cz) for x, y, z in rows]
+        xx, yy, zz, xy, xz, yz = (
+            sum(arm[i] * arm[j] for arm in arms) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+        )
+        turning = _solved((yy + zz, -xy, -xz, xx + zz, -yz, xx + yy), mx, my, mz)
+        u, v, w = turning
+        fx, fy, fz = fx / 3.0, fy / 3.0, fz / 3.0
+        return np.array([(fx + v * z - w * y, fy + w * x - u * z, fz + u * y - v * x) for x, y, z in arms])
+
+
+def _solved(
+    matrix: tuple[float, float, float, float, float, float], x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """Return the solution of a symmetric matrix, (11, 12, 13, 22, 23, 33), for the right side x, y, z."""
+    a, b, c, d, e, f = matrix
+    p, q, r = d * f - e * e, c * e - b * f, b * e - c * d
+    s, t, v = a * f - c * c, b * c - a * e, a * d - b * b
+    scale = 1.0 / (a * p + b * q + c * r)
+    return (
+        scale * (p * x + q * y + r * z),
+        scale * (q * x + s * y + t * z),
+        scale * (r * x + t * y + v * z),
+    )
 
 
 def _axes(points: Vector) -> Vector:
     """Return a right-handed basis of a triangle as columns, shape (3, 3)."""
-    edges = points[1:] - points[0]
-    along = edges[1] / sqrt(float(edges[1] @ edges[1]))
-    normal = cross(along, edges[0])
-    normal = normal / sqrt(float(normal @ normal))
-    basis = np.empty((3, 3))
-    basis[:, 0], basis[:, 1], basis[:, 2] = along, cross(normal, along), normal
-    return basis
+    (x, y, z), (a, b, c), (d, e, f) = points.tolist()
+    d, e, f = d - x, e - y, f - z
+    a, b, c = a - x, b - y, c - z
+    scale = 1.0 / sqrt(d * d + e * e + f * f)
+    d, e, f = scale * d, scale * e, scale * f
+    a, b, c = e * c - f * b, f * a - d * c, d * b - e * a  # across both edges
+    scale = 1.0 / sqrt(a * a + b * b + c * c)
+    a, b, c = scale * a, scale * b, scale * c
+    return np.array([(d, b * f - c * e, a), (e, c * d - a * f, b), (f, a * e - b * d, c)])

@@ -62,6 +62,13 @@ class TissueParams(Params):
             " Of the order of Young's modulus, as of a rod on an elastic foundation; assumed: 60 kPa"
         ),
     )
+    surface: _Positive = Field(
+        default=3e4,
+        description=(
+            "force per length of needle that lies on the skin, and depth, N/m^2: half of `compression`, as"
+            " there is tissue on one side only; assumed"
+        ),
+    )
     skin_stiffness: Stiffness = Field(
         default=800.0,
         gt=0.0,

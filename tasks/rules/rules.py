@@ -5,9 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar
 
+import numpy as np
+
 from hub.participant import Record
+from robots import rotation
 from robots.training.needles import NeedleShape
 from schemas.trocar_msgs import ScoreValue
 from schemas.vectors import Vector
@@ -15,7 +19,29 @@ from tasks.events import Event
 from tasks.goals import Goals
 from tasks.instant import Instant
 
-__all__ = ["AnyRules", "Rules", "Setting", "Suture", "missing_all"]
+__all__ = ["AnyRules", "Rules", "Setting", "Suture", "TipByHoles", "missing_all"]
+
+
+class TipByHoles:
+    """Where a needle's tip is by the holes; several rules ask for it at the same pose."""
+
+    def __init__(self, holes: Vector, needle: NeedleShape) -> None:
+        self._places, self._axes = holes[:, :3, 3], holes[:, :3, :3]
+        self._tip, self._pose = needle.marks[2:], b""
+        self._found = 0, np.zeros((0, 3))
+
+    def at(self, pose: Vector) -> tuple[int, Vector]:
+        """Return the nearest hole to the tip of a needle at `pose`, (7,), and the tip in all holes' frames.
+
+        The latter in m, shape (2 n, 3).
+        """
+        if (seen := pose.tobytes()) != self._pose:
+            self._pose = seen
+            tip: Vector = (self._tip @ rotation.matrix(pose[3:]).T + pose[:3])[0]
+            away = tip - self._places
+            here = np.einsum("nji,nj->ni", self._axes, away)
+            self._found = int((away * away).sum(axis=1).argmin()), here
+        return self._found
 
 
 @dataclass(frozen=True)
@@ -31,6 +57,11 @@ class Suture:
     """Whether there is an estimate of its pose."""
     asked: bool
     """Whether a report is what ends a stitch."""
+
+    @cached_property
+    def tip(self) -> TipByHoles:
+        """The tip of the needle by the holes."""
+        return TipByHoles(self.holes, self.needle)
 
 
 @dataclass(frozen=True)

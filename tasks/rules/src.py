@@ -143,10 +143,7 @@ class _Stitches(Rules[StitchState]):
 
     def _follow(self, suture: Suture, pose: Vector) -> None:
         state = self._seen
-        tip = _placed(suture.needle.marks[2:], pose)[0]
-        away = tip - suture.holes[:, :3, 3]
-        here = np.einsum("nji,nj->ni", suture.holes[:, :3, :3], away)
-        state.nearest = int((away * away).sum(axis=1).argmin())
+        state.nearest, here = suture.tip.at(pose)
         state.out = float(here[state.nearest, 2])
         for i in np.flatnonzero((np.abs(here) <= _NEAR).all(axis=1)).tolist():
             was, height = float(state.before[i]), float(here[i, 2])

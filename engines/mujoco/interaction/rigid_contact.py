@@ -30,9 +30,12 @@ class RigidContact:
         arms: Iterable[str],
         *,
         fixtures: Iterable[str] = (),
-        substep: float = 0.0,
+        every: float = 0.0,
     ) -> None:
-        """Watch the instruments of `arms`, and how they collide if there are `fixtures`; `substep` in s."""
+        """Watch the instruments of `arms`, and how they collide if there are `fixtures`.
+
+        `add` is called for `every` seconds.
+        """
         self._model, self._data, arms = model, data, list(arms)
         self._owner = _owners(model, arms)
         self._welds = [
@@ -49,7 +52,7 @@ class RigidContact:
         self._substeps, self._is_touched, self._was_touched = 0, False, False
         self._geoms, self._found, self._kinds = b"", np.zeros(0, np.intp), np.zeros(0, np.intp)
         """Pairs of geoms in contact as they were last seen, which of them count, and as what collisions."""
-        self.collisions = Collisions(model, self._owner, fixtures, substep) if fixtures else None
+        self.collisions = Collisions(model, self._owner, fixtures, every) if fixtures else None
         self._sides = np.zeros((0, len(arms)))
         """Of each of these whether its second geom (1), its first (-1) or none (0) is of an arm."""
         self.outputs = {f"{arm}/rigid_wrench": mean for arm, mean in zip(arms, self._means, strict=True)}
@@ -57,7 +60,7 @@ class RigidContact:
             self.outputs |= self.collisions.outputs
 
     def add(self) -> None:
-        """Add the forces of one sub-step; call it between `mj_step2` and `mj_step1`.
+        """Add the forces of a sub-step; call it between `mj_step2` and `mj_step1`.
 
         There the forces are solved, and the contacts are still those they belong to.
         """

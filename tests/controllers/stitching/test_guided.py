@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from controllers.expert.hand import pose_of
+from controllers.motion.frames import base_in_world
+from controllers.motion.params import MotionParams
 from controllers.stitching.guided_controller import GuidedStitching, GuidedStitchingParams
 from controllers.stitching.stage import Stage
 from hub.planning.scenario_file import load
+from robots import rotation
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.endoscope import EYES, StereoCamera, left_camera
 from schemas.ros import BoolMessage, Header, Point, PointStamped, StringMessage
 from schemas.visualization import MarkerAction
 from tests.controllers.stitching.test_surgeon import World, drop
@@ -109,6 +113,29 @@ def test_points_may_be_in_any_frame():
     assert "above the skin" in world.said[-1]
     world.pick(0, 0, "PSM7")
     assert "frame_id 'PSM7' is no frame of this scene" in world.said[-1]
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_a_pixel_of_a_picture_is_the_point_of_the_pad_under_it(eye):
+    world, camera = Guided(), StereoCamera()
+    params, entry = world.lead.params, np.array([0.008, 0.018, 0.0])
+    ecm = params.arms.ECM
+    stands = base_in_world("ECM", MotionParams(arms=params.arms))
+    left = stands @ left_camera(ecm.endoscope, camera.baseline).forward(np.array(ecm.start))
+    there = inverse_pose(left) @ params.phantom.pose @ [*entry, 1.0]
+    x, y, ahead = camera.projection(eye) @ there
+    world.pick(x / ahead, y / ahead, f"endoscope_{eye}_image")
+    assert world.lead._surgeon.guided.points[0] == pytest.approx(entry, abs=1e-9)
+    world.pick(camera.width, 0, f"endoscope_{eye}_image")
+    assert "is not in a picture of 320 x 288 pixels" in world.said[-1]
+
+
+def test_a_pixel_beside_the_pad_is_refused():
+    world = Guided()
+    back = rotation.product(world.camera[3:], np.array([1.0, 0.0, 0.0, 0.0]))
+    world.camera = np.concatenate([world.camera[:3], back])
+    world.pick(160, 144, "endoscope_left_image")
+    assert "does not look at the pad" in world.said[-1]
 
 
 @pytest.mark.parametrize(

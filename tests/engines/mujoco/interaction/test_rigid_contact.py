@@ -79,6 +79,22 @@ def test_nothing_touched_is_no_force_and_a_table_pushes_up_at_the_middle_of_a_pr
     assert np.allclose(moment, np.cross([0.0, 0.0, -0.005], force), rtol=1e-2, atol=1e-3 * force[2] * 0.005)
 
 
+def test_the_last_sub_step_alone_has_the_same_motion_and_at_rest_the_same_force():
+    rigs = [
+        Rig(
+            arms={"PSM1": {"instrument": "palpation-probe", "position": [0.0, 0.0, 0.13]}},
+            table={"position": [0, 0, 0]},
+            rigid_wrench=how,
+            timestep="0.25 ms",
+        ).run(0.2, PSM1=[0, 0, 0.12 + 0.0125, 0, 0, 0])
+        for how in (True, "last")
+    ]
+    mean, last = (rig.wrench("PSM1").copy() for rig in rigs)
+    assert last[2] > 0.5
+    assert last == pytest.approx(mean, rel=0.02, abs=1e-3)
+    assert rigs[0].engine.state_hash() == rigs[1].engine.state_hash()
+
+
 def test_two_instruments_push_one_another_with_equal_and_opposite_wrenches():
     """Probes of 5 mm hang side by side, 12 mm apart; one base frame is turned by 90 degrees.
 
