@@ -16,6 +16,7 @@ import trocar
 from learning.environments import ENVIRONMENTS
 from learning.environments.oracles import oracle
 from schemas.errors import RecordingError
+from schemas.ros import Header, Point, Pose, PoseStamped, Quaternion
 
 pytestmark = pytest.mark.xdist_group("environments")
 IDS = sorted(name for name in ENVIRONMENTS if "Retraction" not in name)
@@ -71,6 +72,20 @@ def test_episodes_of_a_vector_are_those_of_one_process(needle):
         assert list(many.get_attr("state_hash")) == alone
     finally:
         many.close()
+
+
+def test_what_has_left_the_table_ends_the_episode_and_is_back_at_reset(needle):
+    first, _ = needle.reset(seed=3)
+    beside = PoseStamped(
+        header=Header(frame_id="world"),
+        pose=Pose(position=Point(x=1.0, z=0.05), orientation=Quaternion(w=1.0)),
+    )
+    needle.unwrapped._session.advance(1, {"robot.needle/place": (beside,)})
+    _, _, terminated, _, info = needle.step(np.zeros(5))
+    assert terminated
+    assert not info["is_success"]
+    again, _ = needle.reset(seed=3)
+    assert np.array_equal(again["observation"], first["observation"])
 
 
 def test_an_action_that_is_too_large_is_clipped(needle):
