@@ -18,9 +18,11 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 OUTPUT = Path(__file__).parents[1] / "pictures" / "page.gif"
-SIZE, WIDTH, COLOURS = {"width": 1100, "height": 700}, 720, 96
-LIVE_FROM_S, LIVE_TO_S, PAST_S = 4.0, 7.0, (6.5, 6.0, 5.5, 5.0, 4.5, 4.0, 3.0, 2.0)
-TROCAR = (sys.executable, "-P", "-m", "trocar", "run", "palpation", "--open", "--set", "duration=20 s")
+SIZE, WIDTH, COLOURS = {"width": 1100, "height": 700}, 720, 128
+ACCENTS, STRIPE = ("#f2b705", "#8a5200", "#b3261e", "#00695f", "#1b6e3c", "#0b62a4", "#b84a00"), 16
+"""Of arrows, warnings, what stops, what is chosen, and plots."""
+LIVE_FROM_S, LIVE_S, BACK_S = 4.0, 3.0, (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
+TROCAR = (sys.executable, "-P", "-m", "trocar", "run", "palpation", "--open", "--set", "duration=2 min")
 
 
 def film(page: Page) -> list[Image.Image]:
@@ -38,13 +40,14 @@ def film(page: Page) -> list[Image.Image]:
 
     until("Boolean(window.trocar?.scene?.placed)")
     until(f"trocar.time > {LIVE_FROM_S}")
+    begin = page.evaluate("trocar.time")
     for share in range(16):
-        until(f"trocar.time > {LIVE_FROM_S + (LIVE_TO_S - LIVE_FROM_S) * share / 15}")
+        until(f"trocar.time > {begin + LIVE_S * share / 15}")
         take()
     slider = page.get_by_role("slider", name="Instant")
     sleep(2.5)  # what has just happened is written
-    for time in PAST_S:
-        slider.fill(str(time))
+    for back in BACK_S:
+        slider.fill(str(begin + LIVE_S - back))
         sleep(0.4)
         take()
     page.get_by_role("button", name="Live").click()
@@ -52,6 +55,16 @@ def film(page: Page) -> list[Image.Image]:
         sleep(0.6)
         take()
     return pictures
+
+
+def _colours(picture: Image.Image) -> Image.Image:
+    """Return a picture with stripes below it of the colours that must be in the palette, however few."""
+    width, height = picture.size
+    made = Image.new("RGB", (width, height + STRIPE * len(ACCENTS)))
+    made.paste(picture, (0, 0))
+    for row, colour in enumerate(ACCENTS):
+        made.paste(colour, (0, height + STRIPE * row, width, height + STRIPE * (row + 1)))
+    return made
 
 
 def main() -> None:
@@ -75,7 +88,7 @@ def main() -> None:
             run.send_signal(signal.SIGINT)
             run.wait()
     # one palette for all, so that what stands still stays the same and takes no bytes
-    palette = pictures[0].quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
+    palette = _colours(pictures[8]).quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
     frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]
     frames[0].save(OUTPUT, save_all=True, append_images=frames[1:], duration=350, loop=0, optimize=True)
 
