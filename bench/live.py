@@ -45,6 +45,7 @@ from schemas.lockstep import Ack
 LEFT_OUT = {
     "browser": "a person drives it from a page",
     "keys": "a person drives it by the keyboard",
+    "peg-board-keys": "a person drives it by the keyboard",
 }
 """Scenarios that do not run by themselves."""
 

@@ -48,7 +48,7 @@ def main() -> None:
     for _ in range(chosen.rounds):
         swept, looped = sweep(chosen.trials, chosen.jobs), loop(chosen.trials)
         print(f"{chosen.trials} trials: loop {looped:.1f} s, sweep {swept:.1f} s, {looped / swept:.2f} x;")
-        print(f"load {os.getloadavg()[0]:.1f}")
+        print(f"load {os.getloadavg()[0]:.1f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -45,15 +45,16 @@ class Expert(Controller):
         chore = self._chore = _chore(params)
         self._progress, self._seen = Progress(), Seen(n=len(chore.things))
         self._team = Team(chore, self._seen, self._progress, hand_over=params.hand_over)
-        for arm in params.hands:
-            self._team.add(Transfer(self._hand(arm), self._team, len(chore.things)))
+        self._hands = [Transfer(self._hand(arm), self._team, len(chore.things)) for arm in params.hands]
+        for each in self._hands:
+            self._team.add(each)
         self.keep(
             self._progress,
             self._seen,
-            *(part for each in self._team.hands for part in (each.state, each.refusals)),
+            *(part for each in self._hands for part in (each.state, each.refusals)),
         )
         self._outputs: dict[str, Any] = {field: self._progress.part(field) for field in PROGRESS}
-        self._outputs |= {f"{each.hand.arm}/phase": each.state.part("phase") for each in self._team.hands}
+        self._outputs |= {f"{each.hand.arm}/phase": each.state.part("phase") for each in self._hands}
 
     def _hand(self, arm: ArmName) -> Hand:
         params = self.params
@@ -66,7 +67,7 @@ class Expert(Controller):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Measured tips and jaws and the things' poses and holders in; commands and progress out."""
-        return expert_ports([each.hand.arm for each in self._team.hands], self._chore.things)
+        return expert_ports([each.hand.arm for each in self._hands], self._chore.things)
 
     @property
     def ended(self) -> str:
@@ -77,7 +78,7 @@ class Expert(Controller):
 
     def configure(self, setup: Setup) -> Outputs:
         """Start with idle hands."""
-        for each in self._team.hands:
+        for each in self._hands:
             each.hand.period = setup.period_ns * 1e-9
             self._outputs |= {f"{each.hand.arm}/servo_cp": (), f"{each.hand.arm}/jaw/move_jp": ()}
         self._outputs["status"] = ()
@@ -88,13 +89,12 @@ class Expert(Controller):
 
         Raises SessionError if a command to a hand that carries something is refused.
         """
-        hands = self._team.hands
         self._sense(inputs)
-        for each in hands:
+        for each in self._hands:
             if t == 0:
                 each.hand.stay()
             each.step()
-        for each in hands:
+        for each in self._hands:
             arm = each.hand.arm
             self._outputs[f"{arm}/servo_cp"] = (each.hand.advance(settle=each.settles),)
             self._outputs[f"{arm}/jaw/move_jp"] = each.hand.jaw_commands()
@@ -112,7 +112,7 @@ class Expert(Controller):
             done = [team.is_done(thing) for thing in range(len(verdicts))]
             progress.placed = sum(done)
             settled = all(is_done or verdict for is_done, verdict in zip(done, verdicts, strict=True))
-            if settled and all(each.state.phase is Phase.IDLE for each in team.hands):
+            if settled and all(each.state.phase is Phase.IDLE for each in self._hands):
                 self._end_leg()
         self._outputs["status"] = tuple(self._news())
 
@@ -144,7 +144,7 @@ class Expert(Controller):
         return f"{self._chore.things[thing]} {why}, at ({x:.0f}, {y:.0f}, {z:.0f}) mm"
 
     def _sense(self, inputs: Inputs) -> None:
-        for each in self._team.hands:
+        for each in self._hands:
             arm = each.hand.arm
             for event in EVENTS:
                 for message in inputs.events(f"{arm}/{event}"):
@@ -154,9 +154,7 @@ class Expert(Controller):
             each.hand.sense(inputs[f"{arm}/local/measured_cp"], float(inputs[f"{arm}/jaw/measured_js"][0]))
         for i, thing in enumerate(self._chore.things):
             holder = float(inputs[f"objects/{thing}/held_by"][0])
-            self._seen.take(
-                i, framed(inputs[f"objects/{thing}/pose"]), holder, self._team.hands[0].hand.period
-            )
+            self._seen.take(i, framed(inputs[f"objects/{thing}/pose"]), holder, self._hands[0].hand.period)
 
 
 def _chore(params: ExpertParams) -> Chore:

@@ -12,7 +12,7 @@ from controllers.expert.progress import Progress, Seen, Verdict
 from hub.participant import Record, array
 
 if TYPE_CHECKING:
-    from controllers.expert.transfer import Transfer
+    from controllers.expert.errand import Errand
 
 __all__ = ["Refusals", "Team"]
 
@@ -39,14 +39,14 @@ class Team:
     def __init__(self, chore: Chore, seen: Seen, progress: Progress, *, hand_over: bool) -> None:
         """Take the task, what all hands share, and whether two hands give things to one another."""
         self.chore, self.seen, self.progress, self._hand_over = chore, seen, progress, hand_over
-        self.hands: list[Transfer] = []
+        self.hands: list[Errand] = []
         self._sides: dict[str, int] = {}
 
-    def add(self, hand: Transfer) -> None:
+    def add(self, hand: Errand) -> None:
         """Add a hand; the surgeon's right one first."""
         self.hands.append(hand)
 
-    def other(self, hand: Transfer) -> Transfer | None:
+    def other(self, hand: Errand) -> Errand | None:
         """Return the other hand, if there is one."""
         return next((each for each in self.hands if each is not hand), None)
 
@@ -55,7 +55,7 @@ class Team:
         """The side to which things go in this leg."""
         return 1 - self.progress.leg % 2
 
-    def side_of(self, hand: Transfer) -> int:
+    def side_of(self, hand: Errand) -> int:
         """Return the side that a hand serves: that which is nearer to it than to the other one."""
         arm = hand.hand.arm
         if arm not in self._sides:
@@ -65,10 +65,10 @@ class Team:
             self._sides[arm] = int(nearer[1] - others[1] < nearer[0] - others[0])
         return self._sides[arm]
 
-    def _distance(self, hand: Transfer, side: int) -> float:
+    def _distance(self, hand: Errand, side: int) -> float:
         return float(np.linalg.norm((hand.hand.base[:3, 3] - self.chore.middle_of(side))[:2]))
 
-    def destination(self, hand: Transfer) -> int:
+    def destination(self, hand: Errand) -> int:
         """Return the side on which `hand` puts down what it has."""
         return self.side_of(hand) if hand.state.role is Role.TAKER else self.goal
 
@@ -76,11 +76,11 @@ class Team:
         """Say whether a thing is where it belongs in this leg."""
         return self.chore.is_done(thing, self.seen.poses, self.goal)
 
-    def choice(self, hand: Transfer) -> tuple[int, Role]:
+    def choice(self, hand: Errand) -> tuple[int, Role]:
         """Return the index of the thing that `hand` is to take next, -1 for none, and as what."""
         return self._exchange(hand) if self._hand_over else (self._next(hand), Role.ALONE)
 
-    def _exchange(self, hand: Transfer) -> tuple[int, Role]:
+    def _exchange(self, hand: Errand) -> tuple[int, Role]:
         other = self.other(hand)
         if other is None:
             return -1, Role.ALONE
@@ -94,7 +94,7 @@ class Team:
                 return thing, Role.GIVER
         return -1, Role.ALONE
 
-    def _next(self, hand: Transfer) -> int:
+    def _next(self, hand: Errand) -> int:
         other = self.other(hand)
         if other is not None and other.state.phase in _PICKING:
             return -1  # they would meet
@@ -103,7 +103,7 @@ class Team:
                 return thing
         return -1
 
-    def _open(self, hand: Transfer) -> list[int]:
+    def _open(self, hand: Errand) -> list[int]:
         """Return the things that `hand` might take."""
         seen, other = self.seen, self.other(hand)
         taken = -1 if other is None else other.state.thing
@@ -116,7 +116,7 @@ class Team:
             and not self.is_done(thing)
         ]
 
-    def _is_nearer(self, thing: int, hand: Transfer, other: Transfer) -> bool:
+    def _is_nearer(self, thing: int, hand: Errand, other: Errand) -> bool:
         """Say whether the place of a thing is nearer to this hand's arm than to the other's."""
         place = self.chore.place(thing, self.seen.poses, self.goal)[:2]
         mine, others = (np.linalg.norm(each.hand.base[:2, 3] - place) for each in (hand, other))
@@ -134,7 +134,7 @@ class Team:
                 elif all(hand.refusals.things[thing] for hand in self._eligible(thing)):
                     seen.verdicts[thing] = Verdict.NOT_REACHABLE
 
-    def _eligible(self, thing: int) -> list[Transfer]:
+    def _eligible(self, thing: int) -> list[Errand]:
         """Return the hands that may take a thing up."""
         if not self._hand_over:
             return self.hands

@@ -9,7 +9,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from engines.bullet.elasticity.stable_step import highest_frequency, lowest_frequency
 from engines.bullet.organs.anchors import WORLD
 from engines.bullet.organs.params import OrganParams
 from engines.bullet.world import COLLISION_MARGIN_M, quiet
@@ -46,12 +45,9 @@ class Organ:
         edges = mesh.nodes[mesh.triangles] - mesh.nodes[np.roll(mesh.triangles, 1, axis=1)]
         self.mean_edge = float(np.linalg.norm(edges, axis=2).mean())
         """Mean length of an edge of the surface, m."""
-        free = np.where(self.anchored, 0.0, 1.0)
-        self.frequency = highest_frequency(mesh, free, params.elastic)
+        self.frequency, lowest = params.frequencies
         """Highest natural frequency, rad/s."""
-        self.period = (
-            2.0 * np.pi / lowest_frequency(mesh, free, params.elastic) if self.anchored.any() else 0.0
-        )
+        self.period = 2.0 * np.pi / lowest if lowest else 0.0
         """Period of the slowest swing, s; 0 where nothing holds the organ."""
         self._client = client
         self._mesh_data = bullet.getMeshData

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from engines.bullet.elasticity.material import Material
+from engines.bullet.elasticity.stable_step import highest_frequency, lowest_frequency
 from engines.bullet.meshing.grid import FEWEST_NODES
 from engines.bullet.meshing.mesh_check import MOST_NODES, checked_mesh
 from engines.bullet.meshing.tet_mesh import TetMesh
@@ -197,6 +198,19 @@ class OrganParams(BaseModel):
             )
         return tied
 
+    @cached_property
+    def frequencies(self) -> tuple[float, float | None]:
+        """Highest natural frequency, and that of the slowest swing, rad/s; None where nothing is anchored.
+
+        They take a third of the time to make an organ, and each episode of learning makes it anew.
+        """
+        tied = np.any(list(self.anchored_nodes.values()), axis=0)
+        free = np.where(tied, 0.0, np.ones(len(self.rest.nodes)))
+        return (
+            highest_frequency(self.rest, free, self.elastic),
+            lowest_frequency(self.rest, free, self.elastic) if np.any(tied) else None,
+        )
+
     def surface(self, part: AnchorParams) -> NDArray[np.bool_]:
         """Return which nodes belong to a part of the surface, shape (n,).
 
@@ -219,9 +233,14 @@ class OrganParams(BaseModel):
 
         It is that of a punch as wide as the sphere, or as a median edge of the surface if that is longer.
         """
+        return self.elastic.contact_stiffness(max(radius, self._median_edge))
+
+    @cached_property
+    def _median_edge(self) -> float:
+        """Of the surface, m."""
         triangles = self.local.triangles
         edges = self.local.nodes[triangles] - self.local.nodes[np.roll(triangles, 1, axis=1)]
-        return self.elastic.contact_stiffness(max(radius, float(np.median(np.linalg.norm(edges, axis=2)))))
+        return float(np.median(np.linalg.norm(edges, axis=2)))
 
 
 @lru_cache(maxsize=16)

@@ -16,6 +16,7 @@ import trocar
 from learning.environments import ENVIRONMENTS
 from learning.environments.oracles import oracle
 from schemas.errors import RecordingError
+from schemas.ros import Header, Point, Pose, PoseStamped, Quaternion
 
 pytestmark = pytest.mark.xdist_group("environments")
 IDS = sorted(name for name in ENVIRONMENTS if "Retraction" not in name)
@@ -71,6 +72,20 @@ def test_episodes_of_a_vector_are_those_of_one_process(needle):
         assert list(many.get_attr("state_hash")) == alone
     finally:
         many.close()
+
+
+def test_what_has_left_the_table_ends_the_episode_and_is_back_at_reset(needle):
+    first, _ = needle.reset(seed=3)
+    beside = PoseStamped(
+        header=Header(frame_id="world"),
+        pose=Pose(position=Point(x=1.0, z=0.05), orientation=Quaternion(w=1.0)),
+    )
+    needle.unwrapped._session.advance(1, {"robot.needle/place": (beside,)})
+    _, _, terminated, _, info = needle.step(np.zeros(5))
+    assert terminated
+    assert not info["is_success"]
+    again, _ = needle.reset(seed=3)
+    assert np.array_equal(again["observation"], first["observation"])
 
 
 def test_an_action_that_is_too_large_is_clipped(needle):
@@ -147,14 +162,14 @@ def test_tissue_is_grasped_and_lifted_and_a_new_episode_has_it_where_it_was():
     pytest.importorskip("pybullet")
     env = gymnasium.make("trocar/Retraction-v0", reward="shaped")
     hashes = []
-    for _ in range(2):
+    for steps in (8, 2):
         observation, _ = env.reset(seed=0)
         policy = oracle(env.unwrapped)
-        for _ in range(8):
+        for _ in range(steps):
             observation, *_, info = env.step(policy(observation))
-        hashes.append(env.unwrapped.state_hash)
-    assert info["is_success"]
-    assert hashes[0] == hashes[1]
+            hashes.append(env.unwrapped.state_hash)
+        assert info["is_success"] == (steps == 8)
+    assert hashes[8:] == hashes[:2]
     env.close()
 
 

@@ -7,25 +7,26 @@ import pyarrow.parquet as pq
 import pytest
 
 CLUSTER = """
-import subprocess, sys
+import sys
 from ray.cluster_utils import Cluster
+from hub.command_line.app import main
 
 cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
 try:
     cluster.add_node(num_cpus=1)
-    done = subprocess.run([*sys.argv[1:], "--ray", cluster.address], check=False)
+    sys.argv = ["trocar", *sys.argv[1:], "--ray", cluster.address]
+    main()
 finally:
     cluster.shutdown()
-sys.exit(done.returncode)
 """
 
 
 @pytest.mark.xdist_group("all cores")
 def test_trials_on_two_nodes(scenario, tmp_path):
     output = tmp_path / "results"
-    sweep = [sys.executable, "-m", "trocar", "sweep", scenario, "--vary", "part.value=0,0.5", "-o", output]
+    sweep = ["sweep", scenario, "--vary", "part.value=0,0.5", "-o", output]
     done = subprocess.run(
-        [sys.executable, "-c", CLUSTER, *sweep], check=False, capture_output=True, text=True
+        [sys.executable, "-P", "-c", CLUSTER, *sweep], check=False, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     rows = pq.read_table(output / "results.parquet").to_pylist()
