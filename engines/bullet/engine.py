@@ -203,7 +203,7 @@ class BulletEngine(Stepped):
             self._sub_grids.append((probe, probe.sub_grid))
 
     def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:
-        sub_grid.update(probe.positions[0], probe.velocities[0], probe.forces[0])
+        sub_grid.update(probe.positions[0], probe.forces[0], probe.near)
         if sub_grid.is_beyond:
             _warn_once(
                 f"participant '{self.name}', probe '{probe.name}': it pressed deeper than {DEEPEST:g} radii,"

@@ -18,12 +18,13 @@ import numpy as np
 
 from engines.bullet.elasticity.forces import Elasticity
 from engines.bullet.elasticity.material import Material
-from engines.bullet.meshing.tet_mesh import Indices, cross
+from engines.bullet.meshing.tet_mesh import Indices
 from engines.bullet.organs.organ import Organ
+from engines.bullet.probes.near_faces import NearFaces, near_faces
 from engines.bullet.probes.probe import Probe
 from schemas.vectors import Vector
 
-__all__ = ["BAND_M", "CONTACT_PERIOD_NS", "Contacts", "Tissue", "closest_points", "touched_faces"]
+__all__ = ["BAND_M", "CONTACT_PERIOD_NS", "Contacts", "Tissue"]
 
 CONTACT_PERIOD_NS = 8_000_000
 """How often the nodes are read to find where probes touch and what force they receive."""
@@ -44,12 +45,6 @@ _LEAST_PART = 1e-3
 
 _LEAST_FORCE_N = 5e-3
 """Below this the inertia of the touched nodes, of some 0.1 g each, counts in what they receive."""
-
-_NEXT = (1, 2, 0)
-"""Corner of a triangle after each."""
-
-_ALL_SIDES = 0b111111
-"""The six sides of a box, each a bit."""
 
 
 class Tissue:
@@ -111,11 +106,15 @@ class Contacts:
         self._tissues = tissues
 
     def update(self, probes: Sequence[Probe]) -> None:
-        """Correct every gain by what the tissue receives; the organs' nodes have just been read."""
+        """Note which faces each probe is near to, and correct every gain by what the tissue receives.
+
+        The organs' nodes have just been read.
+        """
         touches: list[list[_Touch]] = [[] for _ in self._tissues]
         for probe in probes:
             loose = np.flatnonzero(~probe.held)
-            found = [_touches(tissue, probe, loose) for tissue in self._tissues]
+            probe.near = [_near(tissue.organ, probe, loose) for tissue in self._tissues]
+            found = [_touches(near, probe, loose) for near in probe.near]
             for sphere in range(len(probe.radii)):
                 here = [(i, touch[sphere]) for i, touch in enumerate(found) if sphere in touch]
                 probe.touching[sphere] = bool(here)
@@ -130,43 +129,16 @@ class Contacts:
             tissue.advance()
 
 
-def touched_faces(
-    centres: Vector, reach: Vector, nodes: Vector, faces: Indices
-) -> tuple[Indices, Indices, Vector, Vector]:
-    """Return which spheres touch which faces: all pairs with a distance below the sphere's `reach`.
-
-    A pair is the number of the sphere, shape (p,), and its face, shape (p, 3). Also returned are the
-    barycentric coordinates of the faces' nearest points, shape (p, 3), and their distances (m), shape (p,).
-    Pairs stand in the order of the spheres, then of the faces.
-
-    Args:
-        centres: of the spheres, m, shape (k, 3).
-        reach: of each, m, shape (k,).
-        nodes: m, shape (n, 3).
-        faces: the three nodes of each, shape (f, 3).
-    """
-    low, high = centres - reach[:, None], centres + reach[:, None]
-    close = np.flatnonzero(((nodes.min(axis=0) < high) & (nodes.max(axis=0) > low)).all(axis=1))
-    if not close.size:
-        return close, np.zeros((0, 3), np.int64), np.zeros((0, 3)), np.zeros(0)
-    # A face is near where on each of the six sides of the sphere's box some corner of it is inside.
-    inside = np.concatenate([nodes < high[close, None], nodes > low[close, None]], axis=2)  # (c, n, 6)
-    sides = np.packbits(inside, axis=2, bitorder="little")[:, :, 0]
-    a, b, c = faces.T
-    sphere, face = np.nonzero((sides[:, a] | sides[:, b] | sides[:, c]) == _ALL_SIDES)
-    sphere, corners = close[sphere], faces[face]
-    weights, distance = closest_points(centres[sphere], nodes[corners])
-    within = distance < reach[sphere]
-    return sphere[within], corners[within], weights[within], distance[within]
+def _near(organ: Organ, probe: Probe, loose: Indices) -> NearFaces:
+    """Return the faces that the spheres `loose` are near to: as far as they touch, or the probe looks."""
+    reach = np.maximum(probe.radii[loose] + BAND_M, probe.sight)
+    return near_faces(probe.positions[loose], reach, organ.nodes, organ.touchable)
 
 
-def _touches(tissue: Tissue, probe: Probe, loose: Indices) -> dict[int, _Touch]:
-    """Return by number, of the spheres `loose`, those that touch the tissue."""
+def _touches(near: NearFaces, probe: Probe, loose: Indices) -> dict[int, _Touch]:
+    """Return by number, of the spheres `loose`, those that touch."""
     reach = probe.radii[loose] + BAND_M
-    organ = tissue.organ
-    pairs, faces, weights, distances = touched_faces(
-        probe.positions[loose], reach, organ.nodes, organ.touchable
-    )
+    pairs, faces, weights, distances = near.within(reach)
     starts = np.searchsorted(pairs, np.arange(len(loose) + 1)).tolist()
     return {
         sphere: _touch(probe, sphere, reach[i], faces[start:end], weights[start:end], distances[start:end])
@@ -205,29 +177,3 @@ def _correct(tissue: Tissue, touches: Sequence[_Touch]) -> None:
                 min(max(needed, 1.0), _LARGEST_GAIN) / touch.guess - probe.corrections[i]
             )
         probe.gains[i] = min(max(touch.guess * probe.corrections[i], 1.0), _LARGEST_GAIN)
-
-
-def closest_points(point: Vector, corners: Vector) -> tuple[Vector, Vector]:
-    """Return the points of triangles that are nearest to `point` (m), one for all or one for each.
-
-    They come as barycentric coordinates, shape (f, 3), with their distances (m), shape (f,). The nearest
-    point is the foot of the perpendicular if that lies inside the triangle, else it lies on an edge.
-    """
-    edges = corners.take(_NEXT, axis=1) - corners  # (f, 3, 3): edge k from corner k
-    to_point = np.reshape(point, (-1, 1, 3)) - corners  # (f, 3, 3)
-    b, c = edges[:, 0], corners[:, 2] - corners[:, 0]  # from corner 0
-    normal = cross(b, c)
-    square = np.einsum("fi,fi->f", normal, normal)
-    on_c = np.einsum("fi,fi->f", cross(b, to_point[:, 0]), normal) / square
-    on_b = np.einsum("fi,fi->f", cross(to_point[:, 0], c), normal) / square
-    along = np.einsum("fki,fki->fk", to_point, edges) / np.einsum("fki,fki->fk", edges, edges)
-    along = np.minimum(np.maximum(along, 0.0), 1.0)
-    candidates = np.zeros((4, len(corners), 3))
-    candidates[0, :, 0], candidates[0, :, 1], candidates[0, :, 2] = 1.0 - on_b - on_c, on_b, on_c
-    for i in range(3):
-        candidates[1 + i, :, i], candidates[1 + i, :, _NEXT[i]] = 1.0 - along[:, i], along[:, i]
-    away = np.einsum("kfi,fij->kfj", candidates, corners) - point
-    distance = np.sqrt((away * away).sum(axis=2))
-    distance[0, (candidates[0] < 0.0).any(axis=1)] = np.inf
-    best, face = distance.argmin(axis=0), np.arange(len(corners))
-    return candidates[best, face], distance[best, face]

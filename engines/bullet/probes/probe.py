@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from schemas.ports import BondSide
 from schemas.vectors import Vector
 
 if TYPE_CHECKING:
+    from engines.bullet.probes.near_faces import NearFaces
     from engines.bullet.probes.sub_grid import SubGrid
 
 __all__ = ["Probe"]
@@ -86,6 +88,8 @@ class Probe:
         self._reset_rate = 1.0 / coupling.reset_time if coupling.reset_time else 0.0
         self.sub_grid: SubGrid | None = None
         """What the only sphere's mesh lacks in compliance; with it the coupling needs no reset."""
+        self.near: Sequence[NearFaces] = ()
+        """Faces near the spheres that are not held, at the last reading of the contacts, of each organ."""
         self._placed = False
         self._client = client
         self.bodies: list[int] = [self._sphere(radius) for radius in self.radii.tolist()]
@@ -103,6 +107,11 @@ class Probe:
         It is that of the last sub-step, or of the end of the last step.
         """
         return self._springs + self._dampers
+
+    @property
+    def sight(self) -> float:
+        """How far from its centre (m) a sphere looks for faces that it does not touch yet."""
+        return 0.0 if self.sub_grid is None else self.sub_grid.sight(self.velocities[0])
 
     @property
     def contacts(self) -> Vector:

@@ -20,7 +20,8 @@ from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
 from engines.bullet.elasticity.material import Material
 from engines.bullet.meshing.tet_mesh import Indices
 from engines.bullet.organs.organ import Organ
-from engines.bullet.probes.contact_gain import BAND_M, CONTACT_PERIOD_NS, closest_points, touched_faces
+from engines.bullet.probes.contact_gain import BAND_M, CONTACT_PERIOD_NS
+from engines.bullet.probes.near_faces import NearFaces, closest_points
 from engines.bullet.probes.params import Coupling
 from schemas.vectors import Vector
 
@@ -124,17 +125,26 @@ class SubGrid:
         if keep:
             self.yielded, self._speed, self._is_new = yielded, speed, False
 
-    def update(self, centre: Vector, velocity: Vector, force: Vector) -> None:
+    def sight(self, velocity: Vector) -> float:
+        """Return how far (m) from the centre of a sphere with this velocity (m/s) a face may soon be touched.
+
+        velocity: shape (3,).
+        """
+        return self._radius + _NEAR_M + 2e-9 * CONTACT_PERIOD_NS * float(np.sqrt(velocity @ velocity))
+
+    def update(self, centre: Vector, force: Vector, near: Sequence[NearFaces]) -> None:
         """Take the law of the place where the sphere is; the organs' nodes have just been read.
 
         Args:
             centre: of the sphere, m, in `world`, shape (3,).
-            velocity: m/s, shape (3,).
             force: of the coupling on it, N, shape (3,).
+            near: the faces in its `sight`, of each surface.
         """
-        reach = self._radius + _NEAR_M + 2e-9 * CONTACT_PERIOD_NS * float(np.sqrt(velocity @ velocity))
-        found = ((self._place(one, centre, reach), forces) for one, forces in self._laws)
-        places = [(place, forces) for place, forces in found if place is not None]
+        places = [
+            (self._place(surface, faces), forces)
+            for (surface, forces), faces in zip(self._laws, near, strict=True)
+            if len(faces.spheres)
+        ]
         if not places:
             self.yielded, self._speed, self.inward, self.ratio = 0.0, 0.0, np.zeros(3), 1.0
             self._forces = self._yields = np.zeros(1)
@@ -179,13 +189,9 @@ class SubGrid:
         missing = self._depths + (body - self.ratio * mesh - 1.0 / self._coupling.stiffness) * forces
         return np.maximum.accumulate(np.maximum(missing, 0.0))
 
-    def _place(self, surface: Surface, centre: Vector, reach: float) -> _Place | None:
-        """Return where the sphere is, if a face is nearer to its centre than `reach` (m)."""
-        _, faces, weights, distances = touched_faces(
-            centre[None], np.array([reach]), surface.organ.nodes, surface.organ.touchable
-        )
-        if not len(faces):
-            return None
+    def _place(self, surface: Surface, near: NearFaces) -> _Place:
+        """Return where the sphere is that is near these faces."""
+        _, faces, weights, distances = near
         share = np.maximum(self._radius + BAND_M - distances, 0.0)
         if not share.any():
             share[distances.argmin()] = 1.0
