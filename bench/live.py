@@ -63,8 +63,14 @@ class Case(NamedTuple):
 
     name: str
     scenario: str
-    one_host: bool = False
+    apart: bool = False
+    """Whether its tissue has a process of its own."""
     recorded: bool = False
+
+    @property
+    def settings(self) -> list[str]:
+        """What is set in the scenario."""
+        return ["participants.tissue.host=tissue"] if self.apart else []
 
 
 @dataclass
@@ -223,9 +229,8 @@ def run_session(case: Case, seconds: float) -> Cost:
     with tempfile.TemporaryDirectory() as directory:
         meter = Meter()
         launch(
-            load(case.scenario, overrides(seconds)),
+            load(case.scenario, overrides(seconds) + case.settings),
             endpoint=ENDPOINT,
-            one_host=case.one_host,
             record=Path(directory) / "run" if case.recorded else None,
         ).run(meter)
         return meter.cost
@@ -236,8 +241,8 @@ def run_attainable(case: Case, seconds: float) -> float | None:
 
     Its profile tells the waits for the wall clock from all else. None: it has no observers.
     """
-    file = load(case.scenario, overrides(seconds, "realtime"))
-    session = launch(file, endpoint=ENDPOINT, one_host=case.one_host, profile=True)
+    file = load(case.scenario, overrides(seconds, "realtime") + case.settings)
+    session = launch(file, endpoint=ENDPOINT, profile=True)
     if not session.plan.observers():
         return None
     profile = session.run().profile
@@ -260,8 +265,8 @@ def cases(scenarios: Sequence[str]) -> list[Case]:
     rows = [Case(name, name) for name in names if name != "palpation"]
     if "palpation" in names:
         rows += [
-            Case(f"palpation, {places} {kept}", "palpation", one_host, recorded)
-            for places, one_host in (("two processes,", False), ("one process,", True))
+            Case(f"palpation, {places} {kept}", "palpation", apart, recorded)
+            for places, apart in (("one process,", False), ("two processes,", True))
             for kept, recorded in (("not recorded", False), ("recorded", True))
         ]
     return rows

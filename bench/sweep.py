@@ -17,7 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 TROCAR = [sys.executable, "-P", "-m", "trocar"]
-SETTINGS = ["--set", "duration=50 ms", "--set", "participants.tissue.host=hub"]
+SETTINGS = ["--set", "duration=50 ms"]
 
 
 def sweep(trials: int, jobs: int) -> float:

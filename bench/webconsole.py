@@ -4,11 +4,11 @@ python -m bench.webconsole [server] [page] [seek] [step] [--seconds 6] [--minute
 
 `server`: processor time of a server process whose source is fed with the whole cart at 60 Hz, an organ of
 1024 nodes and two pictures of 320 x 288 at 30 Hz, for one page and for four, which acknowledge each frame;
-how the values come from Zenoh to the process is not in it. `page`: bytes of page and scene as they are
-sent, the time to the first picture, and frames per second in headless Chromium with software OpenGL. `seek`:
-the time to look up robot, organ and wrench at random instants of a recording, compared with a scan of the
-file. `step`: processor time of `palpation` at pace `fast`
-in one process, start included, with and without what a page shows being subscribed to, in turns, and the
+feeding stands beside it, and how the values come from Zenoh to the process is not in it. `page`: bytes of
+page and scene as they are sent, the time to the first picture, and frames per second in headless Chromium
+with software OpenGL. `seek`: the time to look up robot, organ and wrench at random instants of a recording,
+compared with a scan of the file. `step`: processor time of `palpation` at pace `fast` in one process, start
+included, with and without what a page shows being subscribed to, in turns, and the
 state hashes of both. The load of the machine stands beside.
 """
 
@@ -18,6 +18,7 @@ import argparse
 import asyncio
 import http.client
 import json
+import math
 import os
 import shutil
 import struct
@@ -29,10 +30,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
-from time import monotonic, perf_counter, process_time, sleep
+from time import clock_gettime, monotonic, perf_counter, process_time, pthread_getcpuclockid, sleep
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from websockets.asyncio.client import connect
 
 from hub.planning.scenario_file import load
@@ -74,14 +76,19 @@ class Fed:
             Outlet("tissue", Port(name="liver/nodes", causality="output", type=SoftBodyState.ros_type)),
             *(Outlet("endoscope", Port(name=f"{eye}/image", **picture)) for eye in ("left", "right")),
         )
-        rng = np.random.default_rng(0)
-        self._grid = rng.normal(0.0, 0.02, (NODES, 3)).astype(np.float32)
-        self._faces = rng.integers(0, NODES, (2 * NODES, 3)).astype(np.uint32)
-        self._jpeg = rng.integers(0, 255, PICTURE_BYTES).astype(np.uint8)
+        self._nodes, self._faces = _ring()
+        self._jpeg = np.random.default_rng(0).integers(0, 255, PICTURE_BYTES).astype(np.uint8)
         self._values: dict[str, Value] = {}
         self.state: dict[str, Any] = {"session": "bench", "state": "running", "time": 0.0}
         self._ending = threading.Event()
-        threading.Thread(target=self._feed, daemon=True).start()
+        self._thread = threading.Thread(target=self._feed, daemon=True)
+        self._thread.start()
+
+    @property
+    def core_s(self) -> float:
+        """Processor time of feeding: in a session other processes and the threads of Zenoh do that."""
+        assert self._thread.ident is not None
+        return clock_gettime(pthread_getcpuclockid(self._thread.ident))
 
     def _feed(self) -> None:
         start = monotonic()
@@ -89,7 +96,7 @@ class Fed:
             at = round(tick * 1e9 / 60)
             self._values["robot.qpos"] = Value(at, self.qpos.encode(np.full(self.qpos.size, 1e-4 * tick), at))
             if tick % 2 == 0:
-                nodes = self._grid + np.float32(1e-3 * np.sin(tick / 20))
+                nodes = self._nodes * np.float32(1.0 + 0.05 * np.sin(tick / 20))
                 state = SoftBodyState(header={}, body="liver", nodes_m=nodes.ravel())
                 self._values["tissue.liver/nodes"] = Value(at, encode(state))
                 for eye in ("left", "right"):
@@ -110,7 +117,7 @@ class Fed:
         """Return the organ with its surface."""
         faces = self._faces.ravel()
         return Value(
-            0, encode(SoftBodyState(header={}, body="", nodes_m=self._grid.ravel(), triangles=faces))
+            0, encode(SoftBodyState(header={}, body="", nodes_m=self._nodes.ravel(), triangles=faces))
         )
 
     def close(self) -> None:
@@ -118,14 +125,28 @@ class Fed:
         self._ending.set()
 
 
+def _ring() -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Return nodes (m) and triangles of a ring of 84 mm, which are as many as the figures are for."""
+    side = math.isqrt(NODES)
+    around, across = (2.0 * np.pi * angle / side for angle in np.divmod(np.arange(NODES), side))
+    reach = 0.03 + 0.012 * np.cos(across)
+    nodes = np.column_stack([reach * np.cos(around), reach * np.sin(around), 0.012 * np.sin(across)])
+    row, column = np.divmod(np.arange(NODES), side)
+    right, up = side * ((row + 1) % side) + column, side * row + (column + 1) % side
+    corner, opposite = side * row + column, side * ((row + 1) % side) + (column + 1) % side
+    faces = np.vstack([np.column_stack([corner, right, opposite]), np.column_stack([corner, opposite, up])])
+    return nodes.astype(np.float32), faces.astype(np.uint32)
+
+
 def serve() -> None:
-    """Serve the fed source in this process; say where, and at each line that comes the processor time."""
+    """Serve the fed source in this process; say where, and at each line that comes the processor times."""
     source = Fed()
     server = Server(Console(source, Pilots()), on_loopback(0))  # pyright: ignore[reportArgumentType]
     thread = threading.Thread(target=server.run)
     thread.start()
     while not sys.stdin.closed and (asked := sys.stdin.readline()):
-        answer = server.gate.invite("operator") if asked.strip() == "link" else process_time()
+        times = process_time() - source.core_s, source.core_s
+        answer = server.gate.invite("operator") if asked.strip() == "link" else times
         print(json.dumps([server.port, answer]), flush=True)
     server.stop()
     thread.join()
@@ -186,8 +207,7 @@ def bench_server(seconds: float) -> dict[str, Any]:
     with served() as server:
         cookies = [server.cookie() for _ in range(4)]
         asyncio.run(_page(server.port, cookies[0], True, 3.0))  # the model is built
-        idle = _share(server, lambda: sleep(seconds / 2))
-        rows["no page"] = {"core_percent": round(idle, 1)}
+        rows["no page"] = _shares(server, lambda: sleep(seconds / 2))
         for pages, pictures in ((1, True), (1, False), (4, True)):
 
             async def look(pages: int = pages, pictures: bool = pictures) -> list[tuple[int, int]]:
@@ -195,20 +215,21 @@ def bench_server(seconds: float) -> dict[str, Any]:
                 return await asyncio.gather(*each)
 
             found: list[tuple[int, int]] = []
-            share = _share(server, lambda look=look, found=found: found.extend(asyncio.run(look())))
+            shares = _shares(server, lambda look=look, found=found: found.extend(asyncio.run(look())))
             rows[f"{pages} pages, pictures {'on' if pictures else 'off'}"] = {
-                "core_percent": round(share, 1),
+                **shares,
                 "frames_per_s": round(sum(f for f, _ in found) / pages / seconds, 1),
                 "mb_per_s_each": round(sum(b for _, b in found) / pages / seconds / 1e6, 3),
             }
     return rows
 
 
-def _share(server: Served, run: Any) -> float:
-    """Return the processor time of the server while something runs, in percent of a core."""
+def _shares(server: Served, run: Any) -> dict[str, float]:
+    """Return the processor time of the server, and of what feeds it, while something runs; % of a core."""
     before, begun = server.ask("time"), perf_counter()
     run()
-    return 100.0 * (server.ask("time") - before) / (perf_counter() - begun)
+    took = np.subtract(server.ask("time"), before) / (perf_counter() - begun)
+    return dict(zip(("core_percent", "feed_percent"), (100.0 * took).round(1).tolist(), strict=True))
 
 
 def bench_page(seconds: float) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,9 @@ class Console:
     def __init__(self, source: Live | Recorded, pilots: Pilots) -> None:
         self.source, self.pilots = source, pilots
         self.started = Started()
+        self.drawable: Callable[[], None] = lambda: None
+        """Is called in a thread when it is known what can be drawn of a session, and nothing of it is left to
+        compute: to compile a model stops all threads for up to 0.1 s."""
         if isinstance(source, Live):
             source.left_out = self.started.pids
         self._stage: Stage | None = None
@@ -52,6 +56,7 @@ class Console:
                 self._stage = await asyncio.to_thread(Stage, scenario, self.source.outlets)
                 await asyncio.to_thread(lambda: self._stage and self._stage.packed)
                 self._generation, self._made = generation, {}
+                await asyncio.to_thread(self.drawable)
             return self._stage
 
     def want(self, page: object, names: frozenset[str] | None) -> None:

@@ -80,10 +80,15 @@ def pose_content(poses: NDArray[np.float32]) -> bytes:
 def node_content(nodes: NDArray[np.float32]) -> bytes:
     """Return least node and step, f32 (3,) each, and the steps from there to each node, u16 (3, n).
 
-    In an organ of 200 mm a node is 1.5 um aside at most. `nodes`: shape (n, 3).
+    In an organ of 200 mm a node is 1.5 um aside at most. `nodes`: x, y, z of one after the other. Raises
+    MessageError if they are not whole or not finite.
     """
-    columns = np.ascontiguousarray(nodes.T)
+    if nodes.size % 3:
+        raise MessageError(f"{nodes.size} numbers are no nodes of three")
+    columns = np.ascontiguousarray(nodes.reshape(-1, 3).T)
     low, high = columns.min(axis=1, keepdims=True), columns.max(axis=1, keepdims=True)
+    if not np.isfinite(high - low).all():
+        raise MessageError("a node is not finite")
     step = np.maximum((high - low) / np.float32(65535.0), np.float32(1e-12))
     steps: NDArray[np.uint16] = np.rint((columns - low) / step).astype("<u2")
     return low.astype("<f4").tobytes() + step.astype("<f4").tobytes() + steps.tobytes()

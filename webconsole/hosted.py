@@ -42,7 +42,10 @@ class HostedDevices:
         self._ending = threading.Event()
 
     def join(self, endpoint: str, plan: Plan) -> None:
-        """Host what pages may lead in a session; what another process hosts already is left alone."""
+        """Host what pages may lead in a session; what another process hosts already is left alone.
+
+        Each is offered once it takes part: what a page did earlier would wait until then.
+        """
         led = [
             name
             for name, planned in plan.participants.items()
@@ -51,7 +54,6 @@ class HostedDevices:
         self._pilots.keep(led)
         for name in led:
             self._endpoints[name] = endpoint
-            self._pilots.offer(name, partial(_give, name))
             held = self._threads.get(name)
             if held is None or not held.is_alive():
                 self._threads[name] = threading.Thread(target=self._host, args=(name,), daemon=True)
@@ -61,6 +63,7 @@ class HostedDevices:
         hand_of(name).served = True
         request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
         host = DeviceHost(name, lambda: reach(self._endpoints[name], name), Keys("*"), request, None)
+        host.joined = partial(self._pilots.offer, name, partial(_give, name))
         try:
             host.serve(self._check)
         except TrocarError as error:

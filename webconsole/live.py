@@ -78,8 +78,9 @@ class Live:
         self._entries: deque[tuple[int, Entry]] = deque(maxlen=_ENTRIES_KEPT)
         self._numbered = 0
         self._lines = Entries()
-        self.joined: Callable[[str, Plan], None] = lambda _endpoint, _plan: None
-        """Is called with endpoint and plan of each session that is reached."""
+        self.plan: Plan | None = None
+        self.endpoint = ""
+        """Where the hub of the session listens."""
         self.left_out: Callable[[], set[int]] = set
         """Returns the processes of hubs that have pages of their own."""
         self._status: SessionStatus | None = None
@@ -222,8 +223,8 @@ class Live:
             keys = Keys(name)
             described = ask(session, keys.control("describe"), Empty(), DescribeReply)
             with self._lock:
+                self.endpoint, self.plan = endpoint, described.plan
                 self._begin(session, keys, described, here=is_loopback(endpoint))
-            self.joined(endpoint, described.plan)
             status = session.declare_subscriber(keys.status, Callback(self._take_status, indirect=False))
             alive = session.liveliness().declare_subscriber(
                 keys.alive("hub", "hub"), Callback(self._take_life, indirect=True), history=True

@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Iterator
-from time import monotonic_ns
+from collections.abc import Iterator, Sequence
+from time import monotonic, monotonic_ns
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -45,6 +45,8 @@ _FRAME_S = 1.0 / 60.0
 _STATE_S = 0.25
 _MOST_WAITING = 2
 """Frames that a page has not acknowledged; until it does, newer values replace what it would have got."""
+_PICTURES_PER_S = 25.0
+"""Of each eye, at most: with 14 kB each, scene and organ, a page gets less than 1 MB/s."""
 _MESSAGES_PER_S = 400.0
 """Of a page: 60 acknowledgements, 120 inputs of a hand, and a burst of them after a pause."""
 _MOST_REFUSED = 200
@@ -72,6 +74,7 @@ class Page:
         self._surfaces: set[str] = set()
         self._lines = 0
         self._rate = TokenBucket(_MESSAGES_PER_S)
+        self._pictures = TokenBucket(_PICTURES_PER_S, 2.0)
         self._refused = 0
         self._changed = asyncio.Event()
 
@@ -246,10 +249,11 @@ class Page:
             self._console.want(self, stage.shown.union(pictures, numbers))
 
     async def _frames(self) -> None:
-        live = self._console.source.kind == "live"
+        live, due_s = self._console.source.kind == "live", monotonic()
         while True:
             if live and self._at_ns is None:
-                await asyncio.sleep(_FRAME_S)
+                due_s = max(due_s + _FRAME_S, monotonic())  # a late frame is not caught up
+                await asyncio.sleep(due_s - monotonic())
             else:
                 await self._changed.wait()
                 self._changed.clear()
@@ -294,12 +298,18 @@ class Page:
             value = self._newest(name)
             if value is not None and not self._is_shown(name, value):
                 yield self._console.section(stage, name, value)
-        for name in stage.pictures if self._show.pictures else ():
-            yield from self._changed_section(stage, name)
+        if self._show.pictures and (self._at_ns is not None or self._has_new(stage.pictures)):
+            for name in stage.pictures:
+                yield from self._changed_section(stage, name)
         for index, name in enumerate(self._show.numbers):
             value = self._newest(name) if stage.is_numeric(name) else None
             if value is not None and self._are_new({name: value}):
                 yield stage.sample(index, name, value)
+
+    def _has_new(self, pictures: Sequence[str]) -> bool:
+        """Return whether there are new pictures and the page may have them; both eyes' go together."""
+        new = any(self._newest(name) is not self._sent.get(name) for name in pictures)
+        return new and self._pictures.spend(monotonic_ns())
 
     def _changed_section(self, stage: Stage, name: str) -> Iterator[Section]:
         value = self._newest(name)

@@ -94,7 +94,12 @@ def _serve(
     link = f"{listening.origins[0]}{server.gate.invite(role)}"
     hosted = HostedDevices(pilots)
     if isinstance(source, Live):
-        source.joined = hosted.join
+
+        def join() -> None:
+            if source.plan is not None:
+                hosted.join(source.endpoint, source.plan)
+
+        console.drawable = join
         source.start()
 
     def started() -> None:

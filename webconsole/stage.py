@@ -25,6 +25,7 @@ from webconsole.felt import felt_wrenches
 from webconsole.frame import Section, SectionKind, node_content
 from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
+from webconsole.payload import first_sequence
 from webconsole.source import Outlet, Value
 
 __all__ = ["GROUP", "Stage"]
@@ -117,14 +118,13 @@ class Stage:
     def section(self, name: str, value: Value) -> Section:
         """Return what a frame has of an outlet that is a surface, markers or a picture."""
         if name in self.surfaces:
-            nodes = decode(SoftBodyState, value.payload).nodes_m.reshape(-1, 3)
+            nodes = np.frombuffer(first_sequence(value.payload, 4), "<f4")
             content = node_content(nodes) if nodes.size else b""
             return Section(SectionKind.NODES, [*self.surfaces].index(name), content)
         if name in self.markers:
             content = marker_content(decode(ShownMarkers, value.payload))
             return Section(SectionKind.MARKERS, self.markers.index(name), content)
-        picture = decode(CompressedImage, value.payload)
-        return Section(SectionKind.PICTURE, self.pictures.index(name), picture.data.tobytes())
+        return Section(SectionKind.PICTURE, self.pictures.index(name), first_sequence(value.payload, 1))
 
     def surface(self, name: str, first: Value) -> Section | None:
         """Return the triangles of a soft surface; None if this message has none."""

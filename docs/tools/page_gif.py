@@ -19,8 +19,8 @@ from playwright.sync_api import Page, sync_playwright
 
 OUTPUT = Path(__file__).parents[1] / "pictures" / "page.gif"
 SIZE, WIDTH, COLOURS = {"width": 1100, "height": 700}, 720, 96
-LIVE_FROM_S, LIVE_TO_S, PAST_S = 4.0, 7.0, (6.5, 6.0, 5.5, 5.0, 4.5, 4.0, 3.0, 2.0)
-TROCAR = (sys.executable, "-P", "-m", "trocar", "run", "palpation", "--open", "--set", "duration=20 s")
+LIVE_FROM_S, LIVE_S, BACK_S = 4.0, 3.0, (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
+TROCAR = (sys.executable, "-P", "-m", "trocar", "run", "palpation", "--open", "--set", "duration=2 min")
 
 
 def film(page: Page) -> list[Image.Image]:
@@ -38,13 +38,14 @@ def film(page: Page) -> list[Image.Image]:
 
     until("Boolean(window.trocar?.scene?.placed)")
     until(f"trocar.time > {LIVE_FROM_S}")
+    begin = page.evaluate("trocar.time")
     for share in range(16):
-        until(f"trocar.time > {LIVE_FROM_S + (LIVE_TO_S - LIVE_FROM_S) * share / 15}")
+        until(f"trocar.time > {begin + LIVE_S * share / 15}")
         take()
     slider = page.get_by_role("slider", name="Instant")
     sleep(2.5)  # what has just happened is written
-    for time in PAST_S:
-        slider.fill(str(time))
+    for back in BACK_S:
+        slider.fill(str(begin + LIVE_S - back))
         sleep(0.4)
         take()
     page.get_by_role("button", name="Live").click()
@@ -52,6 +53,15 @@ def film(page: Page) -> list[Image.Image]:
         sleep(0.6)
         take()
     return pictures
+
+
+def _beside(*pictures: Image.Image) -> Image.Image:
+    """Return one picture of several: before, in contact, and in the past."""
+    width, height = pictures[0].size
+    made = Image.new("RGB", (width, height * len(pictures)))
+    for row, one in enumerate(pictures):
+        made.paste(one, (0, row * height))
+    return made
 
 
 def main() -> None:
@@ -75,7 +85,9 @@ def main() -> None:
             run.send_signal(signal.SIGINT)
             run.wait()
     # one palette for all, so that what stands still stays the same and takes no bytes
-    palette = pictures[0].quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
+    palette = _beside(pictures[0], pictures[8], pictures[-len(BACK_S)]).quantize(
+        COLOURS, method=Image.Quantize.MAXCOVERAGE
+    )
     frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]
     frames[0].save(OUTPUT, save_all=True, append_images=frames[1:], duration=350, loop=0, optimize=True)
 

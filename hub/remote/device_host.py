@@ -62,6 +62,8 @@ class DeviceHost:
         self._loop: DeviceThread | None = None
         self._held: tuple[Any, ...] = ()
         self._failure: ParticipantError | None = None
+        self.joined: Callable[[], None] = lambda: None
+        """Is called each time the device takes part in a run."""
         self._over = threading.Event()
         """The run is over: the hub is gone, or the device has failed."""
 
@@ -126,6 +128,7 @@ class DeviceHost:
             token = session.liveliness().declare_token(keys.alive("device", self._name))
             stack.callback(token.undeclare)
             self._ask(session, self._request.model_copy(update={"ready": True}))
+            self.joined()
             log.info("device '%s' takes part in session '%s'", self._name, keys.session)
             while not self._over.wait(_POLL_S):
                 check()

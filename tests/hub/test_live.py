@@ -81,7 +81,7 @@ def test_a_scenario_runs_to_its_end_or_for_as_long_as_is_asked(scenario):
 def test_every_scenario_has_a_row_or_a_reason():
     rows = live.cases([])
     assert {row.scenario for row in rows} | live.LEFT_OUT.keys() == set(live.installed_scenarios())
-    kinds = [(row.one_host, row.recorded) for row in rows if row.scenario == "palpation"]
+    kinds = [(row.apart, row.recorded) for row in rows if row.scenario == "palpation"]
     assert sorted(kinds) == [(False, False), (False, True), (True, False), (True, True)]
 
 
