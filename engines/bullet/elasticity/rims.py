@@ -33,13 +33,15 @@ _DEPTHS = np.array([0.2, 0.4, 0.6, 0.8, 1.0, 1.2])
 """In radii."""
 _SHARES: Vector = np.array(
     [
-        [0.4468, 0.4665, 0.4840, 0.4970, 0.5070, 0.5150],
+        [0.4468, 0.4665, 0.4840, 0.4966, 0.4966, 0.4966],
         [0.6123, 0.5930, 0.5892, 0.5946, 0.6004, 0.6049],
         [0.7232, 0.6821, 0.6682, 0.6660, 0.6667, 0.6707],
         [0.8025, 0.7629, 0.7437, 0.7355, 0.7336, 0.7352],
     ]
 )
-"""Of the half-space's force, by distance from the rim, then by depth; Poisson ratio 0.4."""
+"""Of the half-space's force, by distance from the rim, then by depth; Poisson ratio 0.4. On the rim it was
+computed up to 0.8 radii, and is taken as the same beyond.
+"""
 
 
 def rim_share(away: float, depths: Vector) -> Vector:
