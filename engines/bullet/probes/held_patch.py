@@ -46,7 +46,7 @@ def missing_compliance(
         tissue += (along + beyond - across) / len(held) * np.outer(normal, normal)
     between = surface.between(held)
     alike = np.tile(np.eye(3), (len(held), 1))
-    mesh: Vector = np.linalg.inv(alike.T @ np.linalg.solve(between, alike))
+    mesh = np.asarray(np.linalg.inv(alike.T @ np.linalg.solve(between, alike)), np.float64)
     return tissue - 0.5 * (mesh + mesh.T)
 
 
