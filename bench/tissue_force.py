@@ -3,10 +3,10 @@
 python bench/tissue_force.py --picture docs/pictures/force-of-tissue.png
 
 Spheres of 2 to 5 mm, 1 to 6 mm deep, over nodes, edges and faces of meshes of about 250 and 600 nodes: in the
-middle of a block of 80 x 60 x 20 mm and 10 kPa, 8 mm from its side, on a liver and on a kidney. The truth is
-`bench/tissue_truth.json`, which `python bench/tissue_truth.py` makes. Depths are those of the instrument: for
-the block from the unloaded surface, for organs from where they hang. Results:
-docs/decisions/0095-converged-truth.md.
+middle of a block of 80 x 60 x 20 mm and 10 kPa, 8 to 1.5 mm from its side, on a liver and on a kidney. The
+truth is `bench/tissue_truth.json`, which `python bench/tissue_truth.py` makes. Depths are those of the
+instrument: for the block from the unloaded surface, for organs from where they hang. Results:
+docs/decisions/0095-converged-truth.md, near the side 0099-rims-and-held-patches.md.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' rig
 
 from engines.bullet.organs.organ import Organ
 from engines.bullet.params import BulletParams
-from engines.bullet.probes.contact_gain import closest_points
+from engines.bullet.probes.near_faces import closest_points
 from schemas.vectors import Vector
 from tests.engines.bullet.rig import BLOCK, Rig, params
 
@@ -35,7 +35,9 @@ STEPS = {250: "1 ms", 350: "1 ms", 450: "0.5 ms", 600: "0.5 ms"}
 ORGANS: dict[str, dict[str, Any]] = {
     "middle": BLOCK,
     "side": BLOCK,
+    "rim-5": BLOCK,
     "rim": BLOCK,
+    "rim-1.5": BLOCK,
     "liver": {"shape": "liver-lobe"},
     "kidney": {"shape": "kidney-with-adrenal"},
 }
@@ -128,7 +130,7 @@ def picture(path: Path) -> None:
     """Draw force over depth on meshes of 250 nodes: converged, with the spring, and of the mesh alone."""
     from matplotlib.figure import Figure
 
-    bodies = [body for body in TRUTH if body != "rim"]
+    bodies = [body for body in TRUTH if not body.startswith("rim")]
     figure: Any = Figure(figsize=(10, 3.5), layout="constrained")
     axes: Any = figure.subplots(1, len(bodies), sharey=True)
     for axis, body in zip(axes, bodies, strict=True):

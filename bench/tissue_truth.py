@@ -1,6 +1,7 @@
 """The force of tissue on a sphere, converged, by finite elements that are not ours.
 
 python bench/tissue_truth.py law    # the shares in engines/bullet/elasticity/half_space.py
+python bench/tissue_truth.py rim    # the shares in engines/bullet/elasticity/rims.py, half an hour of a core
 python bench/tissue_truth.py        # bench/tissue_truth.json, half an hour of a core
 
 Quadratic elements of scikit-fem (`pip install scikit-fem`), fine where the sphere touches; Bullet's material;
@@ -26,7 +27,7 @@ from skfem import Basis, ElementTetP2, ElementTriP2, FacetBasis, MeshTet, MeshTr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from engines.bullet.elasticity.half_space import DEEPEST, POISSON_RATIOS
+from engines.bullet.elasticity.half_space import DEEPEST, POISSON_RATIOS, sphere_force
 from engines.bullet.elasticity.material import Material
 from engines.bullet.meshing.isosurface_stuffing import fill
 from engines.bullet.meshing.smoothing import _onto_surface, smoothed
@@ -54,6 +55,11 @@ DEPTHS_M = (1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3)
 LAW_RADIUS_M = 5e-3
 LAW_DEPTHS: list[float] = np.arange(0.2, 3.01, 0.2).round(1).tolist()
 """In radii."""
+
+RIM_AWAY, RIM_DEPTHS = (0.0, 0.3, 0.6, 1.0), (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
+"""In radii."""
+FAR, NEAR = 60.0, 6.0
+"""In radii: the end of a quarter-space, and up to where it may be touched."""
 
 PENALTY = 5e9
 """Pressure (Pa) by a metre that the surface is inside the sphere: 1 um at 5 kPa."""
@@ -422,6 +428,26 @@ def side_of_block(radius: float, x: float) -> Body:
     )
 
 
+def quarter_space(away: float) -> Solid:
+    """Return half of a quarter-space without weight, pressed at the origin, `away` (m) from its rim."""
+    far = FAR * LAW_RADIUS_M
+    x, y = np.linspace(away - far, away, 3), np.linspace(0.0, far, 3)
+    mesh = refined(
+        MeshTet.init_tensor(x, y, -y[::-1]), np.zeros(3), FINE * LAW_RADIUS_M, REACH * LAW_RADIUS_M
+    )
+    top = mesh.facets_satisfying(lambda x: (np.abs(x[2]) < 1e-9) | (x[0] > away - 1e-9), boundaries_only=True)
+    middles = mesh.p[:, mesh.facets[:, top]].mean(axis=1)
+    top = top[np.linalg.norm(middles, axis=0) < NEAR * LAW_RADIUS_M]
+
+    def fixed(points: Vector) -> Any:
+        outside = (
+            (points[:, 2] < 1e-9 - far) | (points[:, 0] < away - far + 1e-9) | (points[:, 1] > far - 1e-9)
+        )
+        return np.stack([outside, outside | (np.abs(points[:, 1]) < 1e-9), outside], axis=1)
+
+    return three_dimensional(mesh, top, fixed, BLOCK, 0.0, 2.0)
+
+
 def organ(shape: str, x: float, y: float, radius: float) -> Body:
     """Return an organ, pressed on its upper side at (x, y) in m of its body before that is given its form.
 
@@ -490,12 +516,27 @@ def print_law() -> None:
         print(f"[{depth:.2f}, {', '.join(f'{share:.4f}' for share in row)}],", flush=True)
 
 
+def print_rim() -> None:
+    """Print the table of engines/bullet/elasticity/rims.py."""
+    for away in RIM_AWAY:
+        solid, at, shares = quarter_space(away * LAW_RADIUS_M), 0.0, list[str]()
+        for depth in RIM_DEPTHS:
+            while at < depth - 1e-9:
+                at = min(at + 0.25, depth)
+                force = solid.press(np.array([0.0, 0.0, LAW_RADIUS_M * (1.0 - at)]), LAW_RADIUS_M)[2]
+            whole = sphere_force(np.array([depth * LAW_RADIUS_M]), LAW_RADIUS_M, BLOCK)[0]
+            shares.append(f"{force / whole:.4f}")
+        print(f"[{', '.join(shares)}],  # {away:g} radii away", flush=True)
+
+
 def study() -> Iterator[tuple[str, str, Body, float]]:
     """Yield name, title, body and radius (m) of every press."""
     for radius in (2e-3, 3e-3, 4e-3, 5e-3):
         yield "middle", "block, middle", middle_of_block(radius), radius
     yield "side", "block, 8 mm from its side", side_of_block(5e-3, 0.032), 5e-3
+    yield "rim-5", "block, 5 mm from its side", side_of_block(5e-3, 0.035), 5e-3
     yield "rim", "block, 3 mm from its side", side_of_block(5e-3, 0.037), 5e-3
+    yield "rim-1.5", "block, 1.5 mm from its side", side_of_block(5e-3, 0.0385), 5e-3
     yield "liver", "liver", organ("liver-lobe", 0.02, 0.0, 5e-3), 5e-3
     yield "kidney", "kidney", organ("kidney-with-adrenal", 0.0, 0.0, 5e-3), 5e-3
 
@@ -514,4 +555,10 @@ def write(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    print_law() if sys.argv[1:] == ["law"] else write(Path(__file__).parent / "tissue_truth.json")
+    match sys.argv[1:]:
+        case ["law"]:
+            print_law()
+        case ["rim"]:
+            print_rim()
+        case _:
+            write(Path(__file__).parent / "tissue_truth.json")

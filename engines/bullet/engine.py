@@ -116,7 +116,8 @@ class BulletEngine(Stepped):
                     Probe(probe, self._coupling(bond.name), bond, plan, self.params.gravity, client)
                 )
         self._read_nodes(0)
-        self._add_sub_grid()
+        surfaces = self._surfaces()
+        self._add_sub_grid(surfaces)
         self._contacts = Contacts([self._tissue(organ) for organ in self._organs])
         outputs = self._nodes(0)
         self._unused = {
@@ -129,7 +130,7 @@ class BulletEngine(Stepped):
         for probe in self._probes:
             outputs.update(probe.idle)
             if grasp := self.params.probes[probe.name].grasp:
-                self._grasps.append(Grasp(grasp, probe, self._organs))
+                self._grasps.append(Grasp(grasp, probe, self._organs, surfaces))
                 outputs.update(self._grasps[-1].outputs)
         return outputs
 
@@ -192,15 +193,18 @@ class BulletEngine(Stepped):
             " Re-simulate from the recorded grants instead"
         )
 
-    def _add_sub_grid(self) -> None:
+    def _surfaces(self) -> list[Surface]:
+        """Return the surfaces of all organs, if a probe has something in series with their meshes."""
+        if not any(self.params.has_series(probe.name) for probe in self._probes):
+            return []
+        return [Surface(organ, self.params.organs[organ.name].elastic) for organ in self._organs]
+
+    def _add_sub_grid(self, surfaces: list[Surface]) -> None:
         """Give probes of one sphere the spring in series, where all organs are anchored and small enough."""
-        single = [probe for probe in self._probes if self.params.has_sub_grid(probe.name)]
-        if not single:
-            return
-        surfaces = [Surface(organ, self.params.organs[organ.name].elastic) for organ in self._organs]
-        for probe in single:
-            probe.sub_grid = SubGrid(float(probe.radii[0]), self._coupling(probe.name), surfaces)
-            self._sub_grids.append((probe, probe.sub_grid))
+        for probe in self._probes:
+            if self.params.has_sub_grid(probe.name):
+                probe.sub_grid = SubGrid(float(probe.radii[0]), self._coupling(probe.name), surfaces)
+                self._sub_grids.append((probe, probe.sub_grid))
 
     def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:
         sub_grid.update(probe.positions[0], probe.forces[0], probe.near)

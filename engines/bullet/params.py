@@ -48,15 +48,30 @@ class BulletParams(Params):
         """Return whether a probe feels the tissue's force: it is one sphere, and may press every organ so."""
         given = self.probes[probe]
         return (
-            self.sub_grid
-            and given.spheres in (None, 1)
-            and given.grasp is None
-            and all(
-                len(organ.rest.nodes) <= MOST_NODES
-                and any(tied.any() for tied in organ.anchored_nodes.values())
-                for organ in self.organs.values()
-            )
+            self.sub_grid and given.spheres in (None, 1) and given.grasp is None and self._is_compliance_known
         )
+
+    def has_series(self, probe: str) -> bool:
+        """Return whether a spring is in series with a probe: under one sphere, or where a jaw holds."""
+        grasp = self.probes[probe].grasp
+        return self.has_sub_grid(probe) or (grasp is not None and grasp.width is not None)
+
+    @property
+    def _is_compliance_known(self) -> bool:
+        return all(
+            len(organ.rest.nodes) <= MOST_NODES and any(tied.any() for tied in organ.anchored_nodes.values())
+            for organ in self.organs.values()
+        )
+
+    @model_validator(mode="after")
+    def _has_compliance_for_jaws(self) -> Self:
+        for name, probe in self.probes.items():
+            if probe.grasp and probe.grasp.width is not None and not self._is_compliance_known:
+                raise ValueError(
+                    f"probe '{name}': grasp.width needs organs that are anchored and have at most"
+                    f" {MOST_NODES} nodes; leave it out, and a pull is that of the mesh"
+                )
+        return self
 
     @model_validator(mode="after")
     def _known_parts(self) -> Self:

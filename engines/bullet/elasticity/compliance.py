@@ -8,11 +8,14 @@ method of superposition, as for image forces).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from engines.bullet.elasticity.half_space import point_displacement, point_stress
 from engines.bullet.elasticity.material import Material
+from engines.bullet.elasticity.rims import MIRRORED, mirror_displacement, rims_of
 from engines.bullet.meshing.tet_mesh import Indices, TetMesh
 from schemas.vectors import Vector
 
@@ -23,6 +26,9 @@ MOST_NODES = 1200
 
 _DIGITS = 6
 """Significant digits that are kept, so that the rounding of a sum in another order does not matter."""
+
+_SAME_SIDE = 0.9
+"""Cosine between the normals of two faces from which they are one side of a rim."""
 
 _POINTS: Vector = np.array([[2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]])
 """Barycentric coordinates of the points, of equal weight, that integrate a quadratic function over a face
@@ -50,14 +56,48 @@ class SurfaceCompliance:
         blocks = inverse.reshape(len(mesh.nodes), 3, len(mesh.nodes), 3)
         self._between = _rounded(blocks[surface][:, :, surface].transpose(0, 2, 1, 3))
         tied = stiffness[:, fixed]
-        self._body = np.zeros(len(surface))
-        for i, (node, inward) in enumerate(zip(surface, -_normals(mesh, faces, surface), strict=True)):
+
+        def body(node: int, inward: Vector) -> float:
+            """Return what the other boundaries add under 1 N along `inward` on a node, m."""
             if anchored[node]:
-                continue
+                return 0.0
             held = -point_displacement(mesh.nodes[anchored] - mesh.nodes[node], inward, material).ravel()
-            load = _cancelling(mesh.nodes, faces, int(node), inward, material).ravel() - tied @ held
-            self._body[i] = inward @ blocks[node].reshape(3, -1) @ load
-        self._body = _rounded(self._body)
+            load = _cancelling(mesh.nodes, faces, node, inward, material).ravel() - tied @ held
+            return float(inward @ blocks[node].reshape(3, -1) @ load)
+
+        self._normals = normals = _normals(mesh, faces, surface)
+        self._body = _rounded(
+            np.array([body(*pair) for pair in zip(surface.tolist(), -normals, strict=True)])
+        )
+        self.rims = rims_of(mesh.nodes, faces)
+        self._on_rim = self._sides(body)
+        self._by_rim = self._without_mirror(mesh.nodes, material)
+
+    def _sides(self, body: Callable[[int, Vector], float]) -> dict[int, list[tuple[Vector, float]]]:
+        """Return, for every node of a rim, the normals of its sides and what `of_body_at_rim` is there.
+
+        A force on a rim and its mirror image are at one place, so what cancels the one cancels the other.
+        """
+        found: dict[int, list[tuple[Vector, float]]] = {}
+        for ends, sides in zip(self.rims.ends.tolist(), self.rims.outward, strict=True):
+            for node in ends:
+                known = found.setdefault(node, [])
+                for normal in sides:
+                    if all(float(normal @ other) < _SAME_SIDE for other, _ in known):
+                        value = (1.0 + MIRRORED) * body(node, -normal)
+                        known.append((normal, float(f"{value:.{_DIGITS}g}")))
+        return found
+
+    def _without_mirror(self, nodes: Vector, material: Material) -> Vector:
+        """Return `_body` without what the nearest rim adds, which the mesh knows at nodes away from it."""
+        if not len(self.rims.ends):
+            return self._body
+        ways = np.array([self.rims.vectors(nodes[node], nodes) for node in self._surface])
+        away = np.sqrt((ways * ways).sum(axis=2)).min(axis=1)
+        known = (away > 0.0) & (self._body != 0.0)
+        mirrored = np.zeros(len(away))
+        mirrored[known] = mirror_displacement(away[known], material)
+        return _rounded(self._body - mirrored)
 
     def of_mesh(self, nodes: Indices, inward: Vector) -> Vector:
         """Return how far (m) 1 N on one of the surface's `nodes`, shape (k,), moves another one.
@@ -68,6 +108,19 @@ class SurfaceCompliance:
         between = self._between[np.ix_(at, at)].reshape(-1, 9) @ np.outer(inward, inward).ravel()
         return between.reshape(len(at), len(at))
 
+    def on_surface(self, nodes: Indices) -> Indices:
+        """Return which of the `nodes` are on the surface."""
+        return np.intersect1d(nodes, self._surface)
+
+    def normals_at(self, nodes: Indices) -> Vector:
+        """Return the outward normals at the surface's `nodes`, shape (k, 3)."""
+        return self._normals[self._place[nodes]]
+
+    def between(self, nodes: Indices) -> Vector:
+        """Return how far (m) 1 N on the surface's `nodes` moves them, by node and axis, shape (3 k, 3 k)."""
+        at = self._place[nodes]
+        return self._between[np.ix_(at, at)].transpose(0, 2, 1, 3).reshape(3 * len(at), -1)
+
     def of_body(self, nodes: Indices, parts: Vector) -> float:
         """Return how much farther than a half-space the body gives way under a force of 1 N, in m.
 
@@ -75,6 +128,17 @@ class SurfaceCompliance:
         the body is anchored close behind.
         """
         return float(parts @ self._body[self._place[nodes]])
+
+    def of_body_at_rim(self, nodes: Indices, parts: Vector, outward: Vector) -> float:
+        """Return how much farther than a quarter-space the body gives way near a rim, in m.
+
+        Arguments as for `of_body`; outward: normal of the face that is pressed, shape (3,).
+        """
+        values = self._by_rim[self._place[nodes]]
+        for i, node in enumerate(nodes.tolist()):
+            if sides := self._on_rim.get(node):
+                values[i] = max(sides, key=lambda side: float(side[0] @ outward))[1]
+        return float(parts @ values)
 
 
 def _rounded(values: Vector) -> Vector:

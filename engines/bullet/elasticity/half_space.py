@@ -13,7 +13,14 @@ import numpy as np
 from engines.bullet.elasticity.material import Material
 from schemas.vectors import Vector
 
-__all__ = ["DEEPEST", "POISSON_RATIOS", "point_displacement", "point_stress", "sphere_force"]
+__all__ = [
+    "DEEPEST",
+    "POISSON_RATIOS",
+    "patch_compliance",
+    "point_displacement",
+    "point_stress",
+    "sphere_force",
+]
 
 DEEPEST = 2.5
 """Depth in radii up to which the law is known; the material itself gives way under a sphere not far beyond
@@ -68,6 +75,17 @@ def sphere_force(depth: Vector, radius: float, material: Material) -> Vector:
     plane_strain = material.young_modulus / (1.0 - nu**2)
     hertz: Vector = 4.0 / 3.0 * plane_strain * np.sqrt(radius) * depth**1.5
     return hertz * np.interp(depth / radius, _DEPTHS, shares)
+
+
+def patch_compliance(radius: float, material: Material) -> tuple[float, float]:
+    """Return how far (m) a round patch that is held gives way to 1 N: along its normal, and across.
+
+    Along: (1 - 2 nu) / (4 G a log(3 - 4 nu)), of a punch that sticks (Spence, Proceedings of the Royal
+    Society A 305, 1968); across: (2 - nu) / (8 G a) (Johnson, Contact Mechanics, 1985, section 7.2).
+    """
+    nu, shear = material.poisson_ratio, material.lame[0]
+    along = (1.0 - 2.0 * nu) / (4.0 * shear * radius * np.log(3.0 - 4.0 * nu))
+    return float(along), (2.0 - nu) / (8.0 * shear * radius)
 
 
 def point_displacement(away: Vector, inward: Vector, material: Material) -> Vector:

@@ -6,6 +6,7 @@ anchor passes on the whole force. Rules and figures: docs/decisions/0016-tissue-
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 
@@ -13,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.bullet.organs.organ import Organ
+from engines.bullet.probes.held_patch import HeldPatch, missing_compliance
 from engines.bullet.probes.params import GraspParams
 from engines.bullet.probes.probe import Probe
+from engines.bullet.probes.sub_grid import Surface
 from hub.participant import Value
 from schemas.ports import Port
 from schemas.ros import Float64Message, Header, Time
@@ -94,9 +97,12 @@ class _Hold:
 class Grasp:
     """Watches the fingers of one probe, and ties tissue to them."""
 
-    def __init__(self, params: GraspParams, probe: Probe, organs: list[Organ]) -> None:
-        """Watch `probe`, whose fingers may grasp `organs`."""
+    def __init__(
+        self, params: GraspParams, probe: Probe, organs: list[Organ], surfaces: Sequence[Surface] = ()
+    ) -> None:
+        """Watch `probe`, whose fingers may grasp `organs`; with a `width` their `surfaces` are known."""
         self._params, self._probe, self._organs = params, probe, organs
+        self._surfaces = {surface.organ.name: surface for surface in surfaces}
         self._spheres = np.arange(len(probe.radii)).reshape(params.fingers, -1)  # (fingers, spheres of each)
         self._rest = [organ.nodes[:, 2].copy() for organ in organs]
         self._holds: list[_Hold] = []
@@ -206,7 +212,18 @@ class Grasp:
         if self._holds:
             self._widest = spread
             self._set_held(spheres, held=True)
+            probe.held_patch = self._patch(spheres)
         return self._events("grasped", t)
+
+    def _patch(self, spheres: NDArray[np.int64]) -> HeldPatch | None:
+        """Return the spring in series with these spheres, if a `width` is stated and one organ is held."""
+        width = self._params.width
+        if width is None or len(self._holds) != 1:
+            return None
+        hold = self._holds[0]
+        surface = self._surfaces[hold.organ.name]
+        compliance = missing_compliance(surface.compliance, surface.material, hold.nodes, width)
+        return HeldPatch(spheres, self._probe.coupling, compliance)
 
     def _reach(self, organ: Organ) -> float:
         return organ.mean_edge / sqrt(3.0) if self._params.reach is None else self._params.reach
@@ -217,6 +234,7 @@ class Grasp:
             for node, anchor in zip(hold.nodes.tolist(), hold.anchors, strict=True):
                 hold.organ.release(node, anchor)
         self._set_held(np.flatnonzero(self._probe.held), held=False)
+        self._probe.held_patch = None
         self._holds.clear()
         self._widest = 0.0
         self._pull[:], self._lift[:] = 0.0, 0.0

@@ -15,6 +15,7 @@ from schemas.ports import BondSide
 from schemas.vectors import Vector
 
 if TYPE_CHECKING:
+    from engines.bullet.probes.held_patch import HeldPatch
     from engines.bullet.probes.near_faces import NearFaces
     from engines.bullet.probes.sub_grid import SubGrid
 
@@ -71,7 +72,8 @@ class Probe:
         self.touching = np.zeros(n, dtype=np.bool_)
         """Which spheres touched an organ at the last reading of the contacts, shape (n,)."""
         self._side = ForceSide(bond, plan)
-        self._coupling = coupling
+        self.coupling = coupling
+        """Of every proxy with its sphere on the instrument."""
         self._weight = np.array([0.0, 0.0, coupling.mass * gravity])
         self._spring, self._damper = np.zeros(bond.size), np.zeros(bond.size)
         # (n, 3) each: views of the same numbers
@@ -88,6 +90,8 @@ class Probe:
         self._reset_rate = 1.0 / coupling.reset_time if coupling.reset_time else 0.0
         self.sub_grid: SubGrid | None = None
         """What the only sphere's mesh lacks in compliance; with it the coupling needs no reset."""
+        self.held_patch: HeldPatch | None = None
+        """What the mesh lacks in compliance where it is held."""
         self.near: Sequence[NearFaces] = ()
         """Faces near the spheres that are not held, at the last reading of the contacts, of each organ."""
         self._placed = False
@@ -119,7 +123,7 @@ class Probe:
 
         As Bullet has it.
         """
-        return self._applied - self._coupling.mass / self._dt * (self.velocities - self._velocities_before)
+        return self._applied - self.coupling.mass / self._dt * (self.velocities - self._velocities_before)
 
     def begin(self, inputs: Inputs, h: float) -> None:
         """Take the other side's motion at the start of a step of `h` seconds."""
@@ -132,6 +136,8 @@ class Probe:
         self._stretch(tau, 0.5 * dt)
         if self.sub_grid is not None:
             self.sub_grid.give_way(self._springs[0], self._dampers[0], dt, keep=True)
+        if self.held_patch is not None:
+            self.held_patch.give_way(self._springs, self._dampers, dt, keep=True)
         self._side.add(self._spring, self._damper, tau, dt)
         if self._reset_rate and self.sub_grid is None:
             self._reset += self._reset_rate * dt * (self._springs - self._reset)
@@ -163,6 +169,8 @@ class Probe:
         self._stretch(h, 0.0)
         if self.sub_grid is not None:
             self.sub_grid.give_way(self._springs[0], self._dampers[0], 0.5 * self._dt, keep=False)
+        if self.held_patch is not None:
+            self.held_patch.give_way(self._springs, self._dampers, 0.5 * self._dt, keep=False)
         if not np.isfinite(self._spring).all():
             sphere = int(np.flatnonzero(~np.isfinite(self._springs).all(axis=1))[0])
             raise SessionError(
@@ -181,6 +189,8 @@ class Probe:
     def state(self) -> tuple[Vector, ...]:
         """Positions, velocities, gains, the state of the bond, and of the spring in series."""
         own = self.positions, self.velocities, self.gains, self.corrections, self._reset, self._side.state
+        if self.held_patch is not None:
+            own = (*own, self.held_patch.yielded)
         return own if self.sub_grid is None else (*own, self.sub_grid.state)
 
     def _stretch(self, tau: float, ahead: float) -> None:
@@ -193,10 +203,10 @@ class Probe:
         np.subtract(self.targets, self.positions, out=springs)
         if ahead:
             springs -= ahead * self.velocities
-        springs *= self._coupling.stiffness
+        springs *= self.coupling.stiffness
         springs += self._reset
         np.subtract(velocities, self.velocities, out=dampers)
-        dampers *= self._coupling.damping
+        dampers *= self.coupling.damping
 
     def _motion(self, tau: float) -> tuple[Vector, Vector]:
         """Return positions (m) and velocities (m/s) of the instrument's spheres, shapes (n, 3).
@@ -233,7 +243,7 @@ class Probe:
         # A multi-body: with maximal coordinates the sphere is not finite after its first step (pybullet
         # 3.2.7).
         body = bullet.createMultiBody(
-            self._coupling.mass,
+            self.coupling.mass,
             shape,
             basePosition=self.positions[0].tolist(),
             useMaximalCoordinates=False,

@@ -11,13 +11,14 @@ series with spring and damper of the coupling. See docs/decisions/0086-force-of-
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from engines.bullet.elasticity.compliance import SurfaceCompliance
 from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
 from engines.bullet.elasticity.material import Material
+from engines.bullet.elasticity.rims import rim_share
 from engines.bullet.meshing.tet_mesh import Indices
 from engines.bullet.organs.organ import Organ
 from engines.bullet.probes.contact_gain import BAND_M, CONTACT_PERIOD_NS
@@ -45,6 +46,11 @@ _LEAST_FORCE_N = 5e-3
 _SPREAD_POWER, _MOST_SPREAD = 2.0 / 3.0, 2.0
 """How the force spreads from the face that is touched first to those around it: with this power of the force,
 as a contact of Hertz's grows, up to this multiple of the force at which the parts are known.
+"""
+
+_RIM_BEGINS, _RIM_ENDS = 1.0, 1.6
+"""Distances from a rim, in radii: up to the first the law is a quarter-space's, from the second on a
+half-space's, whose error there is 5 % (docs/decisions/0095-converged-truth.md).
 """
 
 _RATIOS = (0.2, 2.0)
@@ -99,6 +105,7 @@ class SubGrid:
         self._speed: float = 0.0  # of the yield, m/s
         self._is_new = False  # the law
         self._forces = self._yields = np.zeros(1)
+        self._rim: float = 0.0  # how far the law is that of a rim, 0 to 1
 
     @property
     def state(self) -> Vector:
@@ -150,6 +157,7 @@ class SubGrid:
             self._forces = self._yields = np.zeros(1)
             return
         place, self._forces = min(places, key=lambda one: one[0].distance)
+        place = self._at_rim(place, centre)
         between = self._measure(place, centre, force)
         self._yields = self._missing(place, between, max(float(force @ self.inward), _LEAST_FORCE_N))
         self._is_new = True
@@ -157,6 +165,27 @@ class SubGrid:
     @property
     def _laws(self) -> Sequence[tuple[Surface, Vector]]:
         return list(zip(self._surfaces, self._half_spaces, strict=True))
+
+    def _at_rim(self, place: _Place, centre: Vector) -> _Place:
+        """Take the forces of a quarter-space where a rim is near, and pass to those of a half-space.
+
+        Return the place with the direction in which the sphere presses a rim.
+        """
+        surface, radius = place.surface, self._radius
+        self._rim = 0.0
+        if not len(surface.compliance.rims.ends):
+            return place
+        moved = place.parts @ (surface.organ.nodes[place.nodes] - surface.settled[place.nodes])
+        inward, reach = self.inward if self.inward.any() else place.inward, _RIM_ENDS * radius
+        found = surface.compliance.rims.near(centre - moved, inward, surface.settled, reach)
+        if found is None:
+            return place
+        away, inward = found
+        self._rim = min((reach - away) / (reach - _RIM_BEGINS * radius), 1.0)
+        share = rim_share(away / radius, self._depths / radius)
+        self._forces = self._forces * (1.0 + self._rim * (share - 1.0))
+        mixed = place.inward + self._rim * (inward - place.inward)
+        return replace(place, inward=mixed / np.sqrt(mixed @ mixed))
 
     def _measure(self, place: _Place, centre: Vector, force: Vector) -> Vector:
         """Set direction and ratio, and return the compliance between the nodes (m/N), shape (k, k)."""
@@ -185,7 +214,11 @@ class SubGrid:
         mesh = first @ between @ first + spread * (
             2.0 * float(first @ between @ more) + spread * float(more @ between @ more)
         )
-        body = place.surface.compliance.of_body(place.nodes, place.parts)
+        compliance = place.surface.compliance
+        body = compliance.of_body(place.nodes, place.parts)
+        if self._rim:
+            at_rim = compliance.of_body_at_rim(place.nodes, place.parts, -place.inward)
+            body += self._rim * (at_rim - body)
         missing = self._depths + (body - self.ratio * mesh - 1.0 / self._coupling.stiffness) * forces
         return np.maximum.accumulate(np.maximum(missing, 0.0))
 

@@ -1,5 +1,9 @@
 """`trocar identify` reads what tools record, and says what a recording lacks."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -72,8 +76,36 @@ def test_a_bag_has_one_such_topic(tmp_path):
 def test_the_topic_with_the_most_messages_is_read(tmp_path):
     states = [JointState(name=list(JOINTS), position=[i, 0.0], effort=[3.0, 4.0]) for i in (0.0, 1.0, 2.0)]
     rows = [("/robot/PSM1/measured_js", i * 10_000_000, one) for i, one in enumerate(states)]
-    write_bag(tmp_path / "bag", [*rows, ("/motion/PSM1/measured_js", 0, states[0])])
+    write_bag(tmp_path / "bag", [*rows, ("/motion/PSM1/measured_js", 0, states[2])])
     assert measurements(tmp_path / "bag", "PSM1", JOINTS).position[:, 0].tolist() == [0.0, 1.0, 2.0]
+    assert measurements(tmp_path / "bag", "PSM1", JOINTS, "motion").position[:, 0].tolist() == [2.0]
+
+
+def test_whose_states_count_is_an_option(tmp_path):
+    states = JointState(name=list(JOINTS), position=[0.0, 0.0], effort=[3.0, 4.0])
+    write_bag(tmp_path / "bag", [("/robot/PSM1/measured_js", 0, states)])
+    words = [str(tmp_path / "bag"), "-o", "never.yaml"]
+    assert "has 2 positions" in str(CliRunner().invoke(app, [*words, "--of", "robot"]).exception)
+    failed = str(CliRunner().invoke(app, [*words, "--of", "real"]).exception)
+    assert "no topics that end in 'real/PSM1/measured_js'" in failed
+
+
+def test_the_command_computes_alike_on_every_machine():
+    """Threads and kernels are set before numpy is imported; what imports it later cannot change them."""
+    script = """
+import os, sys
+class Watch:
+    def find_spec(self, name, path, target=None):
+        if name == "numpy":
+            print(os.environ["OPENBLAS_NUM_THREADS"])
+sys.meta_path.insert(0, Watch())
+import hub.command_line
+import robots.identification.fit
+"""
+    environment = {key: value for key, value in os.environ.items() if "_NUM_THREADS" not in key}
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1"]
 
 
 def test_the_jaw_is_read_at_the_times_of_the_joints(tmp_path):

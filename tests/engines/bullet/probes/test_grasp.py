@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from engines.bullet.elasticity.compliance import SurfaceCompliance
 from engines.bullet.engine import BulletEngine
+from engines.bullet.organs.params import OrganParams
 from engines.bullet.params import BulletParams
+from engines.bullet.probes.held_patch import missing_compliance
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from tests.engines.bullet.finite_elements import Body, equilibrium
-from tests.engines.bullet.rig import IMPULSE, MS
+from tests.engines.bullet.rig import BLOCK, IMPULSE, MS
 
 RADIUS = 2e-3
 OPEN, SHUT = 5e-3, RADIUS
@@ -39,7 +42,7 @@ class Jaw:
         self.engine = BulletEngine("tissue", self.params)
         self.outputs = dict(self.engine.configure(Setup(MS, Path(), {"jaw": IMPULSE})))
         self.t, self.at, self.opening = 0, np.array(at, dtype=float), opening
-        self.events, self.hashes, self.pulls = [], [], []
+        self.events, self.hashes, self.pulls, self.work = [], [], [], []
 
     def __enter__(self):
         return self
@@ -67,6 +70,7 @@ class Jaw:
             self.t += MS
             self.events += self.outputs["jaw/events"]
             self.hashes.append(self.engine.state_hash())
+            self.work.append(-float(self.outputs["jaw/force"] @ (way / seconds).ravel()) * 1e-3)
             self.pulls.append(float(np.linalg.norm(self.outputs["jaw/pull"])))
         return self
 
@@ -118,6 +122,44 @@ def test_the_pull_is_that_of_finite_elements_whose_held_nodes_are_moved_alike(gr
         truth = -(body.elements.forces(nodes) + body.load)[held].sum(axis=0)  # what must hold them there
         assert np.linalg.norm(jaw.outputs["jaw/pull"] - truth) < 0.01 * np.linalg.norm(truth)
         np.testing.assert_allclose(jaw.force, -jaw.outputs["jaw/pull"], atol=0.01 * np.linalg.norm(truth))
+
+
+def test_with_a_width_the_spring_takes_what_the_mesh_lacks_and_gives_it_back():
+    lift = np.array([0.0, 0.0, 4e-3])
+    with grasp_slab(width="4 mm") as jaw:
+        jaw.move(0.1)
+        patch = jaw.engine._probes[0].held_patch
+        before = jaw.outputs["jaw/lift"][0], patch.yielded[2]
+        jaw.move(0.1, at=jaw.at + lift).move(0.1)
+        paid = sum(jaw.work[-200:])
+        rose, yielded = jaw.outputs["jaw/lift"][0] - before[0], patch.yielded[2] - before[1]
+        assert yielded > 0.5 * lift[2]
+        assert rose + yielded == pytest.approx(lift[2], rel=0.1)
+        jaw.move(0.1, at=jaw.at - lift).move(0.1)
+        assert patch.yielded[2] == pytest.approx(before[1], abs=0.05 * lift[2])
+        assert 0.0 < sum(jaw.work[-400:]) < paid
+        jaw.move(0.05, opening=OPEN)
+        assert jaw.engine._probes[0].held_patch is None
+
+
+@pytest.mark.parametrize(("width", "converged"), [(4e-3, 55.0), (6e-3, 87.0)])  # N/m: bench/tissue_pull.py
+def test_a_patch_is_as_stiff_as_converged_elements_say(width, converged):
+    organ = OrganParams.model_validate(BLOCK)
+    body = Body(organ)
+    rest, faces = organ.rest.nodes, organ.rest.triangles
+    surface = SurfaceCompliance(organ.rest, body.fixed, faces[~body.fixed[faces].all(axis=1)], organ.elastic)
+    top = faces[(np.abs(rest[faces][..., 2]) < 1e-9).all(axis=1)]
+    nodes = top[np.linalg.norm(rest[top].mean(axis=1), axis=1).argmin()]
+    missing = missing_compliance(surface, organ.elastic, nodes, width)
+    alike = np.tile(np.eye(3), (3, 1))
+    mesh = np.linalg.inv(alike.T @ np.linalg.solve(surface.between(nodes), alike))
+    assert 1.0 / mesh[2, 2] > 2.0 * converged
+    assert 1.0 / (mesh + missing)[2, 2] == pytest.approx(converged, rel=0.06)
+
+
+def test_a_width_needs_tissue_that_is_anchored():
+    with pytest.raises(ValidationError, match=r"grasp\.width needs organs that are anchored"):
+        Jaw({**SLAB, "anchors": []}, ABOVE_SLAB, width="4 mm")
 
 
 def test_opening_lets_go_and_the_tissue_goes_back():

@@ -1,6 +1,7 @@
 """The model's equations of motion: against identified ones, energy, gravity compensation, servos at rest."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -13,9 +14,11 @@ from engines.mujoco.model.dynamics import dynamics
 from engines.mujoco.params import MujocoParams, SceneParams
 from hub.participant import Inputs, Setup
 from robots import rotation
-from robots.dvrk import setup_joints
-from robots.dvrk.dynamics import of_ecm, of_psm
+from robots.dvrk import ecm, inertia, linkage, setup_joints
+from robots.dvrk.dynamics import Dynamics, of_ecm, of_psm
+from robots.dvrk.ecm import JOINT_NAMES as ECM_JOINTS
 from robots.dvrk.instruments import instrument
+from robots.dvrk.own_dynamics import BodyInertia, JointLosses, OwnDynamics
 
 REFERENCE = json.loads(
     (Path(__file__).parents[3] / "robots" / "data" / "reference_dynamics.json").read_text()
@@ -50,6 +53,20 @@ def test_the_model_moves_as_the_closed_form_says(arm):
     found = dynamics(arm, "straight" if arm == "ECM" else NEEDLE_DRIVER, q.tolist(), [0.0] * q.size)
     assert np.allclose(found.inertia, closed.inertia_matrix(q), atol=1e-6)
     assert np.allclose(found.gravity, closed.gravity(q), atol=1e-5)
+
+
+def test_an_endoscope_arm_has_the_dynamics_of_its_file(tmp_path):
+    q, heavy = np.array([0.4, -0.5, 0.13, 0.7]), {**inertia.ecm()}
+    heavy["insertion"] = replace(heavy["insertion"], mass=2.0 * heavy["insertion"].mass)
+    losses = {name: JointLosses(armature=0.0, stiffness=1e-3, offset=0.0, viscous=0.3) for name in ECM_JOINTS}
+    bodies = {name: BodyInertia(mass=b.mass, centre=b.centre, tensor=b.tensor) for name, b in heavy.items()}
+    own = OwnDynamics(instrument="endoscope", bodies=bodies, joints=losses, discs=[])
+    (tmp_path / "ecm.yaml").write_text(own.text(), "utf-8")
+    found = dynamics("ECM", "straight", q.tolist(), [0.0] * 4, tmp_path / "ecm.yaml")
+    closed = Dynamics(ecm.chain(), linkage.ECM, heavy, np.zeros(4))
+    assert np.allclose(found.gravity, closed.gravity(q), atol=1e-5)
+    assert not np.allclose(found.gravity, of_ecm().gravity(q), atol=0.1)
+    assert np.allclose(found.viscous_friction, 0.3)
 
 
 @pytest.mark.parametrize("arm", ["PSM2", "ECM"])

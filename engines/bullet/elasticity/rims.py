@@ -1,0 +1,138 @@
+"""The sharp edges of a body, and what they take from the force of a half-space.
+
+A sphere near a rim presses a quarter-space. At equal depth its force is the half-space's times a share, of
+converged finite elements of Bullet's material (`python bench/tissue_truth.py rim`): two faces at a right
+angle, no friction, the force along the normal of the face that is pressed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from engines.bullet.elasticity.material import Material
+from engines.bullet.meshing.tet_mesh import Indices
+from schemas.vectors import Vector
+
+__all__ = ["MIRRORED", "Rims", "mirror_displacement", "rim_share", "rims_of"]
+
+_LEAST_TURN = np.pi / 3
+"""Angle between the normals of two faces from which their edge is a rim; the facets of round organs with 250
+nodes turn by less.
+"""
+
+MIRRORED = 1.49
+"""What a rim adds to the displacement by a point force is about that by so many at its mirror image
+(Guilbault, Journal of Tribology 133, 2011, 031402, for a right angle and Poisson ratio 0.4).
+"""
+
+_AWAY = np.array([0.0, 0.3, 0.6, 1.0])
+"""Of the sphere's axis from the rim, in radii."""
+_DEPTHS = np.array([0.2, 0.4, 0.6, 0.8, 1.0, 1.2])
+"""In radii."""
+_SHARES: Vector = np.array(
+    [
+        [0.4468, 0.4665, 0.4840, 0.4966, 0.4966, 0.4966],
+        [0.6123, 0.5930, 0.5892, 0.5946, 0.6004, 0.6049],
+        [0.7232, 0.6821, 0.6682, 0.6660, 0.6667, 0.6707],
+        [0.8025, 0.7629, 0.7437, 0.7355, 0.7336, 0.7352],
+    ]
+)
+"""Of the half-space's force, by distance from the rim, then by depth; Poisson ratio 0.4. On the rim it was
+computed up to 0.8 radii, and is taken as the same beyond.
+"""
+
+
+def rim_share(away: float, depths: Vector) -> Vector:
+    """Return the share of the half-space's force that is left near a rim, at every depth.
+
+    `away`, of the sphere's axis from the rim, and `depths` are in radii.
+    """
+    row = float(np.interp(away, _AWAY, range(len(_AWAY))))
+    low = min(int(row), len(_AWAY) - 2)
+    shares: Vector = _SHARES[low] + (row - low) * (_SHARES[low + 1] - _SHARES[low])
+    return np.interp(depths, _DEPTHS, shares)
+
+
+def mirror_displacement(away: Vector, material: Material) -> Vector:
+    """Return how far (m) the rim lets a point give way under 1 N on it, beyond the half-space's own.
+
+    away: of the point from the rim, m; the mirror image is twice as far. Boussinesq's solution: Johnson,
+    Contact Mechanics (1985), section 3.2.
+    """
+    plane_strain = material.young_modulus / (1.0 - material.poisson_ratio**2)
+    return MIRRORED / (np.pi * plane_strain * 2.0 * away)
+
+
+@dataclass(frozen=True)
+class Rims:
+    """The sharp edges of a surface; each has two sides, the faces that meet there."""
+
+    ends: Indices
+    """Two nodes of each, shape (k, 2)."""
+    outward: Vector
+    """Normal of the face on each side, shape (k, 2, 3)."""
+    across: Vector
+    """In the plane of that face, out over the rim, shape (k, 2, 3)."""
+
+    def vectors(self, point: Vector, nodes: Vector) -> Vector:
+        """Return the way from `point` (m) to the nearest point of each rim, shape (k, 3).
+
+        nodes: m, shape (n, 3).
+        """
+        a, b = nodes[self.ends[:, 0]] - point, nodes[self.ends[:, 1]] - point
+        edge = b - a
+        along = -np.einsum("ki,ki->k", a, edge) / np.einsum("ki,ki->k", edge, edge)
+        return a + np.clip(along, 0.0, 1.0)[:, None] * edge
+
+    def near(
+        self, centre: Vector, inward: Vector, nodes: Vector, reach: float
+    ) -> tuple[float, Vector] | None:
+        """Return how far (m) a sphere's axis is from the nearest rim, and the direction in which it presses.
+
+        Below 0 it is beyond the rim, and presses from its centre to there; before, as the face does. None if
+        none is within `reach` (m).
+
+        Args:
+            centre: of the sphere, m, shape (3,).
+            inward: about into the pressed face, shape (3,).
+            nodes: m, shape (n, 3).
+            reach: m.
+        """
+        ways, facing = self.vectors(centre, nodes), -self.outward @ inward
+        sides = facing.argmax(axis=1)
+        outward = self.outward[np.arange(len(sides)), sides]
+        heights = np.einsum("ki,ki->k", ways, outward)
+        flat = ways - heights[:, None] * outward
+        distances = np.sqrt((flat * flat).sum(axis=1))
+        distances[(facing.max(axis=1) < np.cos(_LEAST_TURN)) | (np.abs(heights) > reach)] = np.inf
+        nearest = int(distances.argmin())
+        if distances[nearest] > reach:
+            return None
+        outwards, across = outward[nearest], self.across[nearest, sides[nearest]]
+        away = float(np.copysign(distances[nearest], ways[nearest] @ across))
+        press = -max(-heights[nearest], 0.0) * outwards + min(away, 0.0) * across
+        return away, press / np.sqrt(press @ press) if away < 0.0 else -outwards
+
+
+def rims_of(nodes: Vector, faces: Indices) -> Rims:
+    """Return the edges where two of the faces, shape (f, 3), meet at a sharp convex angle."""
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    order = np.lexsort(ends.T[::-1])
+    pairs = np.flatnonzero((ends[order][1:] == ends[order][:-1]).all(axis=1))
+    sides = np.stack([order[pairs], order[pairs + 1]], axis=1)  # (e, 2): places among the faces' edges
+    corners = nodes[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    outward = normals[sides // 3]
+    ends = ends[sides[:, 0]]
+    start, edge = nodes[ends[:, 0]], nodes[ends[:, 1]] - nodes[ends[:, 0]]
+    inner = nodes[faces[sides // 3, (sides + 2) % 3]] - start[:, None]  # to the corner off the edge
+    across = np.cross(edge[:, None], outward)
+    across *= -np.sign(np.einsum("esi,esi->es", across, inner))[..., None]
+    across /= np.linalg.norm(across, axis=2)[..., None]
+    turned = np.einsum("ei,ei->e", outward[:, 0], outward[:, 1]) < np.cos(_LEAST_TURN)
+    convex = np.einsum("ei,ei->e", outward[:, 0], inner[:, 1]) < 0.0
+    sharp = turned & convex
+    return Rims(ends[sharp], outward[sharp], across[sharp])

@@ -1,0 +1,92 @@
+"""A spring in series with a jaw that holds tissue: the compliance that the held nodes of a coarse mesh lack.
+
+A jaw holds a patch as wide as its pad, the mesh some nodes, which may stand two pads apart. What a patch of
+that width gives way is known, and what the mesh does between the held nodes too; both are linear, up to a
+lift of three pads within 5 percent. Their difference yields to the pull of all held spheres together. See
+docs/decisions/0099-rims-and-held-patches.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engines.bullet.elasticity.compliance import SurfaceCompliance
+from engines.bullet.elasticity.half_space import patch_compliance
+from engines.bullet.elasticity.material import Material
+from engines.bullet.meshing.tet_mesh import Indices
+from engines.bullet.probes.params import Coupling
+from schemas.vectors import Vector
+
+__all__ = ["HeldPatch", "missing_compliance"]
+
+_ZETA = 0.3
+"""Damping ratio of the proxies on the spring alone. It delays a pull by some 10 ms; at 1 by 40 ms, and a lift
+in 0.1 s then costs more than the tissue gives back.
+"""
+
+
+def missing_compliance(
+    surface: SurfaceCompliance, material: Material, nodes: Indices, width: float
+) -> Vector:
+    """Return how much more (m/N) a patch of tissue gives way than the mesh where it is held, shape (3, 3).
+
+    Symmetric, in `world`; below 0 in a direction in which the mesh is too soft.
+
+    Args:
+        surface: of the organ.
+        material: of its tissue.
+        nodes: held, moved alike, shape (k,).
+        width: of the patch, m.
+    """
+    held = surface.on_surface(nodes)
+    along, across = patch_compliance(0.5 * width, material)
+    tissue: Vector = across * np.eye(3)
+    for node, normal in zip(held.tolist(), surface.normals_at(held), strict=True):
+        beyond = surface.of_body(np.array([node]), np.ones(1))
+        tissue += (along + beyond - across) / len(held) * np.outer(normal, normal)
+    between = surface.between(held)
+    alike = np.tile(np.eye(3), (len(held), 1))
+    mesh = np.asarray(np.linalg.inv(alike.T @ np.linalg.solve(between, alike)), np.float64)
+    return tissue - 0.5 * (mesh + mesh.T)
+
+
+class HeldPatch:
+    """Spring and damper in series with one jaw that holds tissue: how far they have yielded.
+
+    Without the damper the proxies would swing on the spring, as that of the coupling moves with them.
+    """
+
+    def __init__(self, spheres: Indices, coupling: Coupling, compliance: Vector) -> None:
+        """Yield to the sum of the forces on the `spheres`, shape (k,), by `compliance` (m/N), shape (3, 3).
+
+        It is rigid in directions in which that is below 0, as nothing in series stiffens.
+        """
+        self._spheres, self._coupling = spheres, coupling
+        values, self._directions = np.linalg.eigh(compliance)
+        self._compliances: Vector = np.maximum(values, 0.0)
+        self.yielded: Vector = np.zeros(3)
+        """m, in `world`, shape (3,)."""
+
+    def give_way(self, springs: Vector, dampers: Vector, since: float, *, keep: bool) -> None:
+        """Take from the forces (N, shape (n, 3)) of a rigid coupling what the spring in series spares them.
+
+        since: s since its yield was last kept. Along each axis of the compliance C the yield s follows from
+        s + C d s' = C f, with the damper d = 2 zeta sqrt(mass / C), the sum of the forces f = sum k (e - s) +
+        b (e' - s') over the spheres that hold, and s' = (s - s_before) / since.
+        """
+        coupling, at, count = self._coupling, self._spheres, len(self._spheres)
+        compliances, directions = self._compliances, self._directions
+        pull = (springs[at].sum(axis=0) + dampers[at].sum(axis=0)) @ directions
+        rates = compliances * count * coupling.damping + 2.0 * _ZETA * np.sqrt(
+            count * coupling.mass * compliances
+        )
+        rates /= since
+        before = self.yielded @ directions
+        along = (compliances * pull + rates * before) / (
+            1.0 + compliances * count * coupling.stiffness + rates
+        )
+        yielded: Vector = directions @ along
+        springs[at] -= coupling.stiffness * yielded
+        dampers[at] -= coupling.damping / since * (yielded - self.yielded)
+        if keep:
+            self.yielded = yielded
