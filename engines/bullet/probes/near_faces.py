@@ -33,7 +33,7 @@ class NearFaces(NamedTuple):
     def within(self, reach: Vector) -> NearFaces:
         """Return the pairs with a distance below the `reach` (m) of the sphere, shape (k,)."""
         near = self.distances < reach[self.spheres]
-        return NearFaces(*(each[near] for each in self))
+        return NearFaces(self.spheres[near], self.faces[near], self.weights[near], self.distances[near])
 
 
 def near_faces(centres: Vector, reach: Vector, nodes: Vector, faces: Indices) -> NearFaces:
