@@ -114,7 +114,7 @@ async function begin(described) {
 }
 
 async function stage(described) {
-  await makingScene
+  if (!scene && !refused) await makeScene()
   if (!scene) return
   const answer = await fetch("/scene")
   if (!answer.ok) return
@@ -125,15 +125,16 @@ async function stage(described) {
   $("no-scene").textContent = empty ? "Nothing in this session has a scene to draw." : ""
   showCameras()
   dirty = true
-  drawing = false // that took long, but was no drawing
 }
 
+let refused = false // the browser has no WebGL
 async function makeScene() {
   try {
     const { Scene } = await import("./scene.js")
     scene = new Scene($("canvas"), () => { dirty = true })
     scene.chosen = showCameras
   } catch (error) {
+    refused = true
     $("no-scene").hidden = false
     $("no-scene").textContent =
       `This browser draws no scene (${error.message}). Plots and pictures work; to mend it, switch on WebGL.`
@@ -215,7 +216,6 @@ function draw(now) {
   }
 }
 requestAnimationFrame(draw)
-const makingScene = makeScene() // before it is known what is in it
 
 // For the tests and the benchmark: what this page has drawn.
 Object.defineProperty(window, "trocar", { value: { get drawn() { return drawn }, get time() { return lastTime },

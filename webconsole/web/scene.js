@@ -20,8 +20,7 @@ export class Scene {
     this.canvas = canvas
     this.dirty = dirty
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: "low-power" })
-    this.finest = Math.min(devicePixelRatio, 2)
-    this.ratio = isSoftware(this.renderer.getContext()) ? COARSEST : this.finest
+    this.finest = this.ratio = Math.min(devicePixelRatio, 2)
     this.renderer.setPixelRatio(this.ratio)
     this.interval = 0
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.002, 50)
@@ -354,12 +353,6 @@ export class Scene {
     this.camera.quaternion.copy(group.quaternion).multiply(new THREE.Quaternion(...q)).multiply(FLIP)
     this.camera.translateX(aside)
   }
-}
-
-// Whether the processor draws: it begins with few pixels, as to change their number later costs a picture or two.
-function isSoftware(gl) {
-  const info = gl.getExtension("WEBGL_debug_renderer_info")
-  return /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(info?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER))
 }
 
 function geometry(positions, faces, cosine) {
