@@ -44,7 +44,6 @@ class BrowserParams(Params):
         Duration,
         Field(gt=0, le=1_000_000_000, description="a page that sends nothing for this long lets go of all"),
     ] = 100_000_000
-    """With a read and the way to a grant the arm holds within 100 ms."""
     max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = (
         100_000_000
     )

@@ -72,7 +72,7 @@ def test_it_moves_as_asked(page):
 
 def test_it_lets_go_after_silence(page):
     page.ask(200, linear=(1.0, 0.0, 0.0), dead_man=True)
-    before = page.read(68)
+    before = page.read(76)
     assert "pose" in before
     assert "buttons" not in before
     after = page.read(12)
