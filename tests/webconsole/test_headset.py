@@ -82,7 +82,8 @@ def test_the_force_on_the_instrument_is_felt_while_the_hand_leads(browser, tmp_p
         assert feels("0.8", "0.9") is None, "the dead-man is open"
         one.page.evaluate("press(-1)")
         until(lambda: given and given[-1].dead_man)
-        assert until(lambda: feels("0.12", "0.13")) < 0.2
+        # not at once: of the instant that was shown when the hand was pressed, all strength may be felt first
+        assert until(lambda: 0.0 < (feels("0.12", "0.13") or 0.0) < 0.2)
         until(lambda: feels("0.85", "0.9") == 1)
         assert one.page.evaluate("felt.every(({ duration }) => duration === 100)")
         one.page.wait_for_timeout(200)
