@@ -6,6 +6,7 @@ anchor passes on the whole force. Rules and figures: docs/decisions/0016-tissue-
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
@@ -25,6 +26,8 @@ from schemas.trocar_msgs import TissueGrasp
 from schemas.vectors import Vector
 
 __all__ = ["Grasp", "grasp_ports", "nothing_held"]
+
+_log = logging.getLogger(__name__)
 
 _CLOSING_M = 0.5e-3
 """By how much the fingers must have closed on tissue to grasp it, and opened from there to release it.
@@ -110,6 +113,7 @@ class Grasp:
         """Spread of the fingers when they were widest since they touch tissue, or, while they hold it, when
         they took hold, m.
         """
+        self._has_warned = False
         self._held, self._pull, self._lift = np.zeros(1), np.zeros(3), np.zeros(1)
         self.outputs = nothing_held(probe.name)
 
@@ -218,7 +222,17 @@ class Grasp:
     def _patch(self, spheres: NDArray[np.int64]) -> HeldPatch | None:
         """Return the spring in series with these spheres, if a `width` is stated and one organ is held."""
         width = self._params.width
-        if width is None or len(self._holds) != 1:
+        if width is None:
+            return None
+        if len(self._holds) != 1:
+            if not self._has_warned:
+                self._has_warned = True
+                _log.warning(
+                    "probe '%s' holds %s: its grasp.width counts for one organ alone, so the pull is that of"
+                    " the nodes that the meshes hold",
+                    self._probe.name,
+                    " and ".join(f"'{hold.organ.name}'" for hold in self._holds),
+                )
             return None
         hold = self._holds[0]
         surface = self._surfaces[hold.organ.name]

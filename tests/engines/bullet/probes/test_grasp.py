@@ -29,7 +29,7 @@ class Jaw:
 
     fingers = 2
 
-    def __init__(self, organ, at, opening=OPEN, **grasp):
+    def __init__(self, organ, at, opening=OPEN, *, beside=None, **grasp):
         probe = {
             "spheres": 3 * self.fingers,
             "radius": RADIUS,
@@ -37,7 +37,7 @@ class Jaw:
             "grasp": {"fingers": self.fingers, **grasp},
         }
         self.params = BulletParams.model_validate(
-            {"organs": {"organ": organ}, "probes": {"jaw": probe}, "node_period": "1 ms"}
+            {"organs": {"organ": organ, **(beside or {})}, "probes": {"jaw": probe}, "node_period": "1 ms"}
         )
         self.engine = BulletEngine("tissue", self.params)
         self.outputs = dict(self.engine.configure(Setup(MS, Path(), {"jaw": IMPULSE})))
@@ -160,6 +160,15 @@ def test_a_patch_is_as_stiff_as_converged_elements_say(width, converged):
 def test_a_width_needs_tissue_that_is_anchored():
     with pytest.raises(ValidationError, match=r"grasp\.width needs organs that are anchored"):
         Jaw({**SLAB, "anchors": []}, ABOVE_SLAB, width="4 mm")
+
+
+def test_a_width_counts_for_one_organ_alone(caplog):
+    left, right = ({**WALL, "position": [x, 0, 0]} for x in ("-3.1 mm", "3.1 mm"))
+    with Jaw(left, ON_WALL, opening=9e-3, beside={"other": right}, width="4 mm") as jaw:
+        jaw.close()
+        assert jaw.held
+        assert jaw.engine._probes[0].held_patch is None
+    assert caplog.text.count("holds 'organ' and 'other': its grasp.width counts for one organ alone") == 1
 
 
 def test_opening_lets_go_and_the_tissue_goes_back():
