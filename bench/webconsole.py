@@ -76,7 +76,7 @@ class Fed:
             Outlet("tissue", Port(name="liver/nodes", causality="output", type=SoftBodyState.ros_type)),
             *(Outlet("endoscope", Port(name=f"{eye}/image", **picture)) for eye in ("left", "right")),
         )
-        self._nodes, self._faces = _ring()
+        self._nodes, self._faces = ring()
         self._jpeg = np.random.default_rng(0).integers(0, 255, PICTURE_BYTES).astype(np.uint8)
         self._values: dict[str, Value] = {}
         self.state: dict[str, Any] = {"session": "bench", "state": "running", "time": 0.0}
@@ -125,7 +125,7 @@ class Fed:
         self._ending.set()
 
 
-def _ring() -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+def ring() -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Return nodes (m) and triangles of a ring of 84 mm, which are as many as the figures are for."""
     side = math.isqrt(NODES)
     around, across = (2.0 * np.pi * angle / side for angle in np.divmod(np.arange(NODES), side))
