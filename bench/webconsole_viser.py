@@ -4,8 +4,8 @@
     python -m bench.webconsole_viser /tmp/viser/bin/python [--seconds 6]
 
 The bodies of the whole cart at 60 Hz, and at 30 Hz, an organ of 1024 nodes and two pictures of 320 x 288 at
-30 Hz, for one page that reads all. viser encodes the pictures itself. Processor time is that of viser's process, which sets
-its handles too; frames per second are those in which Chromium draws with software OpenGL.
+30 Hz, for one page that reads all. viser encodes the pictures itself. Processor time is that of viser's
+process, which sets its handles too; frames per second are those in which Chromium draws with software OpenGL.
 """
 
 from __future__ import annotations
