@@ -44,6 +44,7 @@ def open_session(
     settings: dict[str, Any] = {
         "mode": mode,
         "scouting/multicast/enabled": False,
+        "scouting/delay": 0,  # a router waits for this long, 500 ms by default, for others to be found
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
         "connect/timeout_ms": 5000,
