@@ -1,8 +1,8 @@
 """A process of `trocar` that has imported what it needs, and waits for its arguments.
 
 `python -P -m webconsole.ready MODULE ...`: a line of its standard input has the arguments, a list in JSON; at
-the end of the input without one it ends. To import takes more than a second, which is done while a
-person still reads the form of a fork.
+the end of the input without one it ends. To import, and to read the definitions of units, messages and kinds,
+takes two seconds, which is done while a person still reads the form of a fork.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ def main() -> None:
     for module in sys.argv[1:]:
         with suppress(Exception):  # a plug-in may raise anything; the command will say what
             import_module(module)
+    _read_definitions()
     line = sys.stdin.readline()
     if not line:
         return
@@ -65,6 +66,17 @@ def main() -> None:
     from hub.command_line import main as command
 
     command()
+
+
+def _read_definitions() -> None:
+    """Read what is read once in a process: messages, units and kinds."""
+    from hub.planning import registry
+    from schemas.codec import typestore
+    from schemas.quantity import to_si
+
+    typestore()
+    to_si("1 mm", "m")
+    registry.kinds()
 
 
 if __name__ == "__main__":

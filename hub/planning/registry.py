@@ -67,7 +67,8 @@ def kinds() -> dict[str, Kind]:
     found: dict[str, Kind] = {}
     for group, role in GROUPS.items():
         for entry in sorted(entry_points(group=group), key=lambda e: (e.name, e.value)):
-            kind = Kind(entry.name, role, entry.dist.name if entry.dist else "an unnamed distribution", entry)
+            distribution = _name(entry.dist) if entry.dist else "an unnamed distribution"
+            kind = Kind(entry.name, role, distribution, entry)
             other = found.get(kind.name)
             if other:
                 raise ScenarioError(
@@ -76,6 +77,12 @@ def kinds() -> dict[str, Kind]:
                 )
             found[kind.name] = kind
     return found
+
+
+@cache
+def _name(dist: Distribution) -> str:
+    """Return the name of a distribution, whose metadata are parsed anew each time that it is asked."""
+    return dist.name
 
 
 def find(name: str) -> Kind:
@@ -177,16 +184,20 @@ def installed_packages(dist: Distribution, extra: str) -> list[str]:
 
 
 def _requirements(dist: Distribution | None, extra: str) -> Iterator[Requirement]:
-    for text in (dist and dist.requires) or ():
-        requirement = Requirement(text)
+    for requirement in _all_requirements(dist) if dist else ():
         marker = requirement.marker
         if not marker or marker.evaluate({"extra": ""}) or not marker.evaluate({"extra": extra}):
             continue
-        if dist and requirement.name == dist.name:  # an extra that consists of others
+        if dist and requirement.name == _name(dist):  # an extra that consists of others
             for part in sorted(requirement.extras):
                 yield from _requirements(dist, part)
         else:
             yield requirement
+
+
+@cache
+def _all_requirements(dist: Distribution) -> tuple[Requirement, ...]:
+    return tuple(Requirement(text) for text in dist.requires or ())
 
 
 def _installed(requirement: Requirement) -> bool:
