@@ -109,6 +109,8 @@ class LinkChannel:
         self._acks.append((self._places[name], pack_ack(ack)))
 
     def flush(self) -> None:
-        """Send the acks and vectors."""
-        self._link.send_report(self._acks, self._vectors.take())
-        self._acks.clear()
+        """Send the acks and vectors, if there are any: the hub reads no report of a host without a step."""
+        vectors = self._vectors.take()
+        if self._acks or vectors:
+            self._link.send_report(self._acks, vectors)
+            self._acks.clear()

@@ -152,6 +152,12 @@ def test_hundreds_of_values_between_two_readings_delay_no_host(prepare):
     assert hashes[0] == hashes[1]
 
 
+def test_a_host_without_a_step_for_a_thousand_grants_delays_none(prepare):
+    rare = "participants.seldom.period=1.2 s", "participants.seldom.step_ns=1200000000"
+    hashes = [prepare(SELDOM, *rare, *_on(host, ("seldom",))).run().state_hash for host in ("hub", "far")]
+    assert hashes[0] == hashes[1]
+
+
 UNREAD = """\
 name: unread
 step: 1 ms
