@@ -27,6 +27,9 @@ __all__ = ["Browser", "BrowserParams"]
 _LONGEST_NS = 50_000_000
 """After a longer pause between reads the stylus moves for this time only: it must not leap."""
 
+_WAY_NS = 2_000_000
+"""From a read to the communication point at which it enters, on one machine (bench/webconsole_session.py)."""
+
 
 class BrowserParams(Params):
     """What a page moves, how fast it moves, and when a silent page is no longer obeyed."""
@@ -42,7 +45,7 @@ class BrowserParams(Params):
     rate: Annotated[float, Field(gt=0.0, le=1000.0, description="samples per second at most")] = 250.0
     silence: Annotated[
         Duration,
-        Field(gt=0, le=1_000_000_000, description="a page that sends nothing for this long lets go of all"),
+        Field(gt=0, le=1_000_000_000, description="the arm holds after a page has sent nothing for this long"),
     ] = 100_000_000
     max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = (
         100_000_000
@@ -72,6 +75,8 @@ class Browser(Device):
         self._stylus = VirtualStylus(self.params.speed, self.params.turn_speed, self.params.stands_for)
         self._pressed = (False, False)
         self._timer, self._last_ns = SampleTimer(self.params.rate), 0
+        silence = self.params.silence  # the last read that is in time lets go
+        self._longest_age_ns = silence - min(round(1e9 / self.params.rate) + _WAY_NS, silence // 4)
         self._lead, self._dragged = -1, np.zeros(3)
         self._spent = False
 
@@ -95,7 +100,7 @@ class Browser(Device):
             self._spent |= self._pressed[0]
             return self._press(t, Wish()) + self._diagnosis.report(Level.WARN, self._unled())
         asked, age_ns, lead = newest
-        if age_ns > self.params.silence:
+        if age_ns > self._longest_age_ns:
             self._spent |= self._pressed[0]
             return self._press(t, Wish()) + self._diagnosis.report(
                 Level.WARN,

@@ -72,10 +72,10 @@ def test_it_moves_as_asked(page):
 
 def test_it_lets_go_after_silence(page):
     page.ask(200, linear=(1.0, 0.0, 0.0), dead_man=True)
-    before = page.read(76)
+    before = page.read(72)
     assert "pose" in before
     assert "buttons" not in before
-    after = page.read(12)
+    after = page.read(8)
     assert after["buttons"].buttons.tolist() == [0, 0]
     later = page.read(400)
     assert {*later} <= {"diagnostics"}, "no pose: the inlet is stale after its max_age"
