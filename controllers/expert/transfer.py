@@ -65,10 +65,16 @@ class Transfer(Taking, Carrying):
     def refuse(self) -> bool:
         """Leave the thing after a command on the way to it was refused; return whether that is possible.
 
-        Commands that were under way may be refused afterwards.
+        On the way back from a thing that is let go, the hand stays where it is. Commands that were under way
+        may be refused afterwards.
         """
+        if self.state.phase is Phase.RETREAT and not self._clings:
+            self.hand.stay()
+            self._give_up()
+            return True
         if self.state.phase not in _APPROACHING:
-            return self.state.phase in _GIVING_UP and bool(self.refusals.things.any())
+            left = self.state.thing < 0 or bool(self.refusals.things.any())
+            return self.state.phase in _GIVING_UP and left
         self.refusals.things[self.state.thing] = 1.0
         self.hand.stay()
         self.state.correction[:] = 0.0
