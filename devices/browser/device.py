@@ -45,7 +45,7 @@ class BrowserParams(Params):
     rate: Annotated[float, Field(gt=0.0, le=1000.0, description="samples per second at most")] = 250.0
     silence: Annotated[
         Duration,
-        Field(gt=0, le=1_000_000_000, description="the arm holds after a page has sent nothing for this long"),
+        Field(gt=0, le=1_000_000_000, description="the arm holds once a page has sent nothing for so long"),
     ] = 100_000_000
     max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = (
         100_000_000
