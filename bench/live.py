@@ -314,12 +314,11 @@ def table(result: Mapping[str, Any]) -> str:
         )
         lines.append(f"| {' | '.join(cells)} |")
     begin, end = (" ".join(f"{load:.1f}" for load in result[name]) for name in ("load_begin", "load_end"))
-    left_out = "; ".join(f"`{name}`: {why}" for name, why in result["left_out"].items())
     facts = (
         f"- {result['cores']} cores",
         f"- medians of {result['runs']} runs",
         f"- load (1, 5, 15 min) at the begin {begin}, at the end {end}",
-        f"- left out: {left_out}",
+        *(f"- left out: `{name}`: {why}" for name, why in result["left_out"].items()),
     )
     return "\n".join([*lines, "", *facts])
 

@@ -60,10 +60,11 @@ class LoopbackPort:
         listen: Sequence[str] = (),
         connect: Sequence[str] = (),
         security: Mapping[str, Any] | None = None,
+        alone: bool = False,
     ) -> zenoh.Session:
         """Open the Zenoh session of a router on the port, and on the endpoints `listen` too.
 
-        `connect` and `security` are those of `open_session`. Raises ConnectError if a port that was given is
+        `connect`, `security` and `alone` are those of `open_session`. Raises ConnectError if a port that was given is
         taken.
         """
         tries = _TRIES
@@ -71,7 +72,11 @@ class LoopbackPort:
             self.release()
             try:
                 return open_session(
-                    "router", listen=[self.endpoint, *listen], connect=connect, security=security
+                    "router",
+                    listen=[self.endpoint, *listen],
+                    connect=connect,
+                    security=security,
+                    alone=alone,
                 )
             except ConnectError:
                 tries -= 1

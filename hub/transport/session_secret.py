@@ -70,7 +70,8 @@ def listen_with_secret(port: LoopbackPort, connect: Sequence[str] = ()) -> Gener
     try:
         with os.fdopen(handle, "w", encoding="ascii") as written:
             written.write(f"{_USER}:{secrets.token_hex(_BYTES)}\n")
-        session = port.listen(connect=connect, security={f"{_SETTINGS}/dictionary_file": name})
+        settings = {f"{_SETTINGS}/dictionary_file": name}
+        session = port.listen(connect=connect, security=settings, alone=not connect)
         with session:
             # now that the port is this hub's: another one's file must not be replaced
             file = file.replace(_file(port.endpoint))

@@ -32,11 +32,12 @@ def open_session(
     listen: Sequence[str] = (),
     connect: Sequence[str] = (),
     security: Mapping[str, Any] | None = None,
+    alone: bool = False,
 ) -> zenoh.Session:
     """Open a Zenoh session without scouting: it listens and connects only at the given endpoints.
 
     `security`: Zenoh's settings of TLS and of access, as `hub.security.credentials` and `hub.security.access`
-    make them.
+    make them. `alone`: a router that no other router meets; it does not wait half a second for others.
 
     Raises ConnectError if an endpoint cannot be opened or reached.
     """
@@ -44,7 +45,6 @@ def open_session(
     settings: dict[str, Any] = {
         "mode": mode,
         "scouting/multicast/enabled": False,
-        "scouting/delay": 0,  # a router waits for this long, 500 ms by default, for others to be found
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
         "connect/timeout_ms": 5000,
@@ -54,6 +54,7 @@ def open_session(
         "transport/link/tx/lease": LEASE_MS,
         "transport/link/tx/queue/size/interactive_high": _EVENT_BATCHES,
         "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
+        **({"scouting/delay": 0} if alone else {}),
         **(security or {}),
     }
     for key, value in settings.items():
