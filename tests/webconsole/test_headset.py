@@ -10,7 +10,7 @@ from tests.webconsole.test_browser import GAMEPAD, Person
 from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
 
-pytestmark = pytest.mark.xdist_group("all cores")
+pytestmark = pytest.mark.alone
 
 IWER = Path(__file__).parent / "vendor/iwer.min.js"
 WORN = """

@@ -127,6 +127,7 @@ def test_a_motion_or_recordings_are_asked_for():
         assert "--excite" in result.output
 
 
+@pytest.mark.alone
 def test_the_whole_circle(tmp_path, monkeypatch):
     """Excite, run, identify: the weight and the friction of the simulated arm are found."""
     monkeypatch.chdir(tmp_path)

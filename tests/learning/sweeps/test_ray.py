@@ -21,7 +21,7 @@ finally:
 """
 
 
-@pytest.mark.xdist_group("all cores")
+@pytest.mark.alone
 def test_trials_on_two_nodes(scenario, tmp_path):
     output = tmp_path / "results"
     sweep = ["sweep", scenario, "--vary", "part.value=0,0.5", "-o", output]

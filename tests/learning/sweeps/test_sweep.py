@@ -23,6 +23,7 @@ def _rows(directory):
     return pq.read_table(directory / "results.parquet").to_pylist()
 
 
+@pytest.mark.alone
 def test_a_table_of_all_trials(scenario, tmp_path):
     output = tmp_path / "results"
     done = _sweep(
@@ -42,6 +43,7 @@ def test_a_table_of_all_trials(scenario, tmp_path):
     assert (output / "results.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.alone
 def test_it_goes_on_where_it_stopped(scenario, tmp_path):
     sweep = Sweep(str(scenario), (parse("part.value=0,0.5"),), tmp_path / "results", repeat=2, recorded=False)
     sweep.open()
@@ -57,6 +59,7 @@ def test_it_goes_on_where_it_stopped(scenario, tmp_path):
     assert [row["part.value"] for row in again.rows()] == [0, 0, 0.5, 0.5]
 
 
+@pytest.mark.alone
 def test_a_killed_trial_is_repeated_once_and_the_table_is_whole(scenario, tmp_path):
     output, mark = tmp_path / "results", tmp_path / "mark"
     once = _sweep(scenario, "--vary", "part.value=0,2", "--set", f"part.mark={mark}", "-o", output)
