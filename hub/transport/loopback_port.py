@@ -64,8 +64,8 @@ class LoopbackPort:
     ) -> zenoh.Session:
         """Open the Zenoh session of a router on the port, and on the endpoints `listen` too.
 
-        `connect`, `security` and `alone` are those of `open_session`. Raises ConnectError if a port that was given is
-        taken.
+        `connect`, `security` and `alone` are those of `open_session`. Raises ConnectError if a port that was
+        given is taken.
         """
         tries = _TRIES
         while True:
