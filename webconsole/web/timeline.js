@@ -83,6 +83,8 @@ export class Timeline {
     const given = Number(new URLSearchParams(hash.slice(1)).get("t") ?? NaN)
     if (!this.begun || Number.isNaN(given) || Math.abs(given - this.time) < 5e-4) return !Number.isNaN(given)
     this.go(given)
+    clearTimeout(this.naming)
+    this.name() // at once: what the page itself was about to name may have taken its place
     return true
   }
 

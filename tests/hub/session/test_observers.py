@@ -75,7 +75,7 @@ def test_a_device_is_shown_what_it_shows(prepare, tmp_path):
     file = tmp_path / "pad.txt"
     pad = f"""  pad: {{kind: "toys:Pad", host: pad, file: "{file}"}}\n"""
     scene = SCENE.replace("connections:\n", f"{pad}connections:\n") + SHOWN
-    prepare(scene, "duration=300 ms").run()
+    prepare(scene, "duration=1 s").run()
     seen = rows(line.partition(" ")[2] for line in file.read_text().splitlines())
     assert all(number == time // 2 for time, number, *_ in seen)
     assert len(seen) > 1
