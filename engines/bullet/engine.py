@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-from functools import lru_cache
 from math import ceil, pi, sin
 from typing import ClassVar
 
@@ -19,6 +17,7 @@ from engines.bullet.probes.grasp import Grasp, grasp_ports, nothing_held
 from engines.bullet.probes.params import Coupling, ProbeParams
 from engines.bullet.probes.probe import Probe
 from engines.bullet.probes.sub_grid import SubGrid, Surface
+from engines.bullet.warn_once import warn_once
 from engines.bullet.world import connect, disconnect
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError
@@ -37,14 +36,6 @@ _GRAVITY_DIGITS = 6
 """Digits to which the growing gravity is rounded: sines differ in their last bit between processors."""
 
 _NO_CLIENT = -1
-
-_log = logging.getLogger(__name__)
-
-
-@lru_cache(maxsize=64)
-def _warn_once(text: str) -> None:
-    """Warn, but not again where the same scene is configured again, as for the next episode of learning."""
-    _log.warning("%s", text)
 
 
 class BulletEngine(Stepped):
@@ -209,7 +200,7 @@ class BulletEngine(Stepped):
     def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:
         sub_grid.update(probe.positions[0], probe.forces[0], probe.near)
         if sub_grid.is_beyond:
-            _warn_once(
+            warn_once(
                 f"participant '{self.name}', probe '{probe.name}': it pressed deeper than {DEEPEST:g} radii,"
                 f" {DEEPEST * float(probe.radii[0]) * 1e3:.3g} mm, up to which the force of tissue is known;"
                 " beyond, it is extrapolated. Press less deep, or with a larger sphere"
@@ -320,7 +311,7 @@ class BulletEngine(Stepped):
         for organ in self._organs:
             phase = self._dt * organ.frequency
             if phase > ACCURATE_PHASE:
-                _warn_once(
+                warn_once(
                     f"participant '{self.name}', organ '{organ.name}': with a timestep of"
                     f" {self.params.timestep / 1e6:g} ms forces of contact are up to some"
                     f" {face_loss(phase):.0%} too small over faces of the mesh (what is held is not"

@@ -6,7 +6,6 @@ anchor passes on the whole force. Rules and figures: docs/decisions/0016-tissue-
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
@@ -19,6 +18,7 @@ from engines.bullet.probes.held_patch import HeldPatch, missing_compliance
 from engines.bullet.probes.params import GraspParams
 from engines.bullet.probes.probe import Probe
 from engines.bullet.probes.sub_grid import Surface
+from engines.bullet.warn_once import warn_once
 from hub.participant import Value
 from schemas.ports import Port
 from schemas.ros import Float64Message, Header, Time
@@ -26,8 +26,6 @@ from schemas.trocar_msgs import TissueGrasp
 from schemas.vectors import Vector
 
 __all__ = ["Grasp", "grasp_ports", "nothing_held"]
-
-_log = logging.getLogger(__name__)
 
 _CLOSING_M = 0.5e-3
 """By how much the fingers must have closed on tissue to grasp it, and opened from there to release it.
@@ -113,7 +111,6 @@ class Grasp:
         """Spread of the fingers when they were widest since they touch tissue, or, while they hold it, when
         they took hold, m.
         """
-        self._has_warned = False
         self._held, self._pull, self._lift = np.zeros(1), np.zeros(3), np.zeros(1)
         self.outputs = nothing_held(probe.name)
 
@@ -225,14 +222,11 @@ class Grasp:
         if width is None:
             return None
         if len(self._holds) != 1:
-            if not self._has_warned:
-                self._has_warned = True
-                _log.warning(
-                    "probe '%s' holds %s: its grasp.width counts for one organ alone, so the pull is that of"
-                    " the nodes that the meshes hold",
-                    self._probe.name,
-                    " and ".join(f"'{hold.organ.name}'" for hold in self._holds),
-                )
+            held = " and ".join(f"'{hold.organ.name}'" for hold in self._holds)
+            warn_once(
+                f"probe '{self._probe.name}' holds {held}: its grasp.width counts for one organ alone, so the"
+                " pull is that of the nodes that the meshes hold"
+            )
             return None
         hold = self._holds[0]
         surface = self._surfaces[hold.organ.name]
