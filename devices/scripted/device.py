@@ -6,23 +6,27 @@ in the headers become the times at which the samples are played, in the port's c
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
 from devices.samples import Playback, clock_of, stamped
-from hub.participant import Device, Params, Sample
+from hub.participant import Device, Params, Sample, VectorSample
 from hub.recording.bag import Bag, BagMessage, output_port
 from schemas.codec import decode, message_type
 from schemas.errors import MessageError, RecordingError
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.quantity import Duration
+from schemas.vectors import VectorCodec
 
 __all__ = ["ScriptedDevice", "ScriptedParams"]
+
+_Maker = Callable[[int], Sample]
+"""Makes a sample with the stamp (ns) that it is given."""
 
 
 class ScriptedParams(Params):
@@ -90,10 +94,10 @@ class ScriptedDevice(Device):
         bag = Bag(self.params.samples)
         played = sorted(bag.messages(), key=lambda message: message.time_ns)
         try:
-            messages = [decode(message_type(m.type), m.payload) for m in played]
+            makers = _makers(played, self.ports)
         except MessageError as error:
             raise RecordingError(f"'{bag.file}': {error}") from error
-        self._playback = Playback(self._play(played, messages))
+        self._playback = Playback(self._play(played, makers))
 
     def read(self, t: int) -> list[Sample]:
         """Return the samples up to time `t` that were not returned before, oldest first."""
@@ -103,19 +107,51 @@ class ScriptedDevice(Device):
         """Discard the samples."""
         self._playback = Playback()
 
-    def _play(self, played: list[BagMessage], messages: list[Message]) -> Iterator[tuple[int, Sample]]:
+    def _play(self, played: list[BagMessage], makers: list[_Maker]) -> Iterator[tuple[int, Sample]]:
         """Yield (time in ns, sample) in order, endlessly if `loop` is set."""
         start, end = played[0].time_ns, played[-1].time_ns
         # between the last sample and the first of the next round: one mean interval
         lap = end - start + max(1, (end - start) // max(1, len(played) - 1))
         offset = 0
         while True:
-            for source, message in zip(played, messages, strict=True):
+            for source, make in zip(played, makers, strict=True):
                 time_ns = round((source.time_ns - start + offset) / self.params.rate)
-                yield time_ns, Sample(_port_name(source.topic), stamped(message, time_ns))
+                yield time_ns, make(time_ns)
             if not self.params.loop:
                 return
             offset += lap
+
+
+def _makers(played: list[BagMessage], ports: Sequence[Port]) -> list[_Maker]:
+    """Return what makes the sample of each message of a recording.
+
+    Messages of a signal are read as numbers, all at once, if they are laid out alike: a hundredth of the time
+    that one after the other takes as a model.
+    """
+    makers: dict[int, _Maker] = {}
+    for port in ports:
+        places = [i for i, message in enumerate(played) if _port_name(message.topic) == port.name]
+        payloads = [played[i].payload for i in places]
+        own = _vector_makers(port, payloads) or [
+            partial(_restamped, port.name, decode(message_type(port.type), payload)) for payload in payloads
+        ]
+        makers.update(zip(places, own, strict=True))
+    return [makers[i] for i in range(len(played))]
+
+
+def _vector_makers(port: Port, payloads: list[bytes]) -> list[_Maker]:
+    """Return what makes the samples of a signal; none if its messages differ in more than their numbers."""
+    if port.variability != "signal":
+        return []
+    codec = VectorCodec(port)
+    try:
+        return [partial(VectorSample, codec, value) for value in codec.decode_all(payloads)]
+    except MessageError:
+        return []
+
+
+def _restamped(port: str, message: Message, time_ns: int) -> Sample:
+    return Sample(port, stamped(message, time_ns))
 
 
 def _ports(bag: Bag, *, simulated_time: bool, max_age_ns: int) -> tuple[Port, ...]:

@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 from pydantic import ValidationError
 
+from devices.samples import stamped
 from devices.scripted.device import ScriptedDevice, ScriptedParams
+from hub.participant import VectorSample
 from schemas.codec import encode, ros2msg_definition
 from schemas.message import Message
 from schemas.ros import Header, Joy, Point, Pose, PoseStamped, Time
@@ -97,6 +99,23 @@ def test_stamps_are_in_the_clock_of_the_port(hand: Path) -> None:
     assert len(samples) == 103
     assert stamps == sorted(stamps)
     assert stamps[-1] == SECOND // 2
+
+
+@pytest.mark.parametrize("frame", ["stylus_base", "another_base"])
+def test_samples_have_the_bytes_of_what_was_recorded_with_a_new_stamp(tmp_path: Path, frame: str) -> None:
+    """As numbers where all messages of a topic are laid out alike, as messages where one is in another frame."""
+    poses = [_pose(EPOCH + i * SECOND // 100, i / 100) for i in range(10)]
+    poses[5] = PoseStamped(header=Header(stamp=poses[5].header.stamp, frame_id=frame), pose=poses[5].pose)
+    _write(
+        tmp_path / "hand.mcap", [("/pose", EPOCH + i * SECOND // 100, pose) for i, pose in enumerate(poses)]
+    )
+    device = _device(tmp_path / "hand.mcap")
+    device.open(tmp_path)
+    samples = device.read(SECOND)
+    assert all(isinstance(sample, VectorSample) for sample in samples) == (frame == "stylus_base")
+    assert [sample.encode() for sample in samples] == [
+        encode(stamped(pose, i * SECOND // 100)) for i, pose in enumerate(poses)
+    ]
 
 
 def test_a_loop_goes_on_with_the_same_spacing(hand: Path) -> None:
