@@ -19,11 +19,12 @@ from engines.bullet.probes.probe import Probe
 from engines.bullet.probes.sub_grid import SubGrid, Surface
 from engines.bullet.warn_once import warn_once
 from engines.bullet.world import connect, disconnect
-from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
+from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port
 from schemas.ros import Header, Time
 from schemas.trocar_msgs import SoftBodyState
+from schemas.vectors import Vector
 
 __all__ = ["BulletEngine"]
 
@@ -55,6 +56,12 @@ class BulletEngine(Stepped):
         self._probes: list[Probe] = []
         self._grasps: list[Grasp] = []
         self._sub_grids: list[tuple[Probe, SubGrid]] = []
+        self._surfaces: list[Surface] = []
+        self._tissues: list[Tissue] = []
+        self._bonded: dict[str, BondPlan] = {}
+        self._settled: list[Vector] = []
+        """Nodes of each organ at the start, m, shape (n, 3)."""
+        self._at_start = False
         self._unused: dict[str, Value] = {}
         """Outputs of the probes that might grasp, but are not bonded."""
 
@@ -100,34 +107,45 @@ class BulletEngine(Stepped):
         if setup.bonds:
             self._warn_of_long_step()
         self._settle()
+        self._read_nodes(0)
+        self._settled = [organ.nodes for organ in self._organs]
+        self._bonded = dict(setup.bonds)
+        self._surfaces = self._loaded_surfaces()
+        self._tissues = [self._tissue(organ) for organ in self._organs]
+        return self._begin()
+
+    def _begin(self) -> Outputs:
+        """Add a proxy for every bond to organs that have settled; return the outputs at time 0."""
         for bond in self.bonds:
-            if plan := setup.bonds.get(bond.name):
+            if plan := self._bonded.get(bond.name):
                 probe = self.params.probes[bond.name]
                 self._probes.append(
-                    Probe(probe, self._coupling(bond.name), bond, plan, self.params.gravity, client)
+                    Probe(probe, self._coupling(bond.name), bond, plan, self.params.gravity, self._client)
                 )
-        self._read_nodes(0)
-        surfaces = self._surfaces()
-        self._add_sub_grid(surfaces)
-        self._contacts = Contacts([self._tissue(organ) for organ in self._organs])
+        self._add_sub_grid()
+        for tissue in self._tissues:
+            tissue.advance()
+        self._contacts = Contacts(self._tissues)
         outputs = self._nodes(0)
         self._unused = {
             port: value
             for name, probe in self.params.probes.items()
-            if probe.grasp and name not in setup.bonds
+            if probe.grasp and name not in self._bonded
             for port, value in nothing_held(name).items()
         }
         outputs.update(self._unused)
         for probe in self._probes:
             outputs.update(probe.idle)
             if grasp := self.params.probes[probe.name].grasp:
-                self._grasps.append(Grasp(grasp, probe, self._organs, surfaces))
+                self._grasps.append(Grasp(grasp, probe, self._organs, self._surfaces))
                 outputs.update(self._grasps[-1].outputs)
+        self._at_start = True
         return outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Press the probes along their predicted motion; return their reactions, and the nodes when due."""
         seconds, dt, probes = h * 1e-9, self._dt, self._probes
+        self._at_start = False
         for probe in probes:
             probe.begin(inputs, seconds)
         for i in range(h // self.params.timestep):
@@ -160,12 +178,30 @@ class BulletEngine(Stepped):
         )
 
     def save(self) -> bytes:
-        """Raise StateError: Bullet cannot."""
-        raise StateError(self._no_state)
+        """Return a mark of the start. Raises StateError later: Bullet gives no velocities of nodes."""
+        if not self._at_start:
+            raise StateError(self._no_state)
+        return self._start_mark
 
-    def restore(self, state: bytes) -> None:  # noqa: ARG002
-        """Raise StateError: Bullet cannot."""
-        raise StateError(self._no_state)
+    def restore(self, state: bytes) -> None:
+        """Go back to the start, bit for bit; raises StateError if `state` marks that of other organs."""
+        if state != self._start_mark:
+            raise StateError(self._no_state)
+        for grasp in self._grasps:
+            grasp.untie()
+        for probe in self._probes:
+            probe.remove()
+        self._probes.clear()
+        self._grasps.clear()
+        self._sub_grids.clear()
+        for organ, nodes in zip(self._organs, self._settled, strict=True):
+            organ.stand(nodes)
+        self._read_nodes(0)
+        self._begin()
+
+    @property
+    def _start_mark(self) -> bytes:
+        return state_hash(*self._settled).to_bytes(8, "little")
 
     def close(self) -> None:
         """Close the world."""
@@ -176,25 +212,27 @@ class BulletEngine(Stepped):
         self._probes.clear()
         self._grasps.clear()
         self._sub_grids.clear()
+        self._settled.clear()
+        self._at_start = False
 
     @property
     def _no_state(self) -> str:
         return (
-            f"participant '{self.name}': Bullet saves neither positions nor velocities of soft bodies."
-            " Re-simulate from the recorded grants instead"
+            f"participant '{self.name}': Bullet gives no velocities of soft bodies, so only the start can be"
+            " saved, and restored with the same organs. Re-simulate from the recorded grants instead"
         )
 
-    def _surfaces(self) -> list[Surface]:
+    def _loaded_surfaces(self) -> list[Surface]:
         """Return the surfaces of all organs, if a probe has something in series with their meshes."""
-        if not any(self.params.has_series(probe.name) for probe in self._probes):
+        if not any(self.params.has_series(name) for name in self._bonded):
             return []
         return [Surface(organ, self.params.organs[organ.name].elastic) for organ in self._organs]
 
-    def _add_sub_grid(self, surfaces: list[Surface]) -> None:
+    def _add_sub_grid(self) -> None:
         """Give probes of one sphere the spring in series, where all organs are anchored and small enough."""
         for probe in self._probes:
             if self.params.has_sub_grid(probe.name):
-                probe.sub_grid = SubGrid(float(probe.radii[0]), self._coupling(probe.name), surfaces)
+                probe.sub_grid = SubGrid(float(probe.radii[0]), self._coupling(probe.name), self._surfaces)
                 self._sub_grids.append((probe, probe.sub_grid))
 
     def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:
@@ -264,7 +302,7 @@ class BulletEngine(Stepped):
         """Increase gravity as slowly as the organs can follow: applied at once, they would swing for long.
 
         It grows like the integral of a Hann window, whose spectrum is below 3 % from two periods per window
-        on.
+        on. What still moves then is stopped, so that the start can be restored.
         """
         import pybullet as bullet
 
@@ -275,6 +313,8 @@ class BulletEngine(Stepped):
             share = round(s - sin(2.0 * pi * s) / (2.0 * pi), _GRAVITY_DIGITS)
             bullet.setGravity(0.0, 0.0, -self.params.gravity * share, physicsClientId=self._client)
             self._simulate(physicsClientId=self._client)
+        for organ in self._organs:
+            organ.stand()
 
     def _check_steps(self, period_ns: int) -> None:
         params, where = self.params, f"participant '{self.name}'"

@@ -29,7 +29,7 @@ Observation = dict[str, NDArray[Any]]
 _FAR = 2.0
 """m; coordinates are clipped to this, so that spaces are bounded."""
 _SETTLING_NS = 20_000_000
-"""Until the first action is due: the period at which the scenes report where things are."""
+"""Until the first action is due where things are put: the period at which the scenes report them."""
 _EYES = ("left", "right")
 
 
@@ -75,9 +75,10 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._terminates = terminate_on_success
         scene = files("learning.environments") / "scenes" / f"{exercise.scene}.yaml"
         duration = f"{step:g} s"
+        settling_ns = _SETTLING_NS if exercise.puts else 0
         own = {
             "participants.actions.action_step": duration,
-            "participants.actions.first_action": f"{_SETTLING_NS / 1e6:g} ms",
+            "participants.actions.first_action": f"{settling_ns / 1e6:g} ms",
             "participants.task.period": duration,
             "participants.camera.width": width,
             "participants.camera.height": height,
@@ -91,7 +92,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise ValueError(
                 f"step {step:g} s is no multiple of the scenario's {self._session.plan.step_ns / 1e9:g} s"
             )
-        self._settling = -(-_SETTLING_NS // self._session.plan.step_ns)
+        self._settling = -(-settling_ns // self._session.plan.step_ns)
         self.exercise = exercise(cast("Task", self._session.participant("task")))
         self._view = self._new_view()
         self._describe(len(self._view.vector()), (height, width, 3))
@@ -134,7 +135,8 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode; the `seed` decides where things start, and the goal.
 
-        `options`: none are known. Things are put and seen before the first action is due, after 20 ms.
+        `options`: none are known. Things are put and seen before the first action is due, after 20 ms; where
+        none are put, it is due at once.
         """
         super().reset(seed=seed)
         if options:

@@ -49,6 +49,8 @@ class Exercise(ABC):
     tolerance: ClassVar[Tolerance] = _NEAR
     floor: ClassVar[float] = -0.05
     """Height under which a thing is lost, m."""
+    puts: ClassVar[bool] = True
+    """Whether things are put where an episode starts."""
 
     def __init__(self, task: Task) -> None:
         """Take the task that watches the scene, which knows where its things belong."""
@@ -71,6 +73,7 @@ class Reach(Exercise):
     """Bring the tip to a point. SurRoL's PsmReach."""
 
     scene = "reach"
+    puts = False
 
     def draw(self, rng: Generator) -> tuple[Starts, Vector]:
         """Draw a point of the workspace: 80 x 80 x 50 mm."""
@@ -197,6 +200,7 @@ class Retraction(Exercise):
 
     scene = "retraction"
     goal_size = 1
+    puts = False
     tolerance = Tolerance(4e-3)
 
     def draw(self, rng: Generator) -> tuple[Starts, Vector]:

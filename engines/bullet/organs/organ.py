@@ -20,6 +20,10 @@ __all__ = ["Organ"]
 _WORLD_BODY = -1
 """Bullet's number for no body: what is anchored to it does not move."""
 
+_STILL = (0.0, 0.0, 0.0)
+_HALTS = 24
+"""Each leaves some 1e-16 of a velocity; so many leave nothing of the largest that there can be."""
+
 
 class Organ:
     """The body in Bullet. Node i of the mesh is node i of Bullet's simulation mesh."""
@@ -104,6 +108,20 @@ class Organ:
         import pybullet as bullet
 
         bullet.setCollisionFilterPair(self._body, body, -1, -1, int(on), physicsClientId=self._client)
+
+    def stand(self, nodes: Vector | None = None) -> None:
+        """Bring all nodes to a standstill, at `nodes`, shape (n, 3), m in `world`, or where they are.
+
+        Bullet reads no velocities of nodes and sets none; but an angular velocity replaces that of every node
+        by that of the whole, and a linear one shifts them all to a mean (`btSoftBody.cpp`). What remains
+        after each round is an error of rounding.
+        """
+        import pybullet as bullet
+
+        if nodes is not None:
+            bullet.resetMeshData(self._body, nodes.tolist(), physicsClientId=self._client)
+        for _ in range(_HALTS):
+            bullet.resetBaseVelocity(self._body, _STILL, _STILL, physicsClientId=self._client)
 
     def sample(self, time_ns: int) -> None:
         """Read the nodes into `nodes`, shape (n, 3), metres, frame `world`.

@@ -130,6 +130,13 @@ class Grasp:
             events = self._watch(t)
         self._say(events)
 
+    def untie(self) -> None:
+        """Untie what is held, and let the spheres that held it touch it again."""
+        for hold in self._holds:
+            for node, anchor in zip(hold.nodes.tolist(), hold.anchors, strict=True):
+                hold.organ.release(node, anchor)
+        self._set_held(np.flatnonzero(self._probe.held), held=False)
+
     @property
     def state(self) -> tuple[Vector, ...]:
         """State between steps: the spread for comparison, outputs, and the nodes held."""
@@ -238,10 +245,7 @@ class Grasp:
 
     def _let_go(self, why: str, t: int) -> tuple[TissueGrasp, ...]:
         events = self._events(why, t)
-        for hold in self._holds:
-            for node, anchor in zip(hold.nodes.tolist(), hold.anchors, strict=True):
-                hold.organ.release(node, anchor)
-        self._set_held(np.flatnonzero(self._probe.held), held=False)
+        self.untie()
         self._probe.held_patch = None
         self._holds.clear()
         self._widest = 0.0

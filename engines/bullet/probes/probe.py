@@ -193,6 +193,13 @@ class Probe:
             own = (*own, self.held_patch.yielded)
         return own if self.sub_grid is None else (*own, self.sub_grid.state)
 
+    def remove(self) -> None:
+        """Take the proxies out of the world."""
+        import pybullet as bullet
+
+        for body in self.bodies:
+            bullet.removeBody(body, physicsClientId=self._client)
+
     def _stretch(self, tau: float, ahead: float) -> None:
         """Set spring and damper `tau` seconds into the step.
 

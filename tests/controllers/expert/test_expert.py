@@ -270,6 +270,19 @@ def test_a_hand_leaves_a_thing_after_a_command_on_the_way_to_it_was_refused():
     assert "ring1 is not reachable" in world.run(10).expert.ended
 
 
+def test_a_hand_whose_way_back_is_refused_stays_and_goes_on_with_the_next_thing():
+    world = World("peg-board-surrol")
+    hand = world.expert._team.hands[0]
+    world.run(20, until=lambda _: hand.state.phase is Phase.RETREAT)
+    world.run(0.05)
+    before = world.tips["PSM1"].copy()
+    world.step(**{"PSM1/error": (StringMessage(data="too far"),)})
+    assert hand.state.phase is not Phase.RETREAT
+    assert np.linalg.norm(world.tips["PSM1"][:3, 3] - before[:3, 3]) < 1e-3
+    world.run(120)
+    assert world.outputs["placed"][0] == len(world.things)
+
+
 def test_a_refused_command_to_a_hand_that_carries_ends_the_session():
     world = one_ring("peg-board-surrol")
     carrying = world.expert._team.hands[0]

@@ -158,12 +158,38 @@ def test_a_motion_that_is_not_finite_ends_the_session_and_names_the_probe():
             rig.hold(0.001)
 
 
-def test_state_cannot_be_saved_and_the_reason_is_given():
-    engine = BulletEngine("tissue", params())
-    with pytest.raises(StateError, match="soft bodies"):
-        engine.save()
-    with pytest.raises(StateError, match="soft bodies"):
-        engine.restore(b"")
+@pytest.mark.parametrize("sub_grid", [True, False])
+def test_the_start_is_restored_bit_for_bit(sub_grid):
+    model = params({**SMALL_BLOCK, "friction": 0.5}, sub_grid=sub_grid)
+
+    def press(rig, x, depth):
+        rig.hashes.clear()
+        rig.at[...], rig.speed[...], rig.t = (x, 0.0, RADIUS + 1e-3), 0.0, 0
+        rig.move((x, 0.0, RADIUS - depth), 0.05)
+        rig.move((x + 5e-3, 0.0, RADIUS - depth), 0.05)  # drags, and ends in contact
+        return list(rig.hashes)
+
+    with Rig(model) as rig:
+        start, nodes = rig.engine.save(), rig.nodes.copy()
+        first = press(rig, 1e-3, 3e-3)
+        with pytest.raises(StateError, match="only the start"):
+            rig.engine.save()
+        rig.engine.restore(start)
+        assert rig.engine.save() == start
+        other = press(rig, -8e-3, 4e-3)
+        rig.engine.restore(start)
+        assert np.array_equal(np.asarray(rig.engine._organs[0].nodes, np.float32), nodes.astype(np.float32))
+        assert press(rig, 1e-3, 3e-3) == first
+    with Rig(model) as rig:
+        assert press(rig, -8e-3, 4e-3) == other
+
+
+def test_the_start_of_other_organs_is_refused():
+    with Rig(params(SMALL_BLOCK)) as one, Rig(params({**SMALL_BLOCK, "young_modulus": "9 kPa"})) as other:
+        with pytest.raises(StateError, match="with the same organs"):
+            other.engine.restore(one.engine.save())
+    with pytest.raises(StateError, match="only the start"):
+        BulletEngine("tissue", params()).save()
 
 
 def test_close_may_be_called_at_any_time():

@@ -158,19 +158,21 @@ def test_an_oracle_does_what_surrol_s_does_in_as_many_steps(name):
     env.close()
 
 
-def test_tissue_is_grasped_and_lifted_and_a_new_episode_has_it_where_it_was():
+def test_tissue_is_grasped_and_lifted_and_a_new_episode_has_it_where_it_was(tmp_path):
+    """The second episode begins with restored tissue; it is simulated again with new one."""
     pytest.importorskip("pybullet")
-    env = gymnasium.make("trocar/Retraction-v0", reward="shaped")
+    env = gymnasium.make("trocar/Retraction-v0", reward="shaped", record=tmp_path)
     hashes = []
-    for steps in (8, 2):
+    for steps in (8, 4):
         observation, _ = env.reset(seed=0)
         policy = oracle(env.unwrapped)
         for _ in range(steps):
             observation, *_, info = env.step(policy(observation))
             hashes.append(env.unwrapped.state_hash)
         assert info["is_success"] == (steps == 8)
-    assert hashes[8:] == hashes[:2]
+    assert hashes[8:] == hashes[:4]
     env.close()
+    assert trocar.verify(tmp_path / "episode-00001").same
 
 
 def test_what_is_unknown_is_refused():
