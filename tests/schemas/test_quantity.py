@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
+from schemas import quantity
 from schemas.quantity import Duration, Force, Length, same_unit, to_si
 
 nonsense = st.one_of(
@@ -192,3 +193,14 @@ def test_a_wrong_dimension_says_what_was_wanted() -> None:
 
     with pytest.raises(ValidationError, match="'2 kg' is not a quantity in N"):
         Pull.model_validate({"force": "2 kg"})
+
+
+@given(
+    number=st.floats(-1e9, 1e9), units=st.sampled_from([*quantity._FACTORS, *((u, u) for u in quantity._SI)])
+)
+def test_units_that_are_known_without_pint_are_as_in_pint(number: float, units: tuple[str, str]) -> None:
+    unit, target = units
+    assert (
+        to_si(f"{number!r} {unit}", target)
+        == quantity._registry().Quantity(number, unit).to(target).magnitude
+    )
