@@ -87,7 +87,7 @@ def run(name: str, nodes: int, seconds: float) -> dict[str, float | str]:
         "nodes": len(mesh.nodes),
         "tetrahedra": len(mesh.tetrahedra),
     }
-    row["timestep_ms"] = params.timestep * 1e-6
+    row["timestep_ms"] = params.sub_step * 1e-6
     with Rig(params, start=at + above + [0.0, 0.0, 1e-3]) as rig:
 
         def cost(kind: str) -> None:

@@ -94,7 +94,7 @@ class BulletEngine(Stepped):
         Raises ScenarioError where a step is too long.
         """
         self._check_steps(setup.period_ns)
-        dt = self.params.timestep * 1e-9
+        dt = self.params.sub_step * 1e-9
         self._dt = dt
         self._client = client = connect(f"participant '{self.name}' (kind bullet)", dt, self.params.gravity)
         import pybullet as bullet
@@ -148,7 +148,7 @@ class BulletEngine(Stepped):
         self._at_start = False
         for probe in probes:
             probe.begin(inputs, seconds)
-        for i in range(h // self.params.timestep):
+        for i in range(h // self.params.sub_step):
             for probe in probes:
                 probe.push((i + 0.5) * dt, dt)
             self._simulate(physicsClientId=self._client)
@@ -256,7 +256,7 @@ class BulletEngine(Stepped):
         )
 
     def _coupling(self, probe: str) -> Coupling:
-        params, timestep = self.params.probes[probe], self.params.timestep * 1e-9
+        params, timestep = self.params.probes[probe], self.params.sub_step * 1e-9
         organs = [organ.elastic for organ in self.params.organs.values()]
         damping = min(material.damping for material in organs)
         if self.params.has_sub_grid(probe):
@@ -275,7 +275,7 @@ class BulletEngine(Stepped):
             stiffness=coupling.stiffness,
             damping=coupling.damping,
             proxy_mass=coupling.mass,
-            proxy_step=self.params.timestep * 1e-9,
+            proxy_step=self.params.sub_step * 1e-9,
             contact_stiffness=(
                 coupling.stiffness if self.params.has_sub_grid(name) else self._contact_stiffness(probe)
             ),
@@ -318,9 +318,9 @@ class BulletEngine(Stepped):
 
     def _check_steps(self, period_ns: int) -> None:
         params, where = self.params, f"participant '{self.name}'"
-        if period_ns % params.timestep:
+        if period_ns % params.sub_step:
             raise ScenarioError(
-                f"{where}: timestep {params.timestep} ns does not divide the period {period_ns} ns"
+                f"{where}: timestep {params.sub_step} ns does not divide the period {period_ns} ns"
             )
         if params.node_period % period_ns:
             raise ScenarioError(
@@ -328,9 +328,9 @@ class BulletEngine(Stepped):
             )
         for name in params.probes:
             longest = self._coupling(name).longest_step * 1e9
-            if params.timestep > longest * (1.0 + 1e-9):
+            if params.sub_step > longest * (1.0 + 1e-9):
                 raise ScenarioError(
-                    f"{where}, probe '{name}': timestep {params.timestep} ns is above 0.5 sqrt(mass /"
+                    f"{where}, probe '{name}': timestep {params.sub_step} ns is above 0.5 sqrt(mass /"
                     f" stiffness) = {longest:.0f} ns, up to which the virtual coupling is stable. Shorten it,"
                     " or take a heavier or softer probe"
                 )
@@ -340,7 +340,7 @@ class BulletEngine(Stepped):
             limit = longest_step(organ.frequency, self.params.organs[organ.name].elastic.damping)
             if self._dt > limit:
                 raise ScenarioError(
-                    f"participant '{self.name}', organ '{organ.name}': timestep {self.params.timestep} ns is"
+                    f"participant '{self.name}', organ '{organ.name}': timestep {self.params.sub_step} ns is"
                     f" above {limit * 1e9:.0f} ns, up to which tissue with a highest natural frequency of"
                     f" {organ.frequency:.0f} rad/s is stable. Shorten it, raise the damping, or take fewer"
                     " nodes"
@@ -353,7 +353,7 @@ class BulletEngine(Stepped):
             if phase > ACCURATE_PHASE:
                 warn_once(
                     f"participant '{self.name}', organ '{organ.name}': with a timestep of"
-                    f" {self.params.timestep / 1e6:g} ms forces of contact are up to some"
+                    f" {self.params.sub_step / 1e6:g} ms forces of contact are up to some"
                     f" {face_loss(phase):.0%} too small over faces of the mesh (what is held is not"
                     f" concerned); up to {ACCURATE_PHASE / organ.frequency * 1e3:.2g} ms they are within 10 %"
                 )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Self
 
 from pydantic import Field, model_validator
 
 from engines.bullet.elasticity.compliance import MOST_NODES
+from engines.bullet.elasticity.stable_step import longest_step
 from engines.bullet.organs.anchors import WORLD, RigidParams
 from engines.bullet.organs.params import OrganParams
 from engines.bullet.probes.params import ProbeParams
@@ -16,6 +18,9 @@ from schemas.quantity import Acceleration, Duration
 from schemas.scenario import Name
 
 __all__ = ["BulletParams"]
+
+_LONGEST_NS, _HALVES = 1_000_000, 4
+"""Of a sub-step that nothing states, and how often it is halved; 62.5 us are far from real time."""
 
 
 class BulletParams(Params):
@@ -27,8 +32,12 @@ class BulletParams(Params):
         description="parts that do not move, and to which organs may be anchored",
     )
     probes: dict[Name, ProbeParams] = Field(default_factory=lambda: {"probe": ProbeParams()})
-    timestep: Duration = Field(
-        default=1_000_000, gt=0, description="sub-step; the period is a multiple of it"
+    timestep: Duration | None = Field(
+        default=None,
+        gt=0,
+        description=(
+            "sub-step; the period is a multiple of it; default: 1 ms, halved until all organs are stable"
+        ),
     )
     node_period: Duration = Field(
         default=16_000_000, gt=0, description="how often the nodes are output; a multiple of the period"
@@ -43,6 +52,17 @@ class BulletParams(Params):
             " anchored organs of at most 1200 nodes"
         ),
     )
+
+    @cached_property
+    def sub_step(self) -> int:
+        """The sub-step, ns: what is stated, or the longest of 1 ms and its halves at which organs are stable."""
+        if self.timestep is not None:
+            return self.timestep
+        limit = min(
+            longest_step(organ.frequencies[0], organ.elastic.damping) for organ in self.organs.values()
+        )
+        halves = (_LONGEST_NS >> i for i in range(_HALVES + 1))
+        return next((step for step in halves if step <= limit * 1e9), _LONGEST_NS >> _HALVES)
 
     def has_sub_grid(self, probe: str) -> bool:
         """Return whether a probe feels the tissue's force: it is one sphere, and may press every organ so."""

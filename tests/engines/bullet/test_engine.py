@@ -131,8 +131,11 @@ def test_unphysical_organs_are_refused(wrong):
         (params(timestep="0.3 ms"), "does not divide the period"),
         (params(node_period="2.5 ms"), "no multiple of the period"),
         (params(probe={"stiffness": "10 kN/m", "mass": "20 g"}), "0.5 sqrt\\(mass / stiffness\\)"),
-        (params({**BLOCK, "young_modulus": "200 kPa"}), "organ 'block'.*highest natural frequency"),
-        (params({**BLOCK, "young_modulus": "30 kPa", "damping": 0}), "raise the damping"),
+        (
+            params({**BLOCK, "young_modulus": "200 kPa"}, timestep="1 ms"),
+            "organ 'block'.*highest natural frequency",
+        ),
+        (params({**BLOCK, "young_modulus": "30 kPa", "damping": 0}, timestep="1 ms"), "raise the damping"),
     ],
 )
 def test_steps_that_are_too_long_are_refused(model, expected):
@@ -145,7 +148,7 @@ def test_an_unstable_organ_ends_the_session_and_names_it(monkeypatch):
     monkeypatch.setattr("engines.bullet.engine.longest_step", lambda frequency, damping: 1.0)
     with (
         pytest.raises(SessionError, match=r"organ 'block' became unstable by .* timestep"),
-        Rig(params({**SMALL_BLOCK, "young_modulus": "500 kPa", "damping": 0})),
+        Rig(params({**SMALL_BLOCK, "young_modulus": "500 kPa", "damping": 0}, timestep="1 ms")),
     ):
         pass
 
@@ -156,6 +159,19 @@ def test_a_motion_that_is_not_finite_ends_the_session_and_names_the_probe():
         rig.pose[2] = np.nan
         with pytest.raises(SessionError, match=r"probe 'probe'.*at 0\.006 s"):
             rig.hold(0.001)
+
+
+@pytest.mark.parametrize(
+    ("modulus", "step"), [("10 kPa", 1_000_000), ("50 kPa", 500_000), ("300 kPa", 250_000)]
+)
+def test_a_sub_step_that_is_not_stated_is_one_at_which_the_tissue_is_stable(modulus, step):
+    block = {**BLOCK, "nodes": 250, "young_modulus": modulus, "damping": "0.25 ms"}
+    model = params(block)
+    assert model.sub_step == step
+    with Rig(model) as rig:
+        rig.move((0.0, 0.0, RADIUS - 1e-3), 0.02)
+        assert np.isfinite(rig.nodes).all()
+    assert params(block, timestep="0.125 ms").sub_step == 125_000
 
 
 @pytest.mark.parametrize("sub_grid", [True, False])
