@@ -281,7 +281,8 @@ def bench_fork(seconds: float) -> dict[str, Any]:
         factor = json.loads(_output("-c", _FACTOR, str(directory), str(seconds)).splitlines()[-1])
         order = Fork(do="fork", time=seconds, duration=seconds + 600.0, pace="realtime", record=False)
         started = Started()
-        started.prepare(["hub.fork", "engines.mujoco.engine", "engines.bullet.engine"])  # the form is open
+        engines = "engines.mujoco.engine", "engines.bullet.engine", "mujoco", "pybullet"
+        started.prepare(["hub.fork", *engines])  # the form is open
         sleep(FORM_S)
         begun = perf_counter()
         one = started.start("fork", fork_arguments(recording, order), seconds)

@@ -1,7 +1,7 @@
 """A process of `trocar` that has imported what it needs, and waits for its arguments.
 
 `python -P -m webconsole.ready MODULE ...`: a line of its standard input has the arguments, a list in JSON; at
-the end of the input without one it ends. To import, and to read the definitions of units, messages and kinds,
+the end of the input without one it ends. To import, and to read the definitions of messages and kinds,
 takes two seconds, which is done while a person still reads the form of a fork.
 """
 
@@ -69,13 +69,11 @@ def main() -> None:
 
 
 def _read_definitions() -> None:
-    """Read what is read once in a process: messages, units and kinds."""
+    """Read what is read once in a process: messages and kinds."""
     from hub.planning import registry
     from schemas.codec import typestore
-    from schemas.quantity import to_si
 
     typestore()
-    to_si("1 mm", "m")
     registry.kinds()
 
 

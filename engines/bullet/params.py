@@ -55,7 +55,7 @@ class BulletParams(Params):
 
     @cached_property
     def sub_step(self) -> int:
-        """The sub-step, ns: what is stated, or the longest of 1 ms and its halves at which organs are stable."""
+        """The sub-step, ns: as stated, or the longest of 1 ms and its halves at which organs are stable."""
         if self.timestep is not None:
             return self.timestep
         limit = min(

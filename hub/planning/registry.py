@@ -28,6 +28,7 @@ __all__ = [
     "Participant",
     "Role",
     "broken",
+    "extra_packages",
     "find",
     "installed_packages",
     "kinds",
@@ -171,6 +172,11 @@ def require_extra(name: str) -> None:
     kind = find(name)
     for package in missing_packages(kind.entry.dist, name):
         raise MissingExtraError(f"{kind.role} '{name}'", name, package, kind.distribution)
+
+
+def extra_packages(name: str) -> list[str]:
+    """Return the names of the packages in the extra of kind `name`; empty for one without an extra."""
+    return sorted({requirement.name for requirement in _requirements(find(name).entry.dist, name)})
 
 
 def missing_packages(dist: Distribution | None, extra: str) -> list[str]:

@@ -99,11 +99,15 @@ def _stiffness_per_mass(mesh: TetMesh, free: Vector, material: Material) -> Call
     mu, lambda_ = material.lame
     node_mass = material.density * volume.sum() / len(mesh.nodes)
 
+    weighted = gradients * (volume / node_mass)[:, None, None]
+
     def stiffness(displacement: Vector) -> Vector:
-        slope = np.einsum("mai,maj->mij", displacement[mesh.tetrahedra], gradients)  # displacement gradient
-        trace = np.einsum("mii->m", slope)
-        stress = mu * (slope + slope.transpose(0, 2, 1)) + lambda_ * trace[:, None, None] * np.eye(3)
-        forces = np.einsum("m,mij,maj->mai", volume, stress, gradients) / node_mass
+        slope = displacement[mesh.tetrahedra].transpose(0, 2, 1) @ gradients  # displacement gradient
+        stress = mu * (slope + slope.transpose(0, 2, 1))
+        pressure = lambda_ * (slope[:, 0, 0] + slope[:, 1, 1] + slope[:, 2, 2])
+        for i in range(3):
+            stress[:, i, i] += pressure
+        forces = weighted @ stress  # which is symmetric
         return (
             np.stack(
                 [
