@@ -4,8 +4,8 @@ python bench/tissue_pull.py
 
 The top of a block of 80 x 60 x 20 mm and 10 kPa. Converged: a round patch as wide as a jaw, on a disc of
 the same thickness (bench/tissue_truth.py, which needs scikit-fem). The mesh: the nodes that a grasp takes
-with two spheres side by side, moved alike, by Newton's method.
-Results: docs/decisions/0095-converged-truth.md.
+with two spheres side by side, moved alike, by Newton's method; and with the spring in series that
+`grasp.width` gives it. Results: docs/decisions/0095-converged-truth.md, 0099-rims-and-held-patches.md.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' truth
 
 from bench.tissue_force import places
 from bench.tissue_truth import BLOCK, STANDARD_GRAVITY, axisymmetric, graded
+from engines.bullet.elasticity.compliance import SurfaceCompliance
+from engines.bullet.probes.held_patch import missing_compliance
 from schemas.vectors import Vector
 from tests.engines.bullet import rig
 from tests.engines.bullet.finite_elements import Body, equilibrium
@@ -46,8 +48,8 @@ def converged(patch: float) -> float:
     return float(solid.residual[2 * held + 1].sum()) / LIFT_M
 
 
-def of_mesh(nodes: int, place: str, pad: float) -> tuple[int, float]:
-    """Return how many nodes are held, and force over lift (N/m)."""
+def of_mesh(nodes: int, place: str, pad: float) -> tuple[int, float, float]:
+    """Return how many nodes are held, and force over lift (N/m): of the mesh, and with `grasp.width`."""
     organ = rig.params({**rig.BLOCK, "nodes": nodes}).organs["block"]
     body, rest, faces = Body(organ), organ.rest.nodes, organ.rest.triangles
     edges = np.linalg.norm(rest[faces] - rest[np.roll(faces, 1, axis=1)], axis=2)
@@ -58,7 +60,10 @@ def of_mesh(nodes: int, place: str, pad: float) -> tuple[int, float]:
     lifted = body.nodes + np.where(held[:, None], [0.0, 0.0, LIFT_M], 0.0)
     lifted, _ = equilibrium(body.elements, lifted, body.fixed | held, body.load)
     force = -(body.elements.forces(lifted) + body.load)[held, 2].sum()
-    return int(held.sum()), float(force) / LIFT_M
+    stiffness = float(force) / LIFT_M
+    surface = SurfaceCompliance(organ.rest, body.fixed, faces, organ.elastic)
+    missing = missing_compliance(surface, organ.elastic, np.flatnonzero(held), 2.0 * pad)
+    return int(held.sum()), stiffness, 1.0 / (1.0 / stiffness + max(float(missing[2, 2]), 0.0))
 
 
 def main() -> None:
@@ -68,9 +73,10 @@ def main() -> None:
         print(f"jaw {2e3 * pad:g} mm wide, converged: {true:.1f} N/m", flush=True)
         for nodes in NODES:
             for place in ("node", "face"):
-                held, found = of_mesh(nodes, place, pad)
-                where = f"{nodes:4} nodes, over a {place}"
-                print(f"  {where}: {held} held, {found:.1f} N/m, {found / true:.1f} times", flush=True)
+                held, found, given = of_mesh(nodes, place, pad)
+                where, times = f"{nodes:4} nodes, over a {place}", f"{found / true:.1f} times"
+                with_width = f"with width {given:.1f} N/m, {given / true:.2f} times"
+                print(f"  {where}: {held} held, {found:.1f} N/m, {times}; {with_width}", flush=True)
 
 
 if __name__ == "__main__":

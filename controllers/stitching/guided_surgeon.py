@@ -7,6 +7,9 @@ clear, then each hand goes on a line from its present setpoint to where the proc
 
 from __future__ import annotations
 
+from contextlib import suppress
+from math import cos, radians, sin
+
 import numpy as np
 
 from controllers.expert.hand import Hand
@@ -28,6 +31,8 @@ _ABOVE = 5.0e-3
 """m; a point so far from the skin is still meant to be on it."""
 _LEAST = 2.0e-3
 """m; of a bite."""
+_TURNS = (15, -15, 30, -30, 45, -45, 60, -60, 90, -90, 135, -135, 180)
+"""Degrees about the skin's normal, by which a stitch that is not feasible is tried; least first."""
 _RAMP = 0.2
 """s in which a pause stops all motion."""
 _MOVED, _TURNED = 0.5e-3, 0.01
@@ -104,11 +109,29 @@ class GuidedSurgeon(Procedure):
     def _propose(self) -> None:
         try:
             plan = self._way_on()
-        except MotionError:
+        except MotionError as error:
+            hint = self._feasible_turn()
             self.guided.picked = 0
-            raise
+            raise MotionError(f"{error}{hint}") from error
         self.guided.stage = Stage.PROPOSED
         self._status.append(f"consent? {plan.margin:.2f} of the joints' ranges is left")
+
+    def _feasible_turn(self) -> str:
+        """Say by which least turn about its middle the picked stitch becomes feasible; empty: by none."""
+        points = self.guided.points
+        picked, middle = points.copy(), points.mean(axis=0)
+        try:
+            for turn in _TURNS:
+                c, s = cos(radians(turn)), sin(radians(turn))
+                points[:] = middle + (picked - middle) @ np.array(
+                    [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
+                )
+                with suppress(MotionError):
+                    self._way_on()
+                    return f"; turned by {turn:+d} degrees about its middle it is feasible"
+        finally:
+            points[:] = picked
+        return ""
 
     def command(self, word: str) -> None:
         """Do what a person says, one of COMMANDS. Raises MotionError if that cannot be done now."""

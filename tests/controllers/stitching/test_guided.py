@@ -235,6 +235,15 @@ def test_a_saved_stitch_goes_on_with_the_same_bits():
     assert world.lead.state_hash() == other.lead.state_hash()
 
 
+def test_of_a_stitch_that_is_not_feasible_it_says_which_turn_makes_it_so():
+    world = Guided().pick(-0.008, 0.018).pick(0.008, 0.018)
+    assert "refused: the stitch is not feasible" in world.said[-1]
+    turn = int(world.said[-1].split("turned by ")[1].split(" degrees")[0])
+    c, s = 0.008 * np.cos(np.radians(turn)), 0.008 * np.sin(np.radians(turn))
+    world.pick(-c, 0.018 - s).pick(c, 0.018 + s)
+    assert "consent?" in world.said[-1]
+
+
 def test_words_that_are_none_are_refused():
     world = Guided().say("go")
     assert "'go' is no command, allowed: consent, pause, resume" in world.said[-1]
