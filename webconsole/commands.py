@@ -19,7 +19,9 @@ __all__ = [
     "Lead",
     "Leave",
     "Network",
+    "Pick",
     "Prepare",
+    "Say",
     "Show",
     "Start",
     "Watch",
@@ -170,8 +172,41 @@ class Hand(_Command):
     along the axes of WebXR (x right, y up, z towards the user)."""
 
 
+class Pick(_Command):
+    """A point that a person clicks in a picture: where a needle goes in, say."""
+
+    do: Literal["pick"]
+    picture: Name
+    """As the session's description names it."""
+    x: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=1e5)]
+    """To the right, in pixels of the picture."""
+    y: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=1e5)]
+    """Down."""
+
+
+class Say(_Command):
+    """A word to what is guided: `consent`, `pause`, and what else it knows."""
+
+    do: Literal["say"]
+    word: Annotated[str, Field(pattern=r"^[a-z][a-z ]{0,30}$")]
+
+
 Command = Annotated[
-    Show | At | Control | Network | Watch | Invite | Prepare | Start | Fork | End | Lead | Leave | Hand,
+    Show
+    | At
+    | Control
+    | Network
+    | Watch
+    | Invite
+    | Prepare
+    | Start
+    | Fork
+    | End
+    | Lead
+    | Leave
+    | Hand
+    | Pick
+    | Say,
     Field(discriminator="do"),
 ]
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Command)

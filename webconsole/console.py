@@ -12,9 +12,10 @@ from hub.planning import registry
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError, ScenarioError
 from schemas.trocar_msgs import ScoreCard
-from webconsole.commands import Control, Fork, Network, Start
+from webconsole.commands import Control, Fork, Network, Pick, Say, Start
 from webconsole.fork import fork_arguments
 from webconsole.frame import Section, SectionKind, pose_content
+from webconsole.guide import guiding
 from webconsole.live import Live
 from webconsole.log import card_of
 from webconsole.pilot import Pilots
@@ -97,6 +98,11 @@ class Console:
         whole_ns = {key: f"{given[key] * 1e9:.0f} ns" for key in ("delay", "jitter") if key in given}
         request = NetworkLinkRequest.model_validate(given | whole_ns)
         await asyncio.to_thread(live.change_link, request)
+
+    async def guide(self, order: Pick | Say) -> None:
+        """Pass on what a person picks or says; raises MessageError or ConnectError."""
+        live = self.live()
+        await asyncio.to_thread(live.ask, "set", guiding(live.guided, order), Empty)
 
     async def prepare(self) -> None:
         """Have processes ready for a session that is about to be started from here."""

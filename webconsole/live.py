@@ -38,6 +38,7 @@ from schemas.network_link import NetworkLinkSpec
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import ScoreCard, SessionStatus
 from webconsole.gauges import HUB, hub_outlets
+from webconsole.guide import guided
 from webconsole.log import LOGGED, Entries, Entry
 from webconsole.past import Past
 from webconsole.source import Outlet, Value
@@ -70,6 +71,7 @@ class Live:
         self._endpoint, self._session_wanted, self._pid = endpoint, session, pid
         self.generation = 0
         self.scenario: Scenario | None = None
+        self.guided: str | None = None
         self.outlets: Sequence[Outlet] = ()
         self.recording = ""
         self.past: Past | None = None
@@ -272,6 +274,7 @@ class Live:
             ),
             *hub_outlets(described.scenario),
         )
+        self.guided = guided(described.plan)
         self._by_name = {one.name: one for one in self.outlets}
         self._device_keys = {
             planned.name for planned in described.plan.participants.values() if planned.role == "device"

@@ -24,7 +24,9 @@ from webconsole.commands import (
     Lead,
     Leave,
     Network,
+    Pick,
     Prepare,
+    Say,
     Show,
     Start,
     Watch,
@@ -158,6 +160,9 @@ class Page:
             case Network():
                 await self._console.network(order)
                 return {}
+            case Pick() | Say():
+                await self._console.guide(order)
+                return {}
             case Prepare():
                 await self._console.prepare()
             case Fork():
@@ -236,6 +241,7 @@ class Page:
                 "kind": self._console.source.kind,
                 "role": self._role,
                 "generation": generation,
+                "guided": self._console.source.guided,
                 **described,
             }
         )

@@ -37,6 +37,7 @@ class Recorded:
 
     kind = "recording"
     generation = 1
+    guided = None
 
     def __init__(self, path: Path) -> None:
         """Open the recording; raises RecordingError if it is not one of a session."""

@@ -53,6 +53,11 @@ class Source(Protocol):
         ...
 
     @property
+    def guided(self) -> str | None:
+        """The participant that a person guides from a page; None if there is none, as in every recording."""
+        ...
+
+    @property
     def state(self) -> Mapping[str, Any]:
         """What the page's head shows, ready for JSON: name, state, times, counts."""
         ...

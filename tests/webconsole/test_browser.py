@@ -263,12 +263,10 @@ def inviter(link):
     return lambda role: finish(invite(role))
 
 
-@pytest.fixture(scope="module")
-def session(tmp_path_factory):
-    """A running session that a page can lead, and what makes links to its page."""
-    hub = tmp_path_factory.mktemp("hub")
-    command = [sys.executable, "-P", "-m", "trocar", "run", "browser", "--open", "--set", "step=5 ms"]
-    command += ["--record", str(hub / "recorded")]
+@contextmanager
+def running(hub, *arguments):
+    """Run a session with its page; yield its process, and what makes links to the page."""
+    command = [sys.executable, "-P", "-m", "trocar", "run", "--open", *arguments]
     said = hub / "said.txt"
     with (
         said.open("w") as out,
@@ -285,6 +283,14 @@ def session(tmp_path_factory):
             yield run, inviter(link[0])
         finally:
             run.send_signal(signal.SIGINT)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """A running session that a page can lead, and what makes links to its page."""
+    hub = tmp_path_factory.mktemp("hub")
+    with running(hub, "browser", "--set", "step=5 ms", "--record", str(hub / "recorded")) as session:
+        yield session
 
 
 def test_a_page_leads_an_arm_and_lets_go(browser, session):

@@ -22,10 +22,17 @@ export class Eyes {
     this.drawn = drawn
     this.section.hidden = !names.length
     this.all = names.map((name) => ({ name, ...figure(drawn ? `${name} eye, drawn by this page` : name.replace("/image_raw/compressed", "")), drawn: 0 }))
+    for (const eye of drawn ? [] : this.all) eye.canvas.onclick = (event) => this.pick(eye, event)
     this.both = figure("both eyes, for red and cyan glasses")
     this.row.replaceChildren(...this.all.map((eye) => eye.figure), this.both.figure)
     this.mode.hidden = !SIDES.every((side) => names.some((name) => name.includes(side)))
     this.show()
+  }
+
+  // A click in a picture, in its pixels.
+  pick({ name, canvas, drawn }, event) {
+    const { left, top, width, height } = canvas.getBoundingClientRect()
+    if (drawn) this.clicked?.(name, (event.clientX - left) / width * canvas.width, (event.clientY - top) / height * canvas.height)
   }
 
   show() {

@@ -5,6 +5,7 @@ import { Alerts } from "./alerts.js"
 import { Depths } from "./depth.js"
 import { Eyes } from "./eyes.js"
 import { Feel } from "./feel.js"
+import { Guide } from "./guide.js"
 import { Head } from "./head.js"
 import { Headset } from "./headset.js"
 import { Log } from "./log.js"
@@ -77,6 +78,7 @@ const timeline = new Timeline((time) => {
 const started = new Started(link, [...document.querySelectorAll(".started")])
 const forks = new Forks(link, timeline, started), start = new Start(link, started)
 timeline.found = (events) => log.add(events, true)
+const guide = new Guide($("guide"), link, eyes, () => past)
 const plots = new Plots($("plot-list"), $("add"), $("ports"), ask)
 $("pictures").onchange = ask
 $("frames").onchange = () => scene?.frames($("frames").checked)
@@ -97,6 +99,7 @@ async function begin(described) {
   head.begin(described)
   past = described.kind === "recording"
   if (!past) timeline.reset()
+  guide.begin(described)
   forks.begin(described)
   start.begin(described)
   log.clear()

@@ -1,0 +1,46 @@
+"""Work that a person guides from a page: points that are picked in a picture, and words of consent.
+
+A participant can be guided if nothing but a person's hand writes its inputs `operator/pick` and
+`operator/command`, as `guided-stitching` has them. A pixel is a point in the frame `<camera>_<eye>_image`,
+x to the right and y down, which the participant turns into the point of the scene under it.
+"""
+
+from __future__ import annotations
+
+from hub.planning.plan import Plan
+from hub.transport.control_messages import SetRequest
+from schemas.errors import MessageError
+from schemas.ros import PointStamped, StringMessage
+from webconsole.commands import Pick, Say
+
+__all__ = ["guided", "guiding"]
+
+_PICK, _COMMAND = "operator/pick", "operator/command"
+_TYPES = {_PICK: PointStamped.ros_type, _COMMAND: StringMessage.ros_type}
+_EYES = ("left", "right")
+
+
+def guided(plan: Plan) -> str | None:
+    """Return the first participant that a person guides; None if there is none."""
+    for name, planned in plan.participants.items():
+        inputs = {port.name: port.type for port in planned.ports if port.causality == "input"}
+        if _TYPES.items() <= inputs.items():
+            return name
+    return None
+
+
+def guiding(participant: str | None, order: Pick | Say) -> SetRequest:
+    """Return what the hub is asked for; raises MessageError if nothing is guided, or no such picture."""
+    if participant is None:
+        raise MessageError("nothing in this session is guided by a person")
+    if isinstance(order, Say):
+        return SetRequest(participant=participant, port=_COMMAND, value={"data": order.word})
+    camera, _, port = order.picture.partition(".")
+    eye = port.partition("/")[0]
+    if eye not in _EYES:
+        raise MessageError(f"'{order.picture}' is no picture of an eye")
+    point = {
+        "header": {"frame_id": f"{camera}_{eye}_image"},
+        "point": {"x": order.x, "y": order.y, "z": 0.0},
+    }
+    return SetRequest(participant=participant, port=_PICK, value=point)
