@@ -103,7 +103,7 @@ def test_stamps_are_in_the_clock_of_the_port(hand: Path) -> None:
 
 @pytest.mark.parametrize("frame", ["stylus_base", "another_base"])
 def test_samples_have_the_bytes_of_what_was_recorded_with_a_new_stamp(tmp_path: Path, frame: str) -> None:
-    """As numbers where all messages of a topic are laid out alike, as messages where one is in another frame."""
+    """As numbers where all messages of a topic are laid out alike, else as messages."""
     poses = [_pose(EPOCH + i * SECOND // 100, i / 100) for i in range(10)]
     poses[5] = PoseStamped(header=Header(stamp=poses[5].header.stamp, frame_id=frame), pose=poses[5].pose)
     _write(

@@ -201,9 +201,13 @@ def test_the_start_is_restored_bit_for_bit(sub_grid):
 
 
 def test_the_start_of_other_organs_is_refused():
-    with Rig(params(SMALL_BLOCK)) as one, Rig(params({**SMALL_BLOCK, "young_modulus": "9 kPa"})) as other:
-        with pytest.raises(StateError, match="with the same organs"):
-            other.engine.restore(one.engine.save())
+    softer = params({**SMALL_BLOCK, "young_modulus": "9 kPa"})
+    with (
+        Rig(params(SMALL_BLOCK)) as one,
+        Rig(softer) as other,
+        pytest.raises(StateError, match="with the same organs"),
+    ):
+        other.engine.restore(one.engine.save())
     with pytest.raises(StateError, match="only the start"):
         BulletEngine("tissue", params()).save()
 
