@@ -139,7 +139,7 @@ class BulletEngine(Stepped):
             if grasp := self.params.probes[probe.name].grasp:
                 self._grasps.append(Grasp(grasp, probe, self._organs, self._surfaces))
                 outputs.update(self._grasps[-1].outputs)
-        self._at_start = True
+        self._at_start = self.params.standstill
         return outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
@@ -302,7 +302,7 @@ class BulletEngine(Stepped):
         """Increase gravity as slowly as the organs can follow: applied at once, they would swing for long.
 
         It grows like the integral of a Hann window, whose spectrum is below 3 % from two periods per window
-        on. What still moves then is stopped, so that the start can be restored.
+        on. What still moves then is stopped, so that the start can be restored, unless `standstill` is false.
         """
         import pybullet as bullet
 
@@ -313,7 +313,7 @@ class BulletEngine(Stepped):
             share = round(s - sin(2.0 * pi * s) / (2.0 * pi), _GRAVITY_DIGITS)
             bullet.setGravity(0.0, 0.0, -self.params.gravity * share, physicsClientId=self._client)
             self._simulate(physicsClientId=self._client)
-        for organ in self._organs:
+        for organ in self._organs if self.params.standstill else ():
             organ.stand()
 
     def _check_steps(self, period_ns: int) -> None:

@@ -52,6 +52,13 @@ class BulletParams(Params):
             " anchored organs of at most 1200 nodes"
         ),
     )
+    standstill: bool = Field(
+        default=True,
+        description=(
+            "whether what still moves when the organs have settled is stopped, so that their start can be"
+            " restored; recordings of version 0.1.0 are without"
+        ),
+    )
 
     @cached_property
     def sub_step(self) -> int:

@@ -22,7 +22,7 @@ _KINDS = {"console": "dvrk-console", "paper": "vrep"}
 _PARTICIPANT_KEYS = {"link": "network_link"}
 _PARAMETER_VALUES = {"profile": {"paper": "vrep"}}
 """By parameter: the old value and the new one, for every kind that accepts only the new one."""
-_EARLIER_DEFAULTS = {"0.1.0": {"bullet": {"sub_grid": False}}}
+_EARLIER_DEFAULTS = {"0.1.0": {"bullet": {"sub_grid": False, "standstill": False}}}
 """By version and kind: what a parameter that came later is to be, so that a recording is verified."""
 _EVENT_PORTS = {"mirror": ("distance", "lag")}
 """By kind: the last parts of the names of ports that were signals, and whose values are events now."""

@@ -55,7 +55,7 @@ const link = new Link({
   },
   trouble({ text }) { said("page", text) },
 })
-let lastTime = 0
+let lastTime = 0, framed = null
 const head = new Head(link)
 const feel = new Feel()
 const pilot = new Pilot($("lead"), link, feel)
@@ -157,7 +157,7 @@ function showCameras() {
 }
 
 function apply(frame) {
-  lastTime = frame.time
+  lastTime = framed = frame.time
   for (const { kind, index, at, size } of frame.sections) {
     if (kind === SAMPLE) plots.sample(plots.names[index], new Float64Array(frame.buffer, at, size / 8))
     else if (kind === PICTURE) eyes.take(index, new Uint8Array(frame.buffer, at, size))
@@ -221,5 +221,5 @@ function draw(now) {
 requestAnimationFrame(draw)
 
 // For the tests and the benchmark: what this page has drawn.
-Object.defineProperty(window, "trocar", { value: { get drawn() { return drawn }, get time() { return lastTime },
+Object.defineProperty(window, "trocar", { value: { get drawn() { return drawn }, get time() { return lastTime }, get framed() { return framed },
   get scene() { return scene }, get headset() { return headset }, get session() { return session } } })
