@@ -15,8 +15,8 @@ __all__ = ["Watchdog"]
 log = logging.getLogger(__name__)
 
 _PERIOD_S = 0.1
-"""Between two looks at the answers; the end of a process is noticed at once. Each look takes the interpreter from
-the step loop: fifty a second were a third of all switches of its thread.
+"""Between two looks at the answers; the end of a process is noticed at once. Each look takes the interpreter
+from the step loop: fifty a second were a third of all switches of its thread.
 """
 
 _STOPPED_NS = 1_000_000_000
