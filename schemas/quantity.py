@@ -61,7 +61,6 @@ _FACTORS = {
 """Of the units that scenarios name most, as pint has them: a session that needs no other starts half a second
 sooner.
 """
-_SI = frozenset(target for _, target in _FACTORS)
 
 
 @cache
@@ -73,7 +72,7 @@ def _registry() -> Any:
 
 def _converted(number: float, unit: str, target: str) -> float:
     """Return `number` in unit `target`. Raises ValueError if `unit` cannot be converted to it."""
-    if unit == target and unit in _SI:
+    if unit == target:
         return number
     if factor := _FACTORS.get((unit, target)):
         return number * factor

@@ -110,7 +110,7 @@ class Console:
         if isinstance(self.source, Recorded) and self.source.scenario is not None:
             kinds = {one.kind for one in self.source.scenario.participants.values()} & set(registry.kinds())
         modules = ["hub.fork", *sorted(registry.find(kind).entry.module for kind in kinds)]
-        # engines import what is heavy when they are configured; named as its distribution, most of it
+        # an engine imports its libraries when it is configured; most have the name of their distribution
         modules += sorted({package for kind in kinds for package in registry.extra_packages(kind)})
         await asyncio.to_thread(self.started.prepare, modules)
 

@@ -128,14 +128,16 @@ def _makers(played: list[BagMessage], ports: Sequence[Port]) -> list[_Maker]:
     Messages of a signal are read as numbers, all at once, if they are laid out alike: a hundredth of the time
     that one after the other takes as a model.
     """
+    places: dict[str, list[int]] = {}
+    for i, message in enumerate(played):
+        places.setdefault(_port_name(message.topic), []).append(i)
     makers: dict[int, _Maker] = {}
     for port in ports:
-        places = [i for i, message in enumerate(played) if _port_name(message.topic) == port.name]
-        payloads = [played[i].payload for i in places]
+        payloads = [played[i].payload for i in places[port.name]]
         own = _vector_makers(port, payloads) or [
             partial(_restamped, port.name, decode(message_type(port.type), payload)) for payload in payloads
         ]
-        makers.update(zip(places, own, strict=True))
+        makers.update(zip(places[port.name], own, strict=True))
     return [makers[i] for i in range(len(played))]
 
 

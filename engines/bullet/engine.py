@@ -219,7 +219,8 @@ class BulletEngine(Stepped):
     def _no_state(self) -> str:
         return (
             f"participant '{self.name}': Bullet gives no velocities of soft bodies, so only the start can be"
-            " saved, and restored with the same organs. Re-simulate from the recorded grants instead"
+            " saved, unless `standstill` is false, and restored with the same organs. Re-simulate from the"
+            " recorded grants instead"
         )
 
     def _loaded_surfaces(self) -> list[Surface]:

@@ -221,5 +221,5 @@ function draw(now) {
 requestAnimationFrame(draw)
 
 // For the tests and the benchmark: what this page has drawn.
-Object.defineProperty(window, "trocar", { value: { get drawn() { return drawn }, get time() { return lastTime }, get framed() { return framed },
-  get scene() { return scene }, get headset() { return headset }, get session() { return session } } })
+Object.defineProperty(window, "trocar", { value: { get drawn() { return drawn }, get time() { return lastTime },
+  get framed() { return framed }, get scene() { return scene }, get headset() { return headset }, get session() { return session } } })

@@ -210,6 +210,8 @@ def test_the_start_of_other_organs_is_refused():
         other.engine.restore(one.engine.save())
     with pytest.raises(StateError, match="only the start"):
         BulletEngine("tissue", params()).save()
+    with Rig(params(SMALL_BLOCK, standstill=False)) as moving, pytest.raises(StateError, match="standstill"):
+        moving.engine.save()
 
 
 def test_close_may_be_called_at_any_time():
