@@ -11,8 +11,10 @@ from robots.dvrk.inverse import branches
 from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["Reach", "reach"]
+__all__ = ["Reach", "reach", "room"]
 
+_TURNS = (-2.0 * pi, 0.0, 2.0 * pi)
+"""By which the shaft's roll may begin on or back, rad."""
 _JUMP = 0.7
 """Most that a joint may turn between two poses of a way, rad: beyond, the arm would change its branch."""
 
@@ -49,17 +51,37 @@ class Reach:
         )
 
 
+def room(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
+    """Return what is left of half a joint's range at each of `tips`, shape (n, 4, 4), as (n,), alone.
+
+    `base`: of the arm in the world, shape (4, 4). Below 0 a pose is out of reach.
+    """
+    found = np.stack([_wound(q, turn) for q in _two(chain, base, tips) for turn in _TURNS])  # (6, n, joints)
+    free = 2.0 * np.minimum(found - chain.lower, chain.upper - found) / (chain.upper - chain.lower)
+    most: Vector = free.min(axis=-1).max(axis=0)
+    return most
+
+
 def reach(chain: SerialChain, base: Vector, tips: Vector) -> Reach:
     """Return the best of all ways of the joints along `tips`, shape (poses, 4, 4), in the world.
 
     `base`: of the arm in the world, shape (4, 4). The shaft's roll may begin a turn on or back.
     """
-    roll, found = 3, list[Reach]()
+    found = list[Reach]()
     turning = [joint.kind == "revolute" for joint in chain.joints]
-    for q in branches(chain, inverse_pose(base) @ tips)[:2]:  # (poses, 6); no arm has the other two
+    for q in _two(chain, base, tips):
         q[:, turning] = np.unwrap(q[:, turning], axis=0)
-        for turn in (-2.0 * pi, 0.0, 2.0 * pi):
-            wound = q.copy()
-            wound[:, roll] += turn
-            found.append(Reach(chain, wound))
+        found += [Reach(chain, _wound(q, turn)) for turn in _TURNS]
     return max(found, key=lambda each: each.margin)
+
+
+def _two(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
+    """Return the joint positions of both branches that an arm has, shape (2, poses, 6)."""
+    return branches(chain, inverse_pose(base) @ tips)[:2]
+
+
+def _wound(q: Vector, turn: float) -> Vector:
+    """Return joint positions, shape (poses, 6), with the shaft's roll a turn (rad) on."""
+    wound = q.copy()
+    wound[:, 3] += turn
+    return wound

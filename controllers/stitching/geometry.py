@@ -4,8 +4,8 @@ The needle turns about the middle of a circle through both holes, in the plane t
 of the skin: constant curvature is what guidelines ask for, since the needle then follows itself. Its angle is
 that of the tip: 0 towards the side it comes from, a quarter of a turn where it points straight down.
 
-A jaw holds the wire across: its fingers point along the needle's axis z, so that a turn of the jaw about its
-own axis drives the needle on, and close along the radius.
+A jaw holds the wire across: its fingers point along the needle's axis z, or against it, so that a turn of the
+jaw about its own axis drives the needle on, and close along the radius.
 """
 
 from __future__ import annotations
@@ -97,6 +97,8 @@ class Grip:
     """How far behind the tip, rad of the arc."""
     left_outside: bool
     """Whether the left finger is on the outer side of the arc."""
+    backwards: bool = False
+    """Whether the fingers point against the needle's axis, as a hand holds it that drives the other way."""
 
 
 def grip_pose(grip: Grip, needle: NeedleShape, reach: float) -> Vector:
@@ -107,7 +109,7 @@ def grip_pose(grip: Grip, needle: NeedleShape, reach: float) -> Vector:
     angle = needle.arc / 2.0 - grip.behind
     outwards = np.array([cos(angle), sin(angle), 0.0])
     pose = np.eye(4)
-    pose[:3, 2] = 0.0, 0.0, 1.0
+    pose[2, 2] = -1.0 if grip.backwards else 1.0
     pose[:3, 1] = outwards if grip.left_outside else -outwards
     pose[:3, 0] = np.cross(pose[:3, 1], pose[:3, 2])
     pose[:3, 3] = needle.radius * outwards - reach * pose[:3, 2]

@@ -70,7 +70,7 @@ class GuidedStitching(TwoHands):
         seen = StereoCamera(params.width, params.height, params.field_of_view, params.baseline)
         self._frames = SceneFrames(params, params.camera, seen)
         self._seen = _Shown()
-        self.keep(self._seen, self._surgeon.guided)
+        self.keep(self._seen, self._surgeon.guided, self._surgeon.handing)
         self._outputs |= {"stage": self._seen.stage, "state": (), "markers": ()}
 
     @property

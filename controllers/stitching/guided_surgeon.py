@@ -8,18 +8,20 @@ clear, then each hand goes on a line from its present setpoint to where the proc
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from math import cos, radians, sin
 
 import numpy as np
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import Hand, framed
 from controllers.stitching.geometry import Stitch
+from controllers.stitching.handing import Hold, handing
 from controllers.stitching.params import StitchParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import stitch_through
 from controllers.stitching.procedure import Procedure
 from controllers.stitching.stage import COMMANDS, Stage
-from controllers.stitching.way_on import WayOn
+from controllers.stitching.way_on import WayOn, behind_tip, is_inside, way_on
 from hub.participant import Record, array, choice, flag, integer, number
 from robots.dvrk.cart import inverse_pose
 from schemas.errors import MotionError
@@ -58,7 +60,7 @@ class GuidedSurgeon(Procedure):
     def __init__(self, params: StitchParams, driver: Hand, puller: Hand) -> None:
         super().__init__(params, driver, puller)
         self.guided = GuidedState()
-        self._hands, self._setpoints = (driver, puller), np.zeros((2, 7))
+        self._setpoints = np.zeros((2, 7))
         self.led = False
         """Whether a person's hand leads an arm now."""
         self.sure = True
@@ -168,7 +170,7 @@ class GuidedSurgeon(Procedure):
 
     @property
     def _is_where_it_paused(self) -> bool:
-        for hand, setpoint in zip(self._hands, self._setpoints, strict=True):
+        for hand, setpoint in zip(self.hands, self._setpoints, strict=True):
             off = hand.line() - setpoint
             off[:3] += hand.state.correction
             turned = min(np.abs(off[3:]).max(), np.abs(off[3:] + 2.0 * setpoint[3:]).max())
@@ -181,12 +183,31 @@ class GuidedSurgeon(Procedure):
             raise MotionError("no stitch is picked: entry and exit are needed")
         if not self.sure:
             raise MotionError("the cameras have not yet seen well enough where the tips are")
-        return super()._way_on()
+        params, state, stitch = self.params, self.state, self.stitch
+        if is_inside(params, state.needle):
+            hands = (self.driver, self.puller)
+            plan = way_on(params, *hands, stitch, state.needle, state.holder)
+            return replace(plan, exchanged=self.handing.exchanged)
+        try:
+            return super()._way_on()
+        except MotionError:
+            if (plan := handing(params, self.hands, stitch, state.needle, self._held)) is None:
+                raise
+            return plan
+
+    @property
+    def _held(self) -> Hold | None:
+        """How the needle is held, by which hand."""
+        for hand in self.hands:
+            if hand.number == self.state.holder:
+                grip = inverse_pose(self.state.needle) @ framed(hand.measured)
+                return Hold(hand, grip, behind_tip(grip, hand, self.stitch))
+        return None
 
     def _go_on(self) -> None:
         """Plan anew, and let the hands go to where the procedure goes on, each from its setpoint."""
         plan = self._way_on()
-        for hand, setpoint in zip(self._hands, self._setpoints, strict=True):
+        for hand, setpoint in zip(self.hands, self._setpoints, strict=True):
             hand.state.correction[:] = 0.0
             hand.state.start[:] = hand.state.goal[:] = setpoint
             hand.state.duration = hand.state.elapsed = 0.0
@@ -200,7 +221,7 @@ class GuidedSurgeon(Procedure):
             self.take_over()
         wanted = 1.0 if guided.stage is Stage.RUNNING else 0.0
         guided.pace += min(max(wanted - guided.pace, -share), share)
-        for hand in self._hands:
+        for hand in self.hands:
             hand.period *= guided.pace
         if guided.pace > 0.0:
             super().step()

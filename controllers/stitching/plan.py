@@ -122,11 +122,10 @@ def require_room(held: float, stitch: Stitch, emerge: float) -> None:
         )
 
 
-def grips_of(hand: Hand, behind: float, needle: NeedleShape) -> list[Vector]:
-    """Return both ways to hold the needle `behind` its tip (rad), as in a `Plan`."""
-    return [
-        grip_pose(Grip(behind, left_outside=side), needle, hand.jaw.length - DEEP) for side in (False, True)
-    ]
+def grips_of(hand: Hand, behind: float, needle: NeedleShape, *, backwards: bool = False) -> list[Vector]:
+    """Return both ways to hold the needle `behind` its tip (rad), as in a `Plan`, from one of its sides."""
+    length = hand.jaw.length - DEEP
+    return [grip_pose(Grip(behind, side, backwards), needle, length) for side in (False, True)]
 
 
 def best_grip(

@@ -84,12 +84,29 @@ class ProcedureState(Record):
     failed = array(1)
 
 
+class HandingState(Record):
+    """Which hand does what, and how the needle comes into the jaw that drives it."""
+
+    exchanged = flag()
+    """Whether driver and puller have exchanged their parts."""
+    pending = flag()
+    """Whether the needle, once picked up, is handed over before it is driven."""
+    left = integer()
+    """Hand-overs that follow the next one: after an even number the driver has it."""
+    needles = array(2, 4, 4)
+    """Where the needle is handed over, the last place first."""
+    between = array(4, 4)
+    """How the puller takes it, to give it back."""
+    pick = array(4, 4)
+    """How it is picked up, if it is handed over then."""
+
+
 class Procedure(ABC):
     """Two hands and a needle; which stitch it is, and what comes before and after, others say."""
 
     def __init__(self, params: StitchParams, driver: Hand, puller: Hand) -> None:
-        self.params, self.driver, self.puller = params, driver, puller
-        self.state = ProcedureState()
+        self.params, self.hands = params, (driver, puller)
+        self.state, self.handing = ProcedureState(), HandingState()
         self.rejoin = Rejoin(driver, puller)
         self._needle = params.needle[1].shape
         self._status: list[str] = []
@@ -120,6 +137,16 @@ class Procedure(ABC):
         }
 
     @property
+    def driver(self) -> Hand:
+        """The hand that drives the needle in."""
+        return self.hands[self.handing.exchanged]
+
+    @property
+    def puller(self) -> Hand:
+        """The hand that pulls it out."""
+        return self.hands[not self.handing.exchanged]
+
+    @property
     @abstractmethod
     def stitch(self) -> Stitch:
         """The stitch at work. Raises MotionError if it is not feasible."""
@@ -138,11 +165,17 @@ class Procedure(ABC):
 
     @property
     def settles(self) -> tuple[bool, bool]:
-        """Whether the tips of driver and puller are to be brought exactly where they were sent."""
+        """Whether the tips of the hands are to be brought exactly where they were sent."""
         phase = self.state.phase
-        driver = phase in (Phase.HOVER, Phase.DESCEND, Phase.ALIGN, Phase.DRIVE, Phase.COME_BACK)
-        puller = phase in (Phase.COME, Phase.TAKE, Phase.PULL)
-        return driver or phase is Phase.TAKE_BACK, puller
+        if phase in (Phase.HOVER, Phase.DESCEND):
+            at_work = self._picker
+        elif phase in (Phase.ALIGN, Phase.DRIVE):
+            at_work = self.driver
+        elif phase in (Phase.COME, Phase.TAKE, Phase.COME_BACK, Phase.TAKE_BACK):
+            at_work = self._taker
+        else:
+            at_work = self.puller if phase is Phase.PULL else None
+        return self.hands[0] is at_work, self.hands[1] is at_work
 
     def statuses(self) -> tuple[str, ...]:
         """Return what was said in this step, and forget it."""
@@ -169,13 +202,12 @@ class Procedure(ABC):
             self._recover(str(error))
 
     def _way_on(self) -> WayOn:
-        return way_on(
-            self.params, self.driver, self.puller, self.stitch, self.state.needle, self.state.holder
-        )
+        return way_on(self.params, *self.hands, self.stitch, self.state.needle, self.state.holder)
 
     def _follow(self, plan: WayOn) -> None:
         """Let the hands go to where a plan goes on."""
         state = self.state
+        self._take_over_parts(plan)
         state.planned[0], state.planned[1] = plan.driver, plan.puller
         state.angle[0], state.attempts, state.failed[0] = plan.angle, 0, 0.0
         state.picked_for, state.free = plan.picked_for, plan.holder is None
@@ -183,6 +215,18 @@ class Procedure(ABC):
             self._grasped(plan.holder)
         self.rejoin.begin(plan, state.grip, state.park)
         self._enter(Phase.BEGIN)
+
+    def _take_over_parts(self, plan: WayOn) -> None:
+        handing, handed = self.handing, plan.handed
+        handing.exchanged = plan.exchanged
+        handing.left = max(0, len(handed) - 1)
+        handing.pending = bool(handed) and plan.phase is Phase.HOVER
+        for i, each in enumerate(reversed(handed)):
+            handing.needles[i] = each.needle
+        if len(handed) > 1:
+            handing.between[:] = handed[-2].grip
+        if plan.pick is not None:
+            handing.pick[:] = plan.pick
 
     def _come_back(self) -> None:
         """Let the hands go on to where the stitch goes on."""
@@ -214,9 +258,32 @@ class Procedure(ABC):
         phase = self.state.phase
         if self.state.free:
             return None
-        if Phase.LIFT <= phase <= Phase.HOLD or phase is Phase.LEAVE_BACK:
+        if phase is Phase.LIFT:
+            return self._picker
+        if phase is Phase.LEAVE_BACK:
+            return self._taker
+        if Phase.PRESENT <= phase <= Phase.HOLD_BACK:
+            return self._giver
+        if Phase.APPROACH <= phase <= Phase.HOLD:
             return self.driver
-        return self.puller if Phase.LEAVE <= phase <= Phase.HOLD_BACK else None
+        return self.puller if Phase.LEAVE <= phase <= Phase.RAISE else None
+
+    @property
+    def _taker(self) -> Hand:
+        """The hand that takes the needle over next."""
+        if self.handing.pending or self.state.phase >= Phase.PRESENT:
+            return self.puller if self.handing.left % 2 else self.driver
+        return self.puller
+
+    @property
+    def _giver(self) -> Hand:
+        """The hand that gives it."""
+        return self.driver if self._taker is self.puller else self.puller
+
+    @property
+    def _picker(self) -> Hand:
+        """The hand that picks it up."""
+        return self._giver if self.handing.pending else self.driver
 
     def _enter(self, phase: Phase) -> None:
         self.state.phase, self.state.waited = phase, 0.0
@@ -251,39 +318,42 @@ class Procedure(ABC):
         state.deviation[0] = float(np.sqrt((off * off).sum(axis=1).max()))
 
     def _pick(self, away: float) -> Vector:
-        """Return the tip's pose, shape (7,), where the driver takes the needle up, or so far before it."""
-        return before(self.state.needle @ self.state.planned[0], away)
+        """Return the tip's pose, shape (7,), where the needle is picked up, or so far before it."""
+        grip = self.handing.pick if self.handing.pending else self.state.planned[0]
+        return before(self.state.needle @ grip, away)
 
     def _hover(self) -> None:
-        if self._arrived(self.driver, _ACCURATE):
-            self.driver.go(self._pick(0.0), _GENTLE)
+        hand = self._picker
+        if self._arrived(hand, _ACCURATE):
+            hand.go(self._pick(0.0), _GENTLE)
             self._enter(Phase.DESCEND)
 
     def _descend(self) -> None:
-        if self._arrived(self.driver, _ACCURATE):
-            self.driver.move_jaw(SHUT)
+        hand = self._picker
+        if self._arrived(hand, _ACCURATE):
+            hand.move_jaw(SHUT)
             self.state.attempts += 1
             self._enter(Phase.CLOSE)
 
     def _close(self) -> None:
-        state = self.state
-        if not self._arrived(self.driver) or state.waited < _PRESSED:
+        state, hand = self.state, self._picker
+        if not self._arrived(hand) or state.waited < _PRESSED:
             return
-        if state.holder and self.driver.angle > _HELD_OPEN:
+        if state.holder and hand.angle > _HELD_OPEN:
             state.attempts = 0
-            self._grasped(self.driver)
+            self._grasped(hand)
             if state.picked_for is Phase.LIFT:
-                goal = self.driver.line()
+                goal = hand.line()
                 goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]
-                self.driver.go(goal)
+                hand.go(goal)
             else:  # in the tissue: back to its way
-                self._lead(self.driver, self.stitch.pose(state.angle[0]), _GENTLE)
+                self._lead(hand, self.stitch.pose(state.angle[0]), _GENTLE)
             self._enter(state.picked_for)
         elif state.attempts >= ATTEMPTS:
-            raise MotionError(f"{self.driver.arm} could not take the needle up in {ATTEMPTS} attempts")
+            raise MotionError(f"{hand.arm} could not take the needle up in {ATTEMPTS} attempts")
         else:
-            self.driver.move_jaw(OPEN)
-            self.driver.go(self._pick(HOVER))
+            hand.move_jaw(OPEN)
+            hand.go(self._pick(HOVER))
             self._enter(Phase.HOVER)
 
     def _grasped(self, hand: Hand) -> None:
@@ -292,8 +362,18 @@ class Procedure(ABC):
         self.state.free = False
 
     def _lift(self) -> None:
-        if self._arrived(self.driver):
+        if not self._arrived(self._picker):
+            return
+        if self.handing.pending:
+            self._to_present(self._picker)
+            self.handing.pending = False
+        else:
             self._to_approach()
+
+    def _to_present(self, hand: Hand) -> None:
+        """Let the hand that holds the needle bring it where it is handed over next."""
+        self._lead(hand, self.handing.needles[self.handing.left])
+        self._enter(Phase.PRESENT)
 
     def _to_approach(self) -> None:
         stitch = self.stitch
@@ -327,20 +407,20 @@ class Procedure(ABC):
 
     def _taking(self, hand: Hand, away: float) -> Vector:
         """Return the pose, shape (7,), where a hand takes over the needle, or so far before it."""
-        planned = self.state.planned[0 if hand is self.driver else 1]
-        return before(self.state.needle @ planned, away)
-
-    def _taker(self) -> Hand:
-        return self.driver if self.state.phase >= Phase.PRESENT else self.puller
+        if hand is self.driver:
+            grip = self.state.planned[0]
+        else:
+            grip = self.handing.between if self.state.phase >= Phase.PRESENT else self.state.planned[1]
+        return before(self.state.needle @ grip, away)
 
     def _come(self, after: Phase) -> None:
-        hand = self._taker()
+        hand = self._taker
         if self._arrived(hand, _ACCURATE):
             hand.go(self._taking(hand, 0.0), _GENTLE)
             self._enter(after)
 
     def _take(self, after: Phase) -> None:
-        hand = self._taker()
+        hand = self._taker
         if hand.has_arrived:  # the needle may still give a little
             hand.state.goal[:] = self._taking(hand, 0.0)
         if self._arrived(hand, _ACCURATE):
@@ -348,7 +428,8 @@ class Procedure(ABC):
             self._enter(after)
 
     def _hold(self, after: Phase) -> None:
-        hand, other = self._taker(), self.driver if self._taker() is self.puller else self.puller
+        hand = self._taker
+        other = self.driver if hand is self.puller else self.puller
         if not self._arrived(hand) or self.state.waited < _PRESSED:
             return
         if hand.angle <= _HELD_OPEN:
@@ -357,7 +438,7 @@ class Procedure(ABC):
         self._enter(after)
 
     def _release(self, after: Phase) -> None:
-        hand = self._taker()
+        hand = self._taker
         other = self.driver if hand is self.puller else self.puller
         self.state.waited += hand.period
         if self.state.waited < OPENED:
@@ -371,7 +452,7 @@ class Procedure(ABC):
     def _leave(self) -> None:
         """Let the driver go clear, then to its place, and pull."""
         if self._arrived(self.driver):
-            self.driver.go(self.state.park[0])
+            self._park(self.driver)
             self.state.angle[0] = self.stitch.angle(self.state.needle)
             self._enter(Phase.PULL)
 
@@ -388,12 +469,21 @@ class Procedure(ABC):
             self._enter(Phase.RAISE)
 
     def _present(self) -> None:
-        if self._arrived(self.puller):
-            self.driver.go(self._taking(self.driver, BACK))
+        if self._arrived(self._giver):
+            self._taker.go(self._taking(self._taker, BACK))
             self._enter(Phase.COME_BACK)
 
     def _leave_back(self) -> None:
-        """Let the puller go clear, then to its place, and go on with the next stitch."""
-        if self._arrived(self.puller):
-            self.puller.go(self.state.park[1])
-            self._to_approach()
+        """Let the giver go clear, then to its place, and hand the needle back or begin with the stitch."""
+        giver, taker = self._giver, self._taker
+        if self._arrived(giver):
+            self._park(giver)
+            if self.handing.left:
+                self.handing.left -= 1
+                self._to_present(taker)
+            else:
+                self._to_approach()
+
+    def _park(self, hand: Hand) -> None:
+        """Send a hand where it stands when it has nothing to do."""
+        hand.go(self.state.park[self.hands.index(hand)])

@@ -75,10 +75,13 @@ class Rejoin:
         state.goals[:] = park
         if plan.holder is not None:
             state.goals[self._hands.index(plan.holder)] = pose_of(plan.needle @ grip)
+        driver, puller = (1, 0) if plan.exchanged else (0, 1)
         if plan.phase is Phase.HOVER:
-            state.goals[0] = before(plan.needle @ plan.driver, BACK)
+            picker = puller if len(plan.handed) % 2 else driver
+            grip = plan.driver if plan.pick is None else plan.pick
+            state.goals[picker] = before(plan.needle @ grip, BACK)
         elif plan.phase is Phase.COME:
-            state.goals[1] = before(plan.needle @ plan.puller, BACK)
+            state.goals[puller] = before(plan.needle @ plan.puller, BACK)
         state.going, state.then, state.waited = Going.OPEN, plan.phase, 0.0
         state.holder = 0.0 if plan.holder is None else plan.holder.number
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import atan2, pi, radians
+from typing import NamedTuple
 
 import numpy as np
 
 from controllers.expert.hand import Hand, framed
+from controllers.stitching.feasibility import Reach
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.params import StitchParams
 from controllers.stitching.phase import Phase
@@ -24,7 +26,7 @@ from robots.dvrk.cart import inverse_pose
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["WayOn", "is_inside", "way_on"]
+__all__ = ["HandOver", "WayOn", "behind_tip", "is_inside", "raised", "way_on"]
 
 _UNDER = 0.5e-3
 """m; a needle with a point so far under the skin is in the tissue."""
@@ -33,6 +35,15 @@ _BESIDE = 2.0e-3
 
 _NEARLY = radians(5.0)
 """Of the arc: so much less than planned may have come out for the puller to take it."""
+
+
+class HandOver(NamedTuple):
+    """From one hand to the other."""
+
+    needle: Vector
+    """Where the needle is given, shape (4, 4)."""
+    grip: Vector
+    """How it is taken, as in a `Plan`."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +61,13 @@ class WayOn:
     """How the hands hold the needle, as in a `Plan`."""
     margin: float
     picked_for: Phase = Phase.LIFT
-    """What follows when the driver has taken the needle up: it is in the tissue, or it is not."""
+    """What follows when the needle has been taken up: it is in the tissue, or it is not."""
+    exchanged: bool = False
+    """Whether the puller drives, and the driver pulls."""
+    handed: tuple[HandOver, ...] = ()
+    """What comes between the first phase and the way, in turn."""
+    pick: Vector | None = None
+    """How it is picked up, if that is not how the driver holds it."""
 
 
 def is_inside(params: StitchParams, needle: Vector) -> bool:
@@ -64,6 +81,13 @@ def _lowest(params: StitchParams, needle: Vector) -> float:
     wire = shape.points(np.linspace(-shape.arc / 2.0, shape.arc / 2.0, 60))
     heights = (wire @ needle[:3, :3].T + needle[:3, 3] - pad[:3, 3]) @ pad[:3, 2]
     return float(heights.min())
+
+
+def raised(params: StitchParams, needle: Vector) -> Vector:
+    """Return a pose of shape (4, 4), if need be raised so that all of the needle is over the skin."""
+    up = needle.copy()
+    up[:3, 3] += max(0.0, params.lift - _lowest(params, needle)) * params.phantom.pose[:3, 2]
+    return up
 
 
 def way_on(
@@ -82,32 +106,33 @@ def way_on(
         angle = _on_its_way(stitch, needle, angle)
         if holding is None:
             return _taken_again(params, driver, puller, stitch, needle, angle)
-    raised = needle.copy()
-    raised[:3, 3] += max(0.0, params.lift - low) * params.phantom.pose[:3, 2]
+    up = raised(params, needle)
     over = stitch.entry - BEFORE
     emerge, lift = params.emerge, params.lift
     pull = pulling(stitch, emerge, lift)
     if holding is puller and inside:
         grip, margin = _kept(puller, needle, [pulling(stitch, emerge, lift, angle)])
         return WayOn(Phase.PULL, puller, stitch.pose(angle), angle, np.eye(4), grip, margin)
-    taking, pull_margin = _chosen(puller, grips_of(puller, params.taken, stitch.needle), [pull])
+    taking, pull_margin = _from_a_side(puller, params.taken, stitch, [pull])
     if holding is driver:
         grip = inverse_pose(needle) @ framed(driver.measured)
-        require_room(_behind(grip, driver, stitch), stitch, emerge)
+        require_room(behind_tip(grip, driver, stitch), stitch, emerge)
         drive = driving(stitch, emerge, lift, angle if inside else None)
-        grip, margin = _kept(driver, needle, [drive] if inside else [[raised], drive])
+        grip, margin = _kept(driver, needle, [drive] if inside else [[up], drive])
         if not inside:
-            return WayOn(Phase.LIFT, driver, raised, over, grip, taking, min(margin, pull_margin))
+            return WayOn(Phase.LIFT, driver, up, over, grip, taking, min(margin, pull_margin))
         phase = Phase.DRIVE if angle < stitch.exit + emerge else Phase.COME
         return WayOn(phase, driver, stitch.pose(angle), angle, grip, taking, min(margin, pull_margin))
     require_room(params.grip, stitch, emerge)
-    drive, grips = driving(stitch, emerge, lift), grips_of(driver, params.grip, stitch.needle)
+    drive = driving(stitch, emerge, lift)
     if holding is puller:
         shown = stitch.pose(stitch.exit + emerge, lift)
         _, kept = _kept(puller, needle, [[shown]])
-        grip, margin = _chosen(driver, grips, [[shown], drive])
+        grip, margin = _from_a_side(driver, params.grip, stitch, [[shown], drive])
         return WayOn(Phase.PRESENT, puller, shown, over, grip, taking, min(kept, margin, pull_margin))
-    grip, margin = _chosen(driver, grips, [[raised, needle], drive])
+    wrong_way_up = bool(needle[:3, 2] @ params.phantom.pose[:3, 2] > 0.0)
+    grips = grips_of(driver, params.grip, stitch.needle, backwards=wrong_way_up)
+    grip, margin = _chosen(driver, grips, [[up, needle], drive])
     return WayOn(Phase.HOVER, None, needle, over, grip, taking, min(margin, pull_margin))
 
 
@@ -116,14 +141,12 @@ def _taken_again(
 ) -> WayOn:
     """Plan how a needle that the tissue alone holds, its tip at `angle` (rad), is taken hold of."""
     emerge, lift = params.emerge, params.lift
-    grips = grips_of(puller, params.taken, stitch.needle)
     if angle > stitch.exit + emerge - _NEARLY:
-        grip, margin = _chosen(puller, grips, [pulling(stitch, emerge, lift, angle)])
+        grip, margin = _from_a_side(puller, params.taken, stitch, [pulling(stitch, emerge, lift, angle)])
         return WayOn(Phase.COME, None, needle, angle, np.eye(4), grip, margin)
     require_room(params.grip, stitch, emerge)
-    taking, pull_margin = _chosen(puller, grips, [pulling(stitch, emerge, lift)])
-    drive = driving(stitch, emerge, lift, angle)
-    grip, margin = _chosen(driver, grips_of(driver, params.grip, stitch.needle), [drive])
+    taking, pull_margin = _from_a_side(puller, params.taken, stitch, [pulling(stitch, emerge, lift)])
+    grip, margin = _from_a_side(driver, params.grip, stitch, [driving(stitch, emerge, lift, angle)])
     margin = min(margin, pull_margin)
     return WayOn(Phase.HOVER, None, needle, angle, grip, taking, margin, Phase.ALIGN)
 
@@ -141,10 +164,20 @@ def _on_its_way(stitch: Stitch, needle: Vector, angle: float) -> float:
     return angle + 2.0 * pi if angle < stitch.entry - BEFORE else angle
 
 
-def _behind(grip: Vector, hand: Hand, stitch: Stitch) -> float:
+def behind_tip(grip: Vector, hand: Hand, stitch: Stitch) -> float:
     """Return how far behind the tip (rad) a jaw holds the needle, by the pose of its tip in the needle's."""
     x, y, _ = (grip[:3, 3] + (hand.jaw.length - DEEP) * grip[:3, 2]).tolist()
     return stitch.needle.arc / 2.0 - atan2(y, x)
+
+
+def _from_a_side(
+    hand: Hand, behind: float, stitch: Stitch, ways: list[list[Vector]]
+) -> tuple[Vector, float]:
+    """Return how a hand takes the needle `behind` its tip (rad): from the other side if it has to."""
+    side, other = (
+        best_grip(hand, grips_of(hand, behind, stitch.needle, backwards=each), ways) for each in (False, True)
+    )
+    return _feasible(hand, other if side[1].problem and not other[1].problem else side)
 
 
 def _kept(hand: Hand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
@@ -153,7 +186,11 @@ def _kept(hand: Hand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector,
 
 
 def _chosen(hand: Hand, grips: list[Vector], ways: list[list[Vector]]) -> tuple[Vector, float]:
-    grip, worst, _ = best_grip(hand, grips, ways)
+    return _feasible(hand, best_grip(hand, grips, ways))
+
+
+def _feasible(hand: Hand, found: tuple[Vector, Reach, int]) -> tuple[Vector, float]:
+    grip, worst, _ = found
     if problem := worst.problem:
         raise MotionError(f"the stitch is not feasible: of {hand.arm}, {problem}")
     return grip, worst.margin
