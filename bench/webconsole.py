@@ -64,7 +64,7 @@ CHROMIUM = shutil.which("chromium") or ""
 class Fed:
     """A source with the whole cart, an organ and two pictures, which change at their rates."""
 
-    kind, generation = "live", 1
+    kind, generation, guided = "live", 1, None
 
     def __init__(self) -> None:
         file = load("teleop", [])

@@ -98,7 +98,7 @@ class Grip:
     left_outside: bool
     """Whether the left finger is on the outer side of the arc."""
     backwards: bool = False
-    """Whether the fingers point against the needle's axis, as a hand holds it that drives the other way."""
+    """Whether the fingers point against the needle's axis."""
 
 
 def grip_pose(grip: Grip, needle: NeedleShape, reach: float) -> Vector:

@@ -187,7 +187,7 @@ class GuidedSurgeon(Procedure):
         if is_inside(params, state.needle):
             hands = (self.driver, self.puller)
             plan = way_on(params, *hands, stitch, state.needle, state.holder)
-            return replace(plan, exchanged=self.handing.exchanged)
+            return replace(plan, exchanged=self.handing.exchanged, alone=self.handing.alone)
         try:
             return super()._way_on()
         except MotionError:

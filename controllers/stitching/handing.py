@@ -61,6 +61,7 @@ class _Goal:
     puller: Vector
     margin: float
     exchanged: bool
+    alone: bool
 
 
 def handing(
@@ -76,9 +77,11 @@ def handing(
         held: by whom and how; None: it lies there.
     """
     search = _Search(params, hands, stitch, needle, held)
-    for way in (search.in_hand, search.once, search.twice):
-        if (found := way()) is not None:
-            return found
+    for alone in (False, True):
+        goals = search.goals(alone=alone)
+        for way in (search.in_hand, search.once, search.twice):
+            if (found := way(goals)) is not None:
+                return found
     return None
 
 
@@ -99,19 +102,19 @@ class _Search:
         self._rooms = dict[int, Vector]()
         self._places = _places(stitch, params)
 
-    @cached_property
-    def _goals(self) -> list[_Goal]:
-        """How the stitch can be driven and pulled, the best first."""
+    def goals(self, *, alone: bool) -> list[_Goal]:
+        """Return how the stitch can be driven and pulled, by two hands or by one alone, the best first."""
         params, stitch, found = self._params, self._stitch, list[_Goal]()
         require_room(params.grip, stitch, params.emerge)
-        pull = [pulling(stitch, params.emerge, params.lift)]
-        for exchanged, (driver, puller) in enumerate((self._hands, self._hands[::-1])):
-            grips = _grips(puller, params.taken, stitch)
-            taken, pulled, _ = best_grip(puller, grips, [pull[0]])
+        pull = pulling(stitch, params.emerge, params.lift)
+        for exchanged, driver in enumerate(self._hands):
+            puller = driver if alone else self._hands[1 - exchanged]
+            taken, pulled, _ = best_grip(puller, _grips(puller, params.taken, stitch), [pull])
             for grip in _grips(driver, params.grip, stitch):
                 margin = min(_margin(driver, grip, self._drive), pulled.margin)
                 if margin >= 0.0:
-                    found.append(_Goal(Hold(driver, grip, params.grip), taken, margin, bool(exchanged)))
+                    hold = Hold(driver, grip, params.grip)
+                    found.append(_Goal(hold, taken, margin, bool(exchanged), alone))
         return sorted(found, key=lambda goal: -goal.margin)
 
     @cached_property
@@ -136,9 +139,9 @@ class _Search:
             for grip in _grips(hand, behind, self._stitch)
         ]
 
-    def in_hand(self) -> WayOn | None:
-        """Return the best way without a hand-over: it is picked up as it is driven."""
-        for goal in self._goals:
+    def in_hand(self, goals: Sequence[_Goal]) -> WayOn | None:
+        """Return the best way without a hand-over: it is picked up, or held, as it is driven."""
+        for goal in goals:
             driver = goal.driver
             for start in self._starts:
                 same = start.hand is driver.hand and np.allclose(start.grip, driver.grip)
@@ -146,15 +149,15 @@ class _Search:
                     return self._way_on(goal, driver, [], [])
         return None
 
-    def once(self) -> WayOn | None:
+    def once(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way with one hand-over."""
-        return self._best((start, goal.driver, goal) for goal in self._goals for start in self._starts)
+        return self._best((start, goal.driver, goal) for goal in goals for start in self._starts)
 
-    def twice(self) -> WayOn | None:
+    def twice(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way by the other hand and back."""
         return self._best(
             (start, between, goal.driver, goal)
-            for goal in self._goals
+            for goal in goals
             for start in self._starts
             for between in self._holds
         )
@@ -217,6 +220,7 @@ class _Search:
             goal.puller,
             goal.margin,
             exchanged=goal.exchanged,
+            alone=goal.alone,
             handed=handed,
             pick=first.grip,
         )

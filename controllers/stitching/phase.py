@@ -33,3 +33,6 @@ class Phase(IntEnum):
     LEAVE_BACK = 20
     DONE = 21
     FAILED = 22
+    LET_GO = 23
+    """Of one hand alone, between DRIVE and COME."""
+    STEP_BACK = 24

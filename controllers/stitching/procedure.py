@@ -89,6 +89,8 @@ class HandingState(Record):
 
     exchanged = flag()
     """Whether driver and puller have exchanged their parts."""
+    alone = flag()
+    """Whether the driver pulls, too."""
     pending = flag()
     """Whether the needle, once picked up, is handed over before it is driven."""
     left = integer()
@@ -132,6 +134,8 @@ class Procedure(ABC):
             Phase.HOLD_BACK: lambda: self._hold(Phase.RELEASE_BACK),
             Phase.RELEASE_BACK: lambda: self._release(Phase.LEAVE_BACK),
             Phase.LEAVE_BACK: self._leave_back,
+            Phase.LET_GO: self._let_go,
+            Phase.STEP_BACK: self._step_back,
             Phase.DONE: lambda: None,
             Phase.FAILED: lambda: None,
         }
@@ -144,7 +148,7 @@ class Procedure(ABC):
     @property
     def puller(self) -> Hand:
         """The hand that pulls it out."""
-        return self.hands[not self.handing.exchanged]
+        return self.driver if self.handing.alone else self._other(self.driver)
 
     @property
     @abstractmethod
@@ -218,7 +222,7 @@ class Procedure(ABC):
 
     def _take_over_parts(self, plan: WayOn) -> None:
         handing, handed = self.handing, plan.handed
-        handing.exchanged = plan.exchanged
+        handing.exchanged, handing.alone = plan.exchanged, plan.alone
         handing.left = max(0, len(handed) - 1)
         handing.pending = bool(handed) and plan.phase is Phase.HOVER
         for i, each in enumerate(reversed(handed)):
@@ -271,14 +275,17 @@ class Procedure(ABC):
     @property
     def _taker(self) -> Hand:
         """The hand that takes the needle over next."""
-        if self.handing.pending or self.state.phase >= Phase.PRESENT:
-            return self.puller if self.handing.left % 2 else self.driver
+        if self.handing.pending or Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK:
+            return self._other(self.driver) if self.handing.left % 2 else self.driver
         return self.puller
 
     @property
     def _giver(self) -> Hand:
         """The hand that gives it."""
-        return self.driver if self._taker is self.puller else self.puller
+        return self._other(self._taker)
+
+    def _other(self, hand: Hand) -> Hand:
+        return self.hands[hand is self.hands[0]]
 
     @property
     def _picker(self) -> Hand:
@@ -401,16 +408,36 @@ class Procedure(ABC):
         self._track(self.driver, angle)
         if angle == end:
             self.state.waited += self.driver.period
-            if self.state.waited > 0.3:
-                self.puller.go(self._taking(self.puller, BACK))
-                self._enter(Phase.COME)
+            if self.state.waited <= 0.3:
+                return
+            if self.handing.alone:
+                self.driver.move_jaw(OPEN)
+                self.state.free = True
+                self._enter(Phase.LET_GO)
+            else:
+                self._to_come()
+
+    def _let_go(self) -> None:
+        self.state.waited += self.driver.period
+        if self.state.waited >= OPENED:
+            self.driver.go(before(framed(self.driver.line()), BACK))
+            self._enter(Phase.STEP_BACK)
+
+    def _step_back(self) -> None:
+        if self._arrived(self.driver):
+            self._to_come()
+
+    def _to_come(self) -> None:
+        self.puller.go(self._taking(self.puller, BACK))
+        self._enter(Phase.COME)
 
     def _taking(self, hand: Hand, away: float) -> Vector:
         """Return the pose, shape (7,), where a hand takes over the needle, or so far before it."""
-        if hand is self.driver:
-            grip = self.state.planned[0]
+        handed = Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK
+        if not handed:
+            grip = self.state.planned[1]
         else:
-            grip = self.handing.between if self.state.phase >= Phase.PRESENT else self.state.planned[1]
+            grip = self.state.planned[0] if hand is self.driver else self.handing.between
         return before(self.state.needle @ grip, away)
 
     def _come(self, after: Phase) -> None:
@@ -428,18 +455,22 @@ class Procedure(ABC):
             self._enter(after)
 
     def _hold(self, after: Phase) -> None:
-        hand = self._taker
-        other = self.driver if hand is self.puller else self.puller
+        hand, other = self._taker, self._giver
         if not self._arrived(hand) or self.state.waited < _PRESSED:
             return
+        alone = hand is self.driver and after is Phase.RELEASE
         if hand.angle <= _HELD_OPEN:
-            raise MotionError(f"{hand.arm} has not taken hold of the needle that {other.arm} holds")
-        other.move_jaw(OPEN)
-        self._enter(after)
+            holder = "tissue" if alone else other.arm
+            raise MotionError(f"{hand.arm} has not taken hold of the needle that {holder} holds")
+        if alone:
+            self._grasped(hand)
+            self._to_pull()
+        else:
+            other.move_jaw(OPEN)
+            self._enter(after)
 
     def _release(self, after: Phase) -> None:
-        hand = self._taker
-        other = self.driver if hand is self.puller else self.puller
+        hand, other = self._taker, self._giver
         self.state.waited += hand.period
         if self.state.waited < OPENED:
             return
@@ -453,8 +484,11 @@ class Procedure(ABC):
         """Let the driver go clear, then to its place, and pull."""
         if self._arrived(self.driver):
             self._park(self.driver)
-            self.state.angle[0] = self.stitch.angle(self.state.needle)
-            self._enter(Phase.PULL)
+            self._to_pull()
+
+    def _to_pull(self) -> None:
+        self.state.angle[0] = self.stitch.angle(self.state.needle)
+        self._enter(Phase.PULL)
 
     def _pull(self) -> None:
         if not self.driver.has_arrived:

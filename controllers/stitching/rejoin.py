@@ -75,9 +75,10 @@ class Rejoin:
         state.goals[:] = park
         if plan.holder is not None:
             state.goals[self._hands.index(plan.holder)] = pose_of(plan.needle @ grip)
-        driver, puller = (1, 0) if plan.exchanged else (0, 1)
+        driver = int(plan.exchanged)
+        puller = driver if plan.alone else 1 - driver
         if plan.phase is Phase.HOVER:
-            picker = puller if len(plan.handed) % 2 else driver
+            picker = 1 - driver if len(plan.handed) % 2 else driver
             grip = plan.driver if plan.pick is None else plan.pick
             state.goals[picker] = before(plan.needle @ grip, BACK)
         elif plan.phase is Phase.COME:

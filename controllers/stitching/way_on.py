@@ -63,7 +63,9 @@ class WayOn:
     picked_for: Phase = Phase.LIFT
     """What follows when the needle has been taken up: it is in the tissue, or it is not."""
     exchanged: bool = False
-    """Whether the puller drives, and the driver pulls."""
+    """Whether the other arm than planned drives."""
+    alone: bool = False
+    """Whether the arm that drives also pulls: it lets go, and takes hold anew."""
     handed: tuple[HandOver, ...] = ()
     """What comes between the first phase and the way, in turn."""
     pick: Vector | None = None
@@ -110,7 +112,7 @@ def way_on(
     over = stitch.entry - BEFORE
     emerge, lift = params.emerge, params.lift
     pull = pulling(stitch, emerge, lift)
-    if holding is puller and inside:
+    if inside and holding is not None and _pulls(params, holding, driver, puller, stitch, needle):
         grip, margin = _kept(puller, needle, [pulling(stitch, emerge, lift, angle)])
         return WayOn(Phase.PULL, puller, stitch.pose(angle), angle, np.eye(4), grip, margin)
     taking, pull_margin = _from_a_side(puller, params.taken, stitch, [pull])
@@ -134,6 +136,16 @@ def way_on(
     grips = grips_of(driver, params.grip, stitch.needle, backwards=wrong_way_up)
     grip, margin = _chosen(driver, grips, [[up, needle], drive])
     return WayOn(Phase.HOVER, None, needle, over, grip, taking, min(margin, pull_margin))
+
+
+def _pulls(
+    params: StitchParams, holding: Hand, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector
+) -> bool:
+    """Say whether a hand holds a needle in the tissue as one that pulls it."""
+    if driver is puller:
+        behind = behind_tip(inverse_pose(needle) @ framed(holding.measured), holding, stitch)
+        return behind < (params.grip + params.taken) / 2.0
+    return holding is puller
 
 
 def _taken_again(
