@@ -1,13 +1,16 @@
 """Stitches without a hub and pictures: force over depth, energy, accuracy, and success over seeds.
 
 Lead, motion controller, engine, pad and task of the scenario `suturing` are stepped in one process, in the
-order of its plan. `force` turns a needle through the pad alone, by hand. Results:
-docs/decisions/0062-needle-in-tissue.md and 0063-stitches.md.
+order of its plan. `guided` does so with `suturing-by-hand`, and picks stitches of any direction, as `plans`
+does without physics. `force` turns a needle through the pad alone, by hand. Results:
+docs/decisions/0062-needle-in-tissue.md, 0063-stitches.md and 0102-hands-exchange-their-parts.md.
 
     python -m bench.suturing stitches --seeds 10 --set participants.lead.stitches=1
     python -m bench.suturing success --rows one.jsonl --seeds 40
     python -m bench.suturing success --rows one-off.jsonl --seeds 40 --errors
     python -m bench.suturing success --rows four.jsonl --seeds 20 --stitches 4
+    python -m bench.suturing guided --rows guided.jsonl --seeds 50
+    python -m bench.suturing plans --stitches 1000
     python -m bench.suturing force --picture force.png
 """
 
@@ -16,14 +19,19 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from math import asin, pi, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from controllers.expert.hand import framed, pose_of
 from controllers.stitching.geometry import stitch_between
+from controllers.stitching.stage import Stage
+from controllers.stitching.way_on import way_on
 from engines.suture_pad.channel import Channel
 from engines.suture_pad.tissue import TissueParams
 from hub.participant import Inputs, Setup
@@ -32,8 +40,11 @@ from hub.planning.scenario_file import load
 from hub.planning.wiring import make_plan
 from hub.session.launch import in_one_host
 from robots.training.needles import NEEDLES
+from schemas.errors import MotionError
+from schemas.ros import Header, Point, PointStamped, StringMessage
+from schemas.vectors import Vector
 
-LEFT_OUT = ("endoscope",)
+LEFT_OUT = ("endoscope", "hands", "left_hand", "right_hand", "markers", "ros")
 
 
 def _make(kind: str, name: str, params: Any) -> Any:
@@ -51,7 +62,11 @@ class Trial:
                 update={
                     "participants": kept,
                     "order": tuple(n for n in file.scenario.order or () if n in kept) or None,
-                    "connections": [c for c in file.scenario.connections if c.target.participant in kept],
+                    "connections": [
+                        c
+                        for c in file.scenario.connections
+                        if {c.source.participant, c.target.participant} <= kept.keys()
+                    ],
                 }
             )
         )
@@ -106,6 +121,10 @@ class Trial:
                 if source == n and (target, into) in self._events and outputs.get(port):
                     self._waiting[target].setdefault(into, []).extend(outputs[port])
         self.time_ns += self.plan.step_ns
+
+    def send(self, participant: str, port: str, message: Any) -> None:
+        """Let an event come to a participant in its next step."""
+        self._waiting[participant].setdefault(port, []).append(message)
 
     def run(self) -> dict[str, Any]:
         """Step until the lead ends, and return the row of the table."""
@@ -201,6 +220,111 @@ def success(args: argparse.Namespace) -> None:
         print(f"{name}: median {np.median(found):.4g}, 90th {np.percentile(found, 90):.4g}")
 
 
+MIDDLE, BITES = 0.03, (0.008, 0.018)
+"""m: either way from the pad's middle, and between the holes, within which a stitch is drawn."""
+
+
+def drawn(rng: np.random.Generator) -> tuple[Vector, Vector]:
+    """Return entry and exit of a stitch of any direction, shape (3,), in the phantom's frame, m."""
+    bite, way = rng.uniform(*BITES), rng.uniform(-pi, pi)
+    middle = np.array([*rng.uniform(-MIDDLE, MIDDLE, 2), 0.0])
+    half = bite / 2.0 * np.array([np.cos(way), np.sin(way), 0.0])
+    return middle - half, middle + half
+
+
+def guided(args: argparse.Namespace) -> None:
+    """Let a program pick stitches of any direction, one for each seed that a file of rows does not have."""
+    file = Path(args.rows)
+    rows: list[dict[str, Any]] = []
+    if file.exists():
+        rows = [json.loads(line) for line in file.read_text().splitlines()]
+    for seed in sorted(set(range(args.first, args.first + args.seeds)) - {row["seed"] for row in rows}):
+        rows.append({"seed": seed, **_guided(seed)})
+        with file.open("a") as out:
+            out.write(json.dumps(rows[-1]) + "\n")
+    made = [row for row in rows if row["made"]]
+    print(f"made: {len(made)} of {len(rows)}")
+    for row in rows:
+        if not row["made"]:
+            print(f"seed {row['seed']}: {row['said']}")
+    for name in ("by one hand", "exchanged"):
+        print(f"{name}: {sum(row[name] for row in made)}")
+    for name in ("entry_mm", "exit_mm", "simulated_s"):
+        found = [row[name] for row in made]
+        print(f"{name}: median {np.median(found):.3g}, most {max(found):.3g}")
+
+
+def _guided(seed: int) -> dict[str, Any]:
+    trial, rng = Trial("suturing-by-hand", [f"scene.seed={seed}"]), np.random.default_rng(seed)
+    holes, shape, said, tips = drawn(rng), NEEDLES["sh-plus"], list[str](), list[Vector]()
+    surgeon = trial.parts["lead"]._surgeon
+    for _ in range(1000):  # the needle comes to rest
+        trial.step()
+    for point in holes:
+        there = Point(x=float(point[0]), y=float(point[1]))
+        trial.send("lead", "operator/pick", PointStamped(header=Header(frame_id="phantom"), point=there))
+    trial.send("lead", "operator/command", StringMessage(data="consent"))
+    begun = False
+    while trial.time_ns < 120_000_000_000 and (surgeon.guided.stage is Stage.RUNNING or not begun):
+        trial.step()
+        if not trial.time_ns % 10_000_000:
+            said += [message.data for message in trial.out["lead"]["status"]]
+            begun = begun or bool(said)
+            needle = framed(trial.out["robot"]["needle/pose"])
+            tips.append(needle[:3, :3] @ shape.marks[2] + needle[:3, 3])
+    said += [message.data for message in trial.out["lead"]["status"]]
+    crossed = _crossings(np.array(tips))
+    off = [
+        1e3 * float(np.linalg.norm(crossed - hole, axis=1).min()) if len(crossed) else None for hole in holes
+    ]
+    return {
+        "simulated_s": trial.time_ns * 1e-9,
+        "made": bool(surgeon.state.made[0]),
+        "entry_mm": off[0],
+        "exit_mm": off[1],
+        "by one hand": surgeon.handing.alone,
+        "exchanged": surgeon.handing.exchanged,
+        "said": said[-1] if said else "",
+    }
+
+
+def _crossings(tips: Vector) -> Vector:
+    """Return where a way of the tip, shape (n, 3), goes through the skin, z = 0: shape (m, 3)."""
+    before, after = tips[:-1], tips[1:]
+    at = np.flatnonzero(before[:, 2] * after[:, 2] < 0.0)
+    share = before[at, 2] / (before[at, 2] - after[at, 2])
+    crossed: Vector = before[at] + share[:, None] * (after[at] - before[at])
+    return crossed
+
+
+def plans(args: argparse.Namespace) -> None:
+    """Plan stitches of any direction, the needle as it lies at first, with and without handing it over."""
+    file = load("suturing-by-hand", [])
+    lead = _make("guided-stitching", "lead", file.params["lead"])
+    surgeon, thing = lead._surgeon, file.params["robot"].objects["needle"]
+    surgeon.sense(np.array([*thing.position, *thing.orientation]), 0.0)
+    for number, hand in enumerate(surgeon.hands):
+        start = np.array(file.params["lead"].arms.driven[hand.arm].start)
+        hand.measured[:] = surgeon.state.park[number] = pose_of(hand.base @ hand.chain.forward(start))
+    rng, took, plain = np.random.default_rng(0), list[float](), 0
+    found: Counter[tuple[bool, bool, int]] = Counter()
+    for _ in range(args.stitches):
+        surgeon.guided.points[:], surgeon.guided.picked = drawn(rng), 2
+        with suppress(MotionError):
+            way_on(surgeon.params, *surgeon.hands, surgeon.stitch, surgeon.state.needle, 0.0)
+            plain += 1
+        began = time.perf_counter()
+        with suppress(MotionError):
+            plan = surgeon._way_on()
+            found[plan.exchanged, plan.alone, len(plan.handed)] += 1
+        took.append(time.perf_counter() - began)
+    print(f"as planned: {plain} of {args.stitches}; with all that hands can do: {found.total()}")
+    for (exchanged, alone, handed), count in sorted(found.items()):
+        who = "the left hand" if exchanged else "the right hand"
+        print(f"{count}: {who} drives{', and pulls' if alone else ''}, after {handed} hand-overs")
+    print(f"to plan one: median {1e3 * np.median(took):.0f} ms, most {1e3 * max(took):.0f} ms")
+
+
 def force(args: argparse.Namespace) -> None:
     """Turn a needle through the pad alone, and compare what it feels along the arc with the model's sum."""
     needle, tissue = NEEDLES["sh-plus"], TissueParams()
@@ -252,6 +376,14 @@ def main() -> None:
     many.add_argument("--stitches", type=int, choices=(1, 4), default=1)
     many.add_argument("--errors", action="store_true", help="with joint errors")
     many.set_defaults(run=success)
+    picked = commands.add_parser("guided")
+    picked.add_argument("--rows", required=True, help="file that the rows are appended to")
+    picked.add_argument("--seeds", type=int, default=50)
+    picked.add_argument("--first", type=int, default=0)
+    picked.set_defaults(run=guided)
+    planned = commands.add_parser("plans")
+    planned.add_argument("--stitches", type=int, default=1000)
+    planned.set_defaults(run=plans)
     two = commands.add_parser("force")
     two.add_argument("--picture")
     two.set_defaults(run=force)

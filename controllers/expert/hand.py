@@ -123,6 +123,8 @@ class Hand:
         """Pose of the tip in the world."""
         self.angle = 0.0
         """Of the jaw, rad."""
+        self.roll = 0.0
+        """Of the shaft, measured, rad."""
         self._angles: list[float] = []
 
     @property

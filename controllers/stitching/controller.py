@@ -26,8 +26,7 @@ class Stitching(TwoHands):
         super().__init__(name, params)
         self._surgeon = Surgeon(params, *self._hands)
         self._looking = Looking(self._hands, self._sights, params.phantom.pose)
-        self.publish(self._surgeon)
-        self.keep(self._looking.state)
+        self.publish(self._surgeon, self._looking.state)
 
     @property
     def ports(self) -> tuple[Port, ...]:

@@ -62,16 +62,18 @@ def room(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
     return most
 
 
-def reach(chain: SerialChain, base: Vector, tips: Vector) -> Reach:
+def reach(chain: SerialChain, base: Vector, tips: Vector, roll: float | None = None) -> Reach:
     """Return the best of all ways of the joints along `tips`, shape (poses, 4, 4), in the world.
 
-    `base`: of the arm in the world, shape (4, 4). The shaft's roll may begin a turn on or back.
+    `base`: of the arm in the world, shape (4, 4). Its roll begins nearest to `roll` (rad); without,
+    it may begin a turn on or back.
     """
     found = list[Reach]()
     turning = [joint.kind == "revolute" for joint in chain.joints]
     for q in _two(chain, base, tips):
         q[:, turning] = np.unwrap(q[:, turning], axis=0)
-        found += [Reach(chain, _wound(q, turn)) for turn in _TURNS]
+        turns = _TURNS if roll is None else (2.0 * pi * round((roll - q[0, 3]) / (2.0 * pi)),)
+        found += [Reach(chain, _wound(q, turn)) for turn in turns]
     return max(found, key=lambda each: each.margin)
 
 

@@ -65,12 +65,11 @@ class GuidedStitching(TwoHands):
     def __init__(self, name: str, params: GuidedStitchingParams) -> None:
         super().__init__(name, params)
         self._surgeon = GuidedSurgeon(params, *self._hands)
-        self.publish(self._surgeon)
+        self._seen = _Shown()
+        self.publish(self._surgeon, self._surgeon.guided, self._seen)
         self._camera, self._banner = params.camera, params.banner
         seen = StereoCamera(params.width, params.height, params.field_of_view, params.baseline)
         self._frames = SceneFrames(params, params.camera, seen)
-        self._seen = _Shown()
-        self.keep(self._seen, self._surgeon.guided, self._surgeon.handing)
         self._outputs |= {"stage": self._seen.stage, "state": (), "markers": ()}
 
     @property

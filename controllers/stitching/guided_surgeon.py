@@ -35,6 +35,7 @@ _LEAST = 2.0e-3
 """m; of a bite."""
 _TURNS = (15, -15, 30, -30, 45, -45, 60, -60, 90, -90, 135, -135, 180)
 """Degrees about the skin's normal, by which a stitch that is not feasible is tried; least first."""
+_HANDED = ("", ", handed over once", ", handed over twice")
 _RAMP = 0.2
 """s in which a pause stops all motion."""
 _MOVED, _TURNED = 0.5e-3, 0.01
@@ -116,7 +117,10 @@ class GuidedSurgeon(Procedure):
             self.guided.picked = 0
             raise MotionError(f"{error}{hint}") from error
         self.guided.stage = Stage.PROPOSED
-        self._status.append(f"consent? {plan.margin:.2f} of the joints' ranges is left")
+        who = self.hands[plan.exchanged].arm
+        pulls, over = " and pulls" if plan.alone else "", _HANDED[len(plan.handed)]
+        left = f"{plan.margin:.2f} of the joints' ranges left"
+        self._status.append(f"consent? {who} drives{pulls}{over}; {left}")
 
     def _feasible_turn(self) -> str:
         """Say by which least turn about its middle the picked stitch becomes feasible; empty: by none."""
@@ -188,20 +192,24 @@ class GuidedSurgeon(Procedure):
             hands = (self.driver, self.puller)
             plan = way_on(params, *hands, stitch, state.needle, state.holder)
             return replace(plan, exchanged=self.handing.exchanged, alone=self.handing.alone)
-        try:
-            return super()._way_on()
-        except MotionError:
-            if (plan := handing(params, self.hands, stitch, state.needle, self._held)) is None:
-                raise
-            return plan
+        plan = handing(params, self.hands, stitch, state.needle, self._held, state.park)
+        if plan is None:
+            super()._way_on()  # says which joint fails
+            raise MotionError(
+                "the stitch is not feasible from where the arms are: a shaft would have to turn farther than"
+                " it can, or the arms would meet"
+            )
+        return plan
 
     @property
     def _held(self) -> Hold | None:
-        """How the needle is held, by which hand."""
+        """How the needle is held, by which hand. Raises MotionError if it is another one."""
         for hand in self.hands:
             if hand.number == self.state.holder:
                 grip = inverse_pose(self.state.needle) @ framed(hand.measured)
                 return Hold(hand, grip, behind_tip(grip, hand, self.stitch))
+        if self.state.holder:
+            super()._way_on()
         return None
 
     def _go_on(self) -> None:

@@ -8,22 +8,24 @@ place of its arc, hands it to the other arm, which takes it from the other side;
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
-from math import ceil, pi, radians
+from itertools import pairwise, product
+from math import pi, radians
 
 import numpy as np
 
-from controllers.expert.hand import Hand, framed
+from controllers.expert.hand import Hand
 from controllers.stitching.feasibility import reach, room
-from controllers.stitching.geometry import Stitch, before
+from controllers.stitching.geometry import Stitch
+from controllers.stitching.itinerary import Itinerary
 from controllers.stitching.params import StitchParams
 from controllers.stitching.phase import Phase
-from controllers.stitching.plan import BEFORE, best_grip, driving, grips_of, pulling, require_room
+from controllers.stitching.plan import BEFORE, driving, grips_of, pulling, require_room
 from controllers.stitching.rejoin import BACK
 from controllers.stitching.way_on import HandOver, WayOn, raised
-from robots import rotation
+from schemas.errors import MotionError
 from schemas.vectors import Vector
 
 __all__ = ["Hold", "handing"]
@@ -36,8 +38,8 @@ _SPINS = 8
 """Orientations of the needle about each axis that are tried for a hand-over."""
 _TRIED = 24
 """Ways that are looked at in full, those with the most room where hands meet first."""
-_SLICE, _TURN = 5.0e-3, 0.2
-"""m and rad: at most between two poses of a line that are looked at."""
+_JAW = 0.012
+"""m: that a jaw reaches from its tip frame, and 2 mm."""
 _DOWN = 0.7
 """Cosine of the angle between fingers that pick a needle up and straight down, at least."""
 
@@ -58,14 +60,21 @@ class _Goal:
     """How the needle is driven, and taken."""
 
     driver: Hold
-    puller: Vector
+    puller: Hand
+    pullers: tuple[Vector, ...]
+    """How the puller can hold it."""
     margin: float
     exchanged: bool
     alone: bool
 
 
 def handing(
-    params: StitchParams, hands: tuple[Hand, Hand], stitch: Stitch, needle: Vector, held: Hold | None
+    params: StitchParams,
+    hands: tuple[Hand, Hand],
+    stitch: Stitch,
+    needle: Vector,
+    held: Hold | None,
+    rests: Vector,
 ) -> WayOn | None:
     """Return how `stitch` is made with the fewest hand-overs, or None if it cannot be made.
 
@@ -75,8 +84,9 @@ def handing(
         stitch: the stitch.
         needle: where the needle is, shape (4, 4), out of the tissue.
         held: by whom and how; None: it lies there.
+        rests: where the tips of the hands stand when they have nothing to do, shape (2, 7).
     """
-    search = _Search(params, hands, stitch, needle, held)
+    search = _Search(params, hands, stitch, needle, held, rests)
     for alone in (False, True):
         goals = search.goals(alone=alone)
         for way in (search.in_hand, search.once, search.twice):
@@ -95,9 +105,12 @@ class _Search:
         stitch: Stitch,
         needle: Vector,
         held: Hold | None,
+        rests: Vector,
     ) -> None:
-        self._params, self._hands, self._stitch, self._needle, self._held = params, hands, stitch, needle, held
-        self._drive = driving(stitch, params.emerge, params.lift)
+        self._params, self._hands, self._stitch = params, hands, stitch
+        self._needle, self._held, self._rests = needle, held, rests
+        self._drive = np.array(driving(stitch, params.emerge, params.lift))
+        self._pull = np.array(pulling(stitch, params.emerge, params.lift))
         self._up = raised(params, needle)
         self._rooms = dict[int, Vector]()
         self._places = _places(stitch, params)
@@ -106,16 +119,25 @@ class _Search:
         """Return how the stitch can be driven and pulled, by two hands or by one alone, the best first."""
         params, stitch, found = self._params, self._stitch, list[_Goal]()
         require_room(params.grip, stitch, params.emerge)
-        pull = pulling(stitch, params.emerge, params.lift)
         for exchanged, driver in enumerate(self._hands):
             puller = driver if alone else self._hands[1 - exchanged]
-            taken, pulled, _ = best_grip(puller, _grips(puller, params.taken, stitch), [pull])
-            for grip in _grips(driver, params.grip, stitch):
-                margin = min(_margin(driver, grip, self._drive), pulled.margin)
+            grips = _grips(puller, params.taken, stitch)
+            taken = tuple(grip for grip in grips if _margin(puller, grip, self._pull) >= 0.0)
+            for hold in self._drivers(driver) if taken else ():
+                margin = _margin(driver, hold.grip, self._drive)
                 if margin >= 0.0:
-                    hold = Hold(driver, grip, params.grip)
-                    found.append(_Goal(hold, taken, margin, bool(exchanged), alone))
+                    found.append(_Goal(hold, puller, taken, margin, bool(exchanged), alone))
         return sorted(found, key=lambda goal: -goal.margin)
+
+    def _drivers(self, driver: Hand) -> list[Hold]:
+        """Return how a hand may hold the needle to drive it: as it does now, or as the parameters say."""
+        params, stitch, held = self._params, self._stitch, self._held
+        holds = [Hold(driver, grip, params.grip) for grip in _grips(driver, params.grip, stitch)]
+        if held is not None and held.hand is driver:
+            with suppress(MotionError):
+                require_room(held.behind, stitch, params.emerge)
+                return [held, *holds]
+        return holds
 
     @cached_property
     def _starts(self) -> list[Hold]:
@@ -127,12 +149,13 @@ class _Search:
             hold
             for hold in self._holds
             if -(self._needle[:3, :3] @ hold.grip[:3, 2]) @ up > _DOWN
-            and _margin(hold.hand, hold.grip, [self._up, self._needle]) >= 0.0
+            and _margin(hold.hand, hold.grip, np.stack([self._up, self._needle])) >= 0.0
         ]
 
     @cached_property
     def _holds(self) -> list[Hold]:
-        angles = sorted({self._params.grip, (self._params.grip + self._params.taken) / 2.0, self._params.taken})
+        grip, taken = self._params.grip, self._params.taken
+        angles = (taken, (grip + taken) / 2.0, grip)
         return [
             Hold(hand, grip, behind)
             for hand, behind in product(self._hands, angles)
@@ -141,12 +164,10 @@ class _Search:
 
     def in_hand(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way without a hand-over: it is picked up, or held, as it is driven."""
-        for goal in goals:
-            driver = goal.driver
-            for start in self._starts:
-                same = start.hand is driver.hand and np.allclose(start.grip, driver.grip)
-                if same and self._held is None and self._goes([driver], [], goal):
-                    return self._way_on(goal, driver, [], [])
+        for goal, start in product(goals, self._starts):
+            same = start.hand is goal.driver.hand and np.allclose(start.grip, goal.driver.grip)
+            if same and (found := self._along([start], [], goal)) is not None:
+                return found
         return None
 
     def once(self, goals: Sequence[_Goal]) -> WayOn | None:
@@ -166,7 +187,7 @@ class _Search:
         """Return the first way, in the order of the room where hands meet, that is feasible throughout."""
         scored = list[tuple[float, list[Hold], list[int], _Goal]]()
         for *holds, goal in chains:
-            pairs = list(zip(holds, holds[1:], strict=False))
+            pairs = list(pairwise(holds))
             if not all(_can_meet(*pair) for pair in pairs):
                 continue
             rooms = [np.minimum(self._room(giver), self._room(taker)) for giver, taker in pairs]
@@ -176,9 +197,8 @@ class _Search:
                 scored.append((margin, holds, at, goal))
         scored.sort(key=lambda each: -each[0])
         for _, holds, at, goal in scored[:_TRIED]:
-            needles = [self._places[i] for i in at]
-            if self._goes(holds, needles, goal):
-                return self._way_on(goal, holds[0], needles, holds[1:])
+            if (found := self._along(holds, [self._places[i] for i in at], goal)) is not None:
+                return found
         return None
 
     def _room(self, hold: Hold) -> Vector:
@@ -187,38 +207,64 @@ class _Search:
             tips = self._places @ hold.grip
             away = tips.copy()
             away[:, :3, 3] -= BACK * tips[:, :3, 2]
-            self._rooms[id(hold)] = np.minimum(*(room(hold.hand.chain, hold.hand.base, each) for each in (tips, away)))
+            chain, base = hold.hand.chain, hold.hand.base
+            self._rooms[id(hold)] = np.minimum(room(chain, base, tips), room(chain, base, away))
         return self._rooms[id(hold)]
 
-    def _goes(self, holds: Sequence[Hold], needles: Sequence[Vector], goal: _Goal) -> bool:
-        """Say whether each hand stays in its joints' ranges from where it takes the needle to where it gives it."""
-        begins = [self._needle, *needles]
-        for i, hold in enumerate(holds):
-            tips = [begins[i] @ hold.grip]
-            if i == 0 and self._held is None:
-                tips.append(self._up @ hold.grip)
-            elif i > 0:
-                tips.insert(0, _away(tips[0]))
-            if i < len(needles):
-                tips = [*_lines(*tips, needles[i] @ hold.grip), _away(needles[i] @ hold.grip)]
-            else:
-                drive = [pose @ hold.grip for pose in self._drive]
-                tips = [*_lines(*tips, drive[0]), *drive[1:]]
-            if reach(hold.hand.chain, hold.hand.base, np.array(tips)).margin < 0.0:
-                return False
-        return goal.margin >= 0.0
+    def _along(self, holds: Sequence[Hold], needles: Sequence[Vector], goal: _Goal) -> WayOn | None:
+        """Return a way, if the joints of both hands can follow it from where they are now to its end."""
+        going = {hand: Itinerary(hand) for hand in self._hands}
+        rests = dict(zip(self._hands, self._rests, strict=True))
+        first, driver = holds[0], goal.driver
+        if self._held is None:
+            going[first.hand].take(self._needle, first.grip)
+            going[first.hand].lead(self._up, first.grip)
+        for giver, taker, needle in zip(holds, holds[1:], needles, strict=False):
+            going[giver.hand].lead(needle, giver.grip)
+            going[taker.hand].take(needle, taker.grip)
+            going[giver.hand].leave(rests[giver.hand])
+        going[driver.hand].lead(self._drive[0], driver.grip)
+        going[driver.hand].follow(self._drive[1:], driver.grip)
+        if not goal.alone:
+            going[driver.hand].leave(rests[driver.hand])
+        for grip in goal.pullers:
+            pulling = going[goal.puller].copy()
+            pulling.take(self._drive[-1], grip)
+            pulling.follow(self._pull, grip)
+            margin = min(each.margin for each in ({**going, goal.puller: pulling}).values())
+            if margin >= 0.0 and self._is_clear(going):
+                return self._way_on(goal, first, grip, needles, holds[1:], margin)
+        return None
 
-    def _way_on(self, goal: _Goal, first: Hold, needles: Sequence[Vector], takers: Sequence[Hold]) -> WayOn:
+    def _is_clear(self, going: dict[Hand, Itinerary]) -> bool:
+        """Say whether each hand with the needle keeps away from where the other one rests."""
+        least = self._stitch.needle.radius + _JAW
+        places = zip(self._hands[::-1], self._rests, strict=True)
+        return all(going[hand].distance(rest[:3]) > least for hand, rest in places)
+
+    def _way_on(
+        self,
+        goal: _Goal,
+        first: Hold,
+        puller: Vector,
+        needles: Sequence[Vector],
+        takers: Sequence[Hold],
+        margin: float,
+    ) -> WayOn:
         handed = tuple(HandOver(needle, taker.grip) for needle, taker in zip(needles, takers, strict=True))
-        held = self._held
+        if self._held is None:
+            phase, holder, where = Phase.HOVER, None, self._needle
+        else:
+            phase, holder = Phase.PRESENT if handed else Phase.LIFT, self._held.hand
+            where = needles[0] if handed else self._up
         return WayOn(
-            Phase.HOVER if held is None else Phase.PRESENT,
-            None if held is None else held.hand,
-            self._needle if held is None else needles[0],
+            phase,
+            holder,
+            where,
             self._stitch.entry - BEFORE,
             goal.driver.grip,
-            goal.puller,
-            goal.margin,
+            puller,
+            margin,
             exchanged=goal.exchanged,
             alone=goal.alone,
             handed=handed,
@@ -228,22 +274,15 @@ class _Search:
 
 def _grips(hand: Hand, behind: float, stitch: Stitch) -> list[Vector]:
     """Return all four ways to hold the needle `behind` its tip (rad)."""
-    return [
-        grip for side in (False, True) for grip in grips_of(hand, behind, stitch.needle, backwards=side)
-    ]
+    return [grip for side in (False, True) for grip in grips_of(hand, behind, stitch.needle, backwards=side)]
 
 
-def _margin(hand: Hand, grip: Vector, needles: Sequence[Vector]) -> float:
-    return reach(hand.chain, hand.base, np.array(needles) @ grip).margin
+def _margin(hand: Hand, grip: Vector, needles: Vector) -> float:
+    return reach(hand.chain, hand.base, needles @ grip).margin
 
 
 def _can_meet(giver: Hold, taker: Hold) -> bool:
     return giver.hand is not taker.hand and abs(giver.behind - taker.behind) >= _APART
-
-
-def _away(tip: Vector) -> Vector:
-    """Return a pose of the tip (4, 4) from which it comes to `tip`."""
-    return framed(before(tip, BACK))
 
 
 def _places(stitch: Stitch, params: StitchParams) -> Vector:
@@ -264,17 +303,3 @@ def _places(stitch: Stitch, params: StitchParams) -> Vector:
             pose[:3, 3] = middle + (params.lift + stitch.needle.radius + height) * up
             places.append(pose)
     return np.array(places)
-
-
-def _lines(*tips: Vector) -> Iterator[Vector]:
-    """Yield poses (4, 4) on the straight lines from one tip to the next, as a hand goes."""
-    for a, b in zip(tips, tips[1:], strict=False):
-        turn = rotation.log(rotation.from_matrix(b[:3, :3] @ a[:3, :3].T))
-        way = b[:3, 3] - a[:3, 3]
-        n = max(1, ceil(np.linalg.norm(way) / _SLICE), ceil(np.linalg.norm(turn) / _TURN))
-        for i in range(n):
-            pose = np.eye(4)
-            pose[:3, :3] = rotation.matrix(rotation.exp(i / n * turn)) @ a[:3, :3]
-            pose[:3, 3] = a[:3, 3] + i / n * way
-            yield pose
-    yield tips[-1]

@@ -40,12 +40,12 @@ class TwoHands(Controller):
             "status": (),
         }
 
-    def publish(self, surgeon: Procedure) -> None:
-        """Keep and publish the state of a procedure."""
+    def publish(self, surgeon: Procedure, *more: Record) -> None:
+        """Keep the state of a procedure, and `more`; publish what others see of it."""
         state = surgeon.state
         self._outputs |= {each: state.part(each) for each in ("made", "angle", "deviation", "done", "failed")}
         kept = (*self._hands, *self._sights, surgeon.rejoin)
-        self.keep(state, self._shown, *(each.state for each in kept))
+        self.keep(state, surgeon.handing, self._shown, *(each.state for each in kept), *more)
 
     def _hand(self, params: StitchParams, arm: ArmName) -> Hand:
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
@@ -71,8 +71,9 @@ class TwoHands(Controller):
         for hand, sight in zip(self._hands, self._sights, strict=True):
             arm = hand.arm
             self._refuse(arm, surgeon, inputs)
+            q = inputs[f"{arm}/measured_js"][: len(hand.chain.joints)]
+            hand.roll = float(q[3])
             if self._looks:
-                q = inputs[f"{arm}/measured_js"][: len(hand.chain.joints)]
                 seen = cast("tuple[PoseWithCovarianceStamped, ...]", inputs.events(f"{arm}/seen"))
                 hand.stand(sight.see(q, seen, hand.period))
             jaw = float(inputs[f"{arm}/jaw/measured_js"][0])

@@ -182,9 +182,7 @@ def behind_tip(grip: Vector, hand: Hand, stitch: Stitch) -> float:
     return stitch.needle.arc / 2.0 - atan2(y, x)
 
 
-def _from_a_side(
-    hand: Hand, behind: float, stitch: Stitch, ways: list[list[Vector]]
-) -> tuple[Vector, float]:
+def _from_a_side(hand: Hand, behind: float, stitch: Stitch, ways: list[list[Vector]]) -> tuple[Vector, float]:
     """Return how a hand takes the needle `behind` its tip (rad): from the other side if it has to."""
     side, other = (
         best_grip(hand, grips_of(hand, behind, stitch.needle, backwards=each), ways) for each in (False, True)

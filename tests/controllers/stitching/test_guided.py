@@ -9,11 +9,13 @@ from controllers.expert.hand import pose_of
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import MotionParams
 from controllers.stitching.guided_controller import GuidedStitching, GuidedStitchingParams
+from controllers.stitching.phase import Phase
 from controllers.stitching.stage import Stage
 from hub.planning.scenario_file import load
 from robots import rotation
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.endoscope import EYES, StereoCamera, left_camera
+from robots.training.needles import NEEDLES
 from schemas.ros import BoolMessage, Header, Point, PointStamped, StringMessage
 from schemas.visualization import MarkerAction
 from tests.controllers.stitching.test_surgeon import World, drop
@@ -97,6 +99,60 @@ def test_a_person_picks_sees_the_path_consents_and_gets_a_stitch_through_both_po
     assert world.largest < TIP_PERIOD
 
 
+@pytest.mark.parametrize(
+    ("degrees", "way", "ends_with"),
+    [
+        pytest.param(180, [], "PSM2", id="to the left: as a right hand makes it"),
+        pytest.param(0, ["PSM2"], "PSM1", id="to the right: a left hand is given the needle, and drives it"),
+        pytest.param(-135, [], "PSM1", id="out of reach of the left hand: the right one also pulls"),
+        pytest.param(-45, ["PSM2"], "PSM2", id="out of reach of the right hand: it gives the needle away"),
+    ],
+)
+def test_a_stitch_goes_in_any_direction(degrees, way, ends_with):
+    world, tips, takers = Guided(), [], []
+    holes = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0.0]) * 0.008
+    entry, leave = np.array([0.0, 0.01, 0.0]) - holes, np.array([0.0, 0.01, 0.0]) + holes
+    world.pick(*entry[:2]).pick(*leave[:2]).say("consent")
+    while world.stage is Stage.RUNNING and world.t < 60e9:
+        world.step()
+        if world.phase is Phase.APPROACH and takers != (held := list(world.grips)):
+            takers = held
+        if world.phase in (Phase.DRIVE, Phase.PULL):
+            tips.append(world.needle[:3, :3] @ NEEDLES["sh-plus"].marks[2] + world.needle[:3, 3])
+    assert world.lead._surgeon.state.made[0] == 1.0, world.said
+    assert takers == (way or ["PSM1"])
+    assert list(world.grips) == [ends_with]
+    for hole in (entry, leave):
+        assert np.linalg.norm(np.array(tips) - hole, axis=1).min() < 0.2e-3
+    assert world.largest < TIP_PERIOD
+
+
+def test_a_needle_that_lies_the_wrong_way_up_is_turned_over_by_the_other_hand():
+    world = Guided()
+    world.needle = world.needle @ np.diag([1.0, -1.0, -1.0, 1.0])
+    world.step()
+    assert world.consented().stage is Stage.RUNNING, world.said
+    world.until("PULL", 60)
+    assert world.phase is Phase.PULL, world.said
+
+
+@pytest.mark.parametrize(
+    "phase", ["LIFT", "PRESENT", "TAKE_BACK", "LEAVE_BACK", "LET_GO", "STEP_BACK", "TAKE", "PULL"]
+)
+def test_a_stitch_with_exchanged_hands_goes_on_after_a_take_over(phase):
+    world = Guided()  # PSM1 gives the needle to PSM2, which drives, lets go and pulls
+    world.pick(-0.0057, 0.0157).pick(0.0057, 0.0043).say("consent").until(phase)
+    assert world.phase.name == phase
+    world.led = True
+    world.step()
+    world.led = False
+    world.step(**{"PSM1/following": (BoolMessage(data=False),)})
+    world.say("resume").run(60, until=lambda w: w.stage is not Stage.RUNNING)
+    assert world.lead._surgeon.state.made[0] == 1.0, world.said
+    assert list(world.grips) == ["PSM2"]
+    assert world.largest < TIP_PERIOD
+
+
 def test_points_may_be_in_any_frame():
     world = Guided()
     entry = np.array([0.008, 0.018, 0.0, 1.0])
@@ -144,7 +200,7 @@ def test_a_pixel_beside_the_pad_is_refused():
         ((0.081, 0.0), (0.070, 0.0), r"entry is 1\.0 mm beside the pad"),
         ((0.012, 0.0), (-0.012, 0.0), r"24\.0 mm apart, and the needle is 22\.9 mm across"),
         ((0.008, 0.0), (0.007, 0.0), r"1\.0 mm apart, at least 2"),
-        ((0.0, 0.008), (0.0, -0.008), r"of PSM[12], .* would .*"),
+        ((0.065, 0.037), (0.065, 0.053), r"of PSM[12], .* would .*"),
     ],
 )
 def test_what_is_not_feasible_is_refused_with_the_number_that_fails(entry, leave, why):
@@ -229,18 +285,20 @@ def test_a_saved_stitch_goes_on_with_the_same_bits():
     other.lead.restore(world.lead.save())
     other.tips = {arm: tip.copy() for arm, tip in world.tips.items()}
     other.jaws, other.grips = dict(world.jaws), dict(world.grips)
+    other.joints = dict(world.joints)
     other.needle, other.t = world.needle.copy(), world.t
+    assert other.phase is world.phase is not Phase.DONE
     world.run(1, until=lambda _: False)
     other.run(1, until=lambda _: False)
     assert world.lead.state_hash() == other.lead.state_hash()
 
 
 def test_of_a_stitch_that_is_not_feasible_it_says_which_turn_makes_it_so():
-    world = Guided().pick(-0.008, 0.018).pick(0.008, 0.018)
+    world = Guided().pick(0.065, 0.037).pick(0.065, 0.053)
     assert "refused: the stitch is not feasible" in world.said[-1]
-    turn = int(world.said[-1].split("turned by ")[1].split(" degrees")[0])
+    turn = 90 + int(world.said[-1].split("turned by ")[1].split(" degrees")[0])
     c, s = 0.008 * np.cos(np.radians(turn)), 0.008 * np.sin(np.radians(turn))
-    world.pick(-c, 0.018 - s).pick(c, 0.018 + s)
+    world.pick(0.065 - c, 0.045 - s).pick(0.065 + c, 0.045 + s)
     assert "consent?" in world.said[-1]
 
 

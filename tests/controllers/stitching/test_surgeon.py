@@ -12,6 +12,7 @@ from controllers.stitching.phase import Phase
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.inverse import inverse
 from robots.training.needles import NEEDLES
 from schemas.errors import SessionError
 from schemas.ros import StringMessage
@@ -33,7 +34,12 @@ class World:
             hand.arm: hand.base @ hand.chain.forward(np.array(given.arms.driven[hand.arm].start))
             for hand in self.lead._hands
         }
+        self.joints = {
+            hand.arm: np.array(given.arms.driven[hand.arm].start, float) for hand in self.lead._hands
+        }
         self.jaws, self.grips, self.t, self.said = dict.fromkeys(self.tips, 0.5), {}, 0, []
+        self.fastest = 0.0
+        """Most that a joint has moved in a period, rad or m."""
         self.wire = NEEDLES["sh-plus"].points(np.linspace(-1.57, 1.57, 200))
 
     def make(self, given, params):
@@ -48,7 +54,7 @@ class World:
         for hand in self.lead._hands:
             arm = hand.arm
             values[f"{arm}/local/measured_cp"] = pose_of(inverse_pose(hand.base) @ self.tips[arm])
-            values[f"{arm}/measured_js"] = np.zeros(18)
+            values[f"{arm}/measured_js"] = np.concatenate([self.joints[arm], np.zeros(12)])
             wide = 0.1 if arm in self.grips and self.jaws[arm] < 0 else self.jaws[arm]
             values[f"{arm}/jaw/measured_js"] = np.array([wide, 0, 0])
         values["objects/needle/pose"] = pose_of(self.needle)
@@ -75,7 +81,11 @@ class World:
                 self.grips[arm] = inverse_pose(self.tips[arm]) @ self.needle
         for message in out[f"{arm}/servo_cp"]:
             p, q = message.pose.position, message.pose.orientation
-            self.tips[arm] = hand.base @ framed(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
+            tip = framed(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
+            self.tips[arm] = hand.base @ tip
+            joints = inverse(hand.chain, tip, self.joints[arm])
+            self.fastest = max(self.fastest, float(np.abs(joints - self.joints[arm]).max()))
+            self.joints[arm] = joints
         if arm in self.grips and len(self.grips) == 1:
             self.needle = self.tips[arm] @ self.grips[arm]
 

@@ -1,0 +1,93 @@
+"""The way of one hand through all that it does in a stitch, and whether its joints follow. SI units, world.
+
+The range of the shaft's roll is more than a turn: the same pose of the tip may be near one end of it or near
+the other, by how the arm came there. So a way is looked at as a whole, from the roll that the arm has now.
+"""
+
+from __future__ import annotations
+
+from math import ceil
+
+import numpy as np
+
+from controllers.expert.hand import Hand, framed
+from controllers.stitching.feasibility import reach
+from controllers.stitching.geometry import before
+from controllers.stitching.rejoin import BACK
+from robots import rotation
+from robots.dvrk.cart import inverse_pose
+from schemas.vectors import Vector
+
+__all__ = ["Itinerary", "away"]
+
+_SLICE, _TURN = 5.0e-3, 0.2
+"""m and rad: at most between two poses of a line that are looked at."""
+
+
+class Itinerary:
+    """Straight lines of the tip from where it is now, as a `Hand` goes, and ways of the needle in its jaw."""
+
+    def __init__(self, hand: Hand) -> None:
+        self.hand = hand
+        self._tips = [framed(hand.measured)[None]]
+        self._carrying = list[tuple[Vector, Vector]]()
+
+    def copy(self) -> Itinerary:
+        """Return an itinerary that may go on in another way."""
+        other = Itinerary(self.hand)
+        other._tips, other._carrying = list(self._tips), list(self._carrying)
+        return other
+
+    def go(self, tip: Vector) -> None:
+        """Go on a line to a pose, shape (4, 4)."""
+        self._tips.append(_line(self._tips[-1][-1], tip))
+
+    def lead(self, needle: Vector, grip: Vector) -> None:
+        """Go on a line where the needle, held with `grip`, comes to a pose, shape (4, 4)."""
+        self.go(needle @ grip)
+        self._carrying.append((self._tips[-1], grip))
+
+    def follow(self, needles: Vector, grip: Vector) -> None:
+        """Lead the needle through poses, shape (n, 4, 4), that are near to each other."""
+        self._tips.append(needles @ grip)
+
+    def take(self, needle: Vector, grip: Vector) -> None:
+        """Come along the fingers, and take the needle."""
+        self.go(away(needle @ grip))
+        self.go(needle @ grip)
+
+    def leave(self, rest: Vector) -> None:
+        """Go back along the fingers, and to where it rests, shape (7,)."""
+        self.go(away(self._tips[-1][-1]))
+        self.go(framed(rest))
+
+    @property
+    def margin(self) -> float:
+        """Least share of half a joint's range that is left; below 0 the joints cannot follow."""
+        return reach(self.hand.chain, self.hand.base, np.concatenate(self._tips), self.hand.roll).margin
+
+    def distance(self, place: Vector) -> float:
+        """Return how near tip or needle come to a place, shape (3,), while the needle is carried."""
+        ways = [way[:, :3, 3] for tips, grip in self._carrying for way in (tips, tips @ inverse_pose(grip))]
+        return min((float(np.linalg.norm(way - place, axis=1).min()) for way in ways), default=np.inf)
+
+
+def away(tip: Vector) -> Vector:
+    """Return the pose (4, 4) from which a tip comes to `tip`, and to which it goes back."""
+    return framed(before(tip, BACK))
+
+
+def _line(a: Vector, b: Vector) -> Vector:
+    """Return poses, shape (n, 4, 4), after `a` on the straight line to `b`, with the shortest turn."""
+    turn = rotation.log(rotation.from_matrix(b[:3, :3] @ a[:3, :3].T))
+    way, angle = b[:3, 3] - a[:3, 3], float(np.sqrt(turn @ turn))
+    n = max(1, ceil(float(np.sqrt(way @ way)) / _SLICE), ceil(angle / _TURN))
+    shares = np.arange(1, n + 1) / n
+    poses = np.tile(b, (n, 1, 1))
+    poses[:-1, :3, 3] = a[:3, 3] + shares[:-1, None] * way
+    if angle > 0.0:
+        x, y, z = turn / angle
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        sine, cosine = np.sin(shares[:-1, None, None] * angle), np.cos(shares[:-1, None, None] * angle)
+        poses[:-1, :3, :3] = (np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)) @ a[:3, :3]
+    return poses
