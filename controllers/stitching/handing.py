@@ -18,6 +18,7 @@ import numpy as np
 
 from controllers.expert.hand import Hand
 from controllers.stitching.feasibility import reach, room
+from controllers.stitching.gap import ROOM, gap
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.itinerary import Itinerary
 from controllers.stitching.params import StitchParams
@@ -113,6 +114,7 @@ class _Search:
         self._pull = np.array(pulling(stitch, params.emerge, params.lift))
         self._up = raised(params, needle)
         self._rooms = dict[int, Vector]()
+        self._meetings = dict[tuple[int, int], Vector]()
         self._places = _places(stitch, params)
 
     def goals(self, *, alone: bool) -> list[_Goal]:
@@ -172,25 +174,25 @@ class _Search:
 
     def once(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way with one hand-over."""
-        return self._best((start, goal.driver, goal) for goal in goals for start in self._starts)
+        return self._best(((start, goal.driver), goal) for goal in goals for start in self._starts)
 
     def twice(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way by the other hand and back."""
         return self._best(
-            (start, between, goal.driver, goal)
+            ((start, between, goal.driver), goal)
             for goal in goals
             for start in self._starts
             for between in self._holds
         )
 
-    def _best(self, chains: Iterator[tuple[Hold | _Goal, ...]]) -> WayOn | None:
+    def _best(self, chains: Iterator[tuple[Sequence[Hold], _Goal]]) -> WayOn | None:
         """Return the first way, in the order of the room where hands meet, that is feasible throughout."""
-        scored = list[tuple[float, list[Hold], list[int], _Goal]]()
-        for *holds, goal in chains:
+        scored = list[tuple[float, Sequence[Hold], list[int], _Goal]]()
+        for holds, goal in chains:
             pairs = list(pairwise(holds))
             if not all(_can_meet(*pair) for pair in pairs):
                 continue
-            rooms = [np.minimum(self._room(giver), self._room(taker)) for giver, taker in pairs]
+            rooms = [self._meeting(giver, taker) for giver, taker in pairs]
             at = [int(each.argmax()) for each in rooms]
             margin = min(goal.margin, *(float(each[i]) for each, i in zip(rooms, at, strict=True)))
             if margin >= 0.0:
@@ -211,6 +213,18 @@ class _Search:
             self._rooms[id(hold)] = np.minimum(room(chain, base, tips), room(chain, base, away))
         return self._rooms[id(hold)]
 
+    def _meeting(self, giver: Hold, taker: Hold) -> Vector:
+        """Return the lesser room of both at each place, shape (n,); -1 where the instruments would meet."""
+        key = id(giver), id(taker)
+        if key not in self._meetings:
+            rooms = np.minimum(self._room(giver), self._room(taker))
+            at = np.flatnonzero(rooms >= 0.0)
+            there = self._places[at]
+            gaps = gap(giver.hand, there @ giver.grip, taker.hand, there @ taker.grip)
+            rooms[at[gaps < ROOM]] = -1.0
+            self._meetings[key] = rooms
+        return self._meetings[key]
+
     def _along(self, holds: Sequence[Hold], needles: Sequence[Vector], goal: _Goal) -> WayOn | None:
         """Return a way, if the joints of both hands can follow it from where they are now to its end."""
         going = {hand: Itinerary(hand) for hand in self._hands}
@@ -225,9 +239,10 @@ class _Search:
             going[giver.hand].leave(rests[giver.hand])
         going[driver.hand].lead(self._drive[0], driver.grip)
         going[driver.hand].follow(self._drive[1:], driver.grip)
-        if not goal.alone:
-            going[driver.hand].leave(rests[driver.hand])
+        going[driver.hand].leave(None if goal.alone else rests[driver.hand])
         for grip in goal.pullers:
+            if not (goal.alone or self._can_take_out(driver, goal.puller, grip)):
+                continue
             pulling = going[goal.puller].copy()
             pulling.take(self._drive[-1], grip)
             pulling.follow(self._pull, grip)
@@ -235,6 +250,11 @@ class _Search:
             if margin >= 0.0 and self._is_clear(going):
                 return self._way_on(goal, first, grip, needles, holds[1:], margin)
         return None
+
+    def _can_take_out(self, driver: Hold, puller: Hand, grip: Vector) -> bool:
+        """Say whether the puller can take the needle where it has come out, beside the driver."""
+        end = self._drive[-1:]
+        return bool(gap(driver.hand, end @ driver.grip, puller, end @ grip)[0] >= ROOM)
 
     def _is_clear(self, going: dict[Hand, Itinerary]) -> bool:
         """Say whether each hand with the needle keeps away from where the other one rests."""

@@ -56,10 +56,11 @@ class Itinerary:
         self.go(away(needle @ grip))
         self.go(needle @ grip)
 
-    def leave(self, rest: Vector) -> None:
+    def leave(self, rest: Vector | None = None) -> None:
         """Go back along the fingers, and to where it rests, shape (7,)."""
         self.go(away(self._tips[-1][-1]))
-        self.go(framed(rest))
+        if rest is not None:
+            self.go(framed(rest))
 
     @property
     def margin(self) -> float:
