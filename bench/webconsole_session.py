@@ -46,7 +46,7 @@ from schemas.codec import decode
 from schemas.keys import Keys
 from schemas.ros import Joy
 from webconsole.commands import Fork
-from webconsole.fork import fork_arguments
+from webconsole.fork import fork_arguments, fork_modules
 from webconsole.frame import SectionKind, sections
 from webconsole.started import Started
 
@@ -281,8 +281,7 @@ def bench_fork(seconds: float) -> dict[str, Any]:
         factor = json.loads(_output("-c", _FACTOR, str(directory), str(seconds)).splitlines()[-1])
         order = Fork(do="fork", time=seconds, duration=seconds + 600.0, pace="realtime", record=False)
         started = Started()
-        engines = "engines.mujoco.engine", "engines.bullet.engine", "mujoco", "pybullet"
-        started.prepare(["hub.fork", *engines])  # the form is open
+        started.prepare(fork_modules(recording.scenario()))  # the form is open
         sleep(FORM_S)
         begun = perf_counter()
         one = started.start("fork", fork_arguments(recording, order), seconds)

@@ -227,8 +227,8 @@ class _Grants:
 
     def __init__(self, recording: Recording, parent: Plan, plan: Plan, step: int) -> None:
         self._recording, self._step_ns, self._end = recording, plan.step_ns, step
-        first = next(recording.grants(), None)
-        last_ns = max((grant.horizon_ns for grant in recording.grants()), default=0)
+        first, last = next(recording.grants(), None), recording.last_grant()
+        last_ns = 0 if last is None else last.horizon_ns
         if first is None or not 0 < step * plan.step_ns <= last_ns:
             raise RecordingError(
                 f"'{recording.file}' cannot be forked at {step * plan.step_ns / 1e9:g} s: it goes from 0 to"

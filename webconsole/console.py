@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from hub.devices.network_link_control import NetworkLinkRequest
-from hub.planning import registry
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError, ScenarioError
 from schemas.trocar_msgs import ScoreCard
 from webconsole.commands import Control, Fork, Network, Pick, Say, Start
-from webconsole.fork import fork_arguments
+from webconsole.fork import fork_arguments, fork_modules
 from webconsole.frame import Section, SectionKind, pose_content
 from webconsole.guide import guiding
 from webconsole.live import Live
@@ -106,12 +105,8 @@ class Console:
 
     async def prepare(self) -> None:
         """Have processes ready for a session that is about to be started from here."""
-        kinds: set[str] = set()
-        if isinstance(self.source, Recorded) and self.source.scenario is not None:
-            kinds = {one.kind for one in self.source.scenario.participants.values()} & set(registry.kinds())
-        modules = ["hub.fork", *sorted(registry.find(kind).entry.module for kind in kinds)]
-        # an engine imports its libraries when it is configured; most have the name of their distribution
-        modules += sorted({package for kind in kinds for package in registry.extra_packages(kind)})
+        scenario = self.source.scenario if isinstance(self.source, Recorded) else None
+        modules = ["hub.fork"] if scenario is None else fork_modules(scenario)
         await asyncio.to_thread(self.started.prepare, modules)
 
     async def fork(self, order: Fork) -> int:

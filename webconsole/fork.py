@@ -17,7 +17,7 @@ from webconsole.changes import WORD, require_harmless
 from webconsole.commands import Fork
 from webconsole.started import page_devices, recorded_in
 
-__all__ = ["fork_arguments", "fork_form", "tree_of"]
+__all__ = ["fork_arguments", "fork_form", "fork_modules", "tree_of"]
 
 _MOST_MEMBERS = 200
 
@@ -35,6 +35,14 @@ def fork_form(recording: Recording) -> dict[str, Any]:
         "duration": None if scenario.duration is None else scenario.duration / 1e9,
         "parameters": [*_parameters(scenario, plan)],
     }
+
+
+def fork_modules(scenario: Scenario) -> list[str]:
+    """Return the modules that a fork of a session of this scenario imports."""
+    kinds = {one.kind for one in scenario.participants.values()} & set(registry.kinds())
+    # an engine imports its libraries when it is configured; most have the name of their distribution
+    packages = {package for kind in kinds for package in registry.extra_packages(kind)}
+    return ["hub.fork", *sorted({registry.find(kind).entry.module for kind in kinds}), *sorted(packages)]
 
 
 def _parameters(scenario: Scenario, plan: Plan) -> Iterator[str]:

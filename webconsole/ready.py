@@ -69,12 +69,13 @@ def main() -> None:
 
 
 def _read_definitions() -> None:
-    """Read what is read once in a process: messages and kinds."""
+    """Read what is read once in a process: messages, kinds and what they require."""
     from hub.planning import registry
     from schemas.codec import typestore
 
     typestore()
-    registry.kinds()
+    for name in registry.kinds():
+        registry.extra_packages(name)
 
 
 if __name__ == "__main__":

@@ -203,7 +203,13 @@ def _requirements(dist: Distribution | None, extra: str) -> Iterator[Requirement
 
 @cache
 def _all_requirements(dist: Distribution) -> tuple[Requirement, ...]:
-    return tuple(Requirement(text) for text in dist.requires or ())
+    return _parsed(tuple(dist.requires or ()))
+
+
+@cache
+def _parsed(texts: tuple[str, ...]) -> tuple[Requirement, ...]:
+    """Return requirements; each group of entry points has an object of its own for one distribution."""
+    return tuple(Requirement(text) for text in texts)
 
 
 def _installed(requirement: Requirement) -> bool:

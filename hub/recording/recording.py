@@ -19,6 +19,7 @@ from pydantic import ValidationError
 from hub.planning.plan import Plan
 from hub.planning.renamed import current_names
 from hub.recording.bag import Bag, locating
+from hub.recording.moments import Moments
 from hub.recording.series import Series
 from schemas.codec import decode
 from schemas.errors import RecordingError, did_you_mean
@@ -209,6 +210,17 @@ class Recording(Bag):
     def grants(self) -> Iterator[GrantMessage]:
         """Yield the grants in the order in which they were given."""
         return (grant for _, grant in self._decoded(GRANT_TOPIC, GrantMessage))
+
+    def last_grant(self) -> GrantMessage | None:
+        """Return the grant that was given last, found by the index; None if there is none."""
+        if GRANT_TOPIC not in self.topics:
+            return None
+        moments = Moments(self)
+        found = moments.newest(GRANT_TOPIC, moments.span_ns[1])
+        if found is None:
+            return None
+        with locating(self, GRANT_TOPIC, found.time_ns):
+            return decode(GrantMessage, found.payload)
 
     def acks(self, participant: str) -> Iterator[AckMessage]:
         """Yield the acks of `participant` in the order of their steps."""

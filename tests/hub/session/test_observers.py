@@ -49,7 +49,7 @@ def test_it_sees_the_newest_whole_states_and_misses_are_counted(prepare, tmp_pat
     assert all(time % 20 == 0 and number == node == time // 2 for time, number, node, _ in seen)
     assert {triangles for *_, triangles in seen} == {3}  # they come with the state at time 0 alone
     observed = summary.observers["camera"]
-    assert observed.states >= len(seen) - 1 >= 3
+    assert observed.states >= len(seen) - 2 >= 3  # its last count may come too late for the summary
     assert observed.dropped > 0
     assert observed.states + observed.dropped <= 50
     assert observed.dropped >= times[-1] // 20 - (len(seen) - 1)
