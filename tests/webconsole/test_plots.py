@@ -52,6 +52,31 @@ def test_values_that_leave_no_scale_are_drawn_without_an_error(person, values, s
     assert person.errors == []
 
 
+def test_what_a_page_has_not_seen_is_a_gap(person):
+    """Who looked at the past for some seconds has no line over them, and no contact without a beginning."""
+    data, contacts = person.page.evaluate(
+        """async () => {
+          const { Plots } = await import("/web/plots.js"), { Contacts } = await import("/web/depth.js")
+          const [list, input, options] = ["div", "input", "datalist"].map((name) => document.createElement(name))
+          const plots = new Plots(list, input, options, () => {})
+          plots.begin([{ name: "slow", columns: ["x"], type: "Vector", live: true },
+            { name: "tissue.probe/wrench", columns: ["x"], type: "Vector", live: true }], false)
+          plots.add(plots.entries.get("slow"))
+          for (const time of [0, 0.1, 0.2, 5.2, 5.3]) plots.sample("tissue.probe/wrench", [time, 1])
+          for (const time of [0, 1, 2]) plots.sample("slow", [time, 1])
+          const contacts = new Contacts(), press = (time, force) => contacts.push(time, 0, 0, -time, 0, 0, force)
+          press(0, 0); press(0.1, 1); press(0.2, 1)
+          contacts.miss()
+          press(5.2, 1); press(5.3, 0); press(5.4, 1)
+          return [plots.plots.map(({ data }) => data), contacts.lines.map(({ length }) => length)]
+        }"""
+    )
+    assert [[0, 0.1, 0.2, 2.7, 5.2, 5.3], [1, 1, 1, None, 1, 1]] in data
+    assert [[0, 1, 2], [1, 1, 1]] in data
+    assert contacts == [2, 1]
+    assert person.errors == []
+
+
 def test_a_recording_is_enlarged_down_to_a_shortest_time(person):
     """Dragging in a plot enlarges it, and again."""
     person.page.evaluate(

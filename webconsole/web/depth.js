@@ -3,7 +3,7 @@
 // As in the report of a recording: depth is the displacement of the motion side since first contact, against the mean
 // direction of the force on it; a line for each contact.
 
-import { short } from "./plots.js"
+import { GAP_S, short } from "./plots.js"
 
 const TOUCH_N = 0.02, RELEASE_N = 0.01 // webconsole/recorded.py; less, so that noise makes no new contact
 const MOST_POINTS = 4000, MOST_CONTACTS = 6
@@ -15,6 +15,10 @@ export class Contacts {
   // Time (s), point (m) and force (N).
   push(time, x, y, z, fx, fy, fz) {
     const force = Math.hypot(fx, fy, fz), last = this.all.at(-1)
+    if (this.joined) {
+      this.joined = force > RELEASE_N
+      return false
+    }
     if (!last || last.over) {
       if (!(force > TOUCH_N)) return false
       this.all.push({ first: [x, y, z], sum: [0, 0, 0], rows: [], over: false })
@@ -27,6 +31,13 @@ export class Contacts {
     contact.rows.push([x, y, z, force])
     if (contact.rows.length > MOST_POINTS) contact.rows = contact.rows.filter((_, i) => i % 2 === 0)
     return true
+  }
+
+  // What came since is not known: a contact that goes on has no beginning.
+  miss() {
+    const last = this.all.at(-1)
+    if (last) last.over = true
+    this.joined = true
   }
 
   // [[depth (mm), force (N)], ...] of each contact.
@@ -83,7 +94,10 @@ class Depth {
   }
 
   take(time, [x, y, z, fx, fy, fz]) {
-    if (!this.recorded && this.contacts.push(time, x, y, z, fx, fy, fz)) this.fresh = true
+    if (this.recorded) return
+    if (time - this.time > GAP_S) this.contacts.miss()
+    this.time = time
+    if (this.contacts.push(time, x, y, z, fx, fy, fz)) this.fresh = true
   }
 
   refresh() { if (this.fresh) { this.fresh = false; this.draw() } }

@@ -9,6 +9,9 @@ const LIKELY = [
   [/measured_js$/, /measured_cp$/, /pose$/],
 ]
 
+// Nothing came for so long (s), and five times as long as between the samples before: the page looked elsewhere.
+export const GAP_S = 0.5
+
 export class Plots {
   constructor(list, input, options, changed) {
     Object.assign(this, { list, input, options, changed })
@@ -151,6 +154,11 @@ class Plot {
       if (row[0] === times[times.length - 1]) return
       for (const column of this.data) column.length = 0 // another session
     }
+    const since = row[0] - times.at(-1)
+    if (since > GAP_S && since > 5 * this.since) {
+      times.push(row[0] - since / 2)
+      for (const column of this.data.slice(1)) column.push(null)
+    } else this.since = since
     times.push(row[0])
     this.columns.forEach(({ at }, i) => this.data[i + 1].push(drawable(row[at + 1])))
     const old = times.findIndex((time) => time >= row[0] - LAST_S)
