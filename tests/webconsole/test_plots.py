@@ -57,14 +57,16 @@ def test_what_a_page_has_not_seen_is_a_gap(person):
     data, contacts = person.page.evaluate(
         """async () => {
           const { Plots } = await import("/web/plots.js"), { Contacts } = await import("/web/depth.js")
-          const [list, input, options] = ["div", "input", "datalist"].map((name) => document.createElement(name))
+          const tags = ["div", "input", "datalist"]
+          const [list, input, options] = tags.map((name) => document.createElement(name))
           const plots = new Plots(list, input, options, () => {})
           plots.begin([{ name: "slow", columns: ["x"], type: "Vector", live: true },
             { name: "tissue.probe/wrench", columns: ["x"], type: "Vector", live: true }], false)
           plots.add(plots.entries.get("slow"))
           for (const time of [0, 0.1, 0.2, 5.2, 5.3]) plots.sample("tissue.probe/wrench", [time, 1])
           for (const time of [0, 1, 2]) plots.sample("slow", [time, 1])
-          const contacts = new Contacts(), press = (time, force) => contacts.push(time, 0, 0, -time, 0, 0, force)
+          const contacts = new Contacts()
+          const press = (time, force) => contacts.push(time, 0, 0, -time, 0, 0, force)
           press(0, 0); press(0.1, 1); press(0.2, 1)
           contacts.miss()
           press(5.2, 1); press(5.3, 0); press(5.4, 1)
