@@ -306,9 +306,8 @@ def _can_meet(giver: Hold, taker: Hold) -> bool:
 
 
 def _places(stitch: Stitch, params: StitchParams) -> Vector:
-    """Return where a needle may be handed over, over the middle of the stitch, shape (n, 4, 4)."""
-    up = params.phantom.pose[:3, 2]
-    middle = stitch.centre + (params.phantom.pose[:3, 3] - stitch.centre) @ up * up
+    """Return where a needle may be handed over, over the middle of the pad, where eyes look, (n, 4, 4)."""
+    middle, up = params.phantom.pose[:3, 3], params.phantom.pose[:3, 2]
     axes = np.array([axis for axis in product((-1.0, 0.0, 1.0), repeat=3) if any(axis)])
     places = list[Vector]()
     for axis in axes / np.linalg.norm(axes, axis=1, keepdims=True):
