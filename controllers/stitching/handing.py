@@ -35,6 +35,8 @@ _APART = radians(45.0)
 """Of the arc: so far from one jaw the other takes hold."""
 _HEIGHTS = (0.0, 0.02)
 """m, over the least height at which the needle is handed over."""
+_NEARER = 0.5
+"""To the surgeon, of the height over the skin."""
 _SPINS = 8
 """Orientations of the needle about each axis that are tried for a hand-over."""
 _TRIED = 24
@@ -306,8 +308,12 @@ def _can_meet(giver: Hold, taker: Hold) -> bool:
 
 
 def _places(stitch: Stitch, params: StitchParams) -> Vector:
-    """Return where a needle may be handed over, over the middle of the pad, where eyes look, (n, 4, 4)."""
+    """Return where a needle may be handed over, shape (n, 4, 4).
+
+    On the way from the middle of the pad to the endoscope, which looks there from the surgeon's side, y < 0.
+    """
     middle, up = params.phantom.pose[:3, 3], params.phantom.pose[:3, 2]
+    to_eyes = up - _NEARER * params.phantom.pose[:3, 1]
     axes = np.array([axis for axis in product((-1.0, 0.0, 1.0), repeat=3) if any(axis)])
     places = list[Vector]()
     for axis in axes / np.linalg.norm(axes, axis=1, keepdims=True):
@@ -319,6 +325,6 @@ def _places(stitch: Stitch, params: StitchParams) -> Vector:
             pose[:3, 0] = np.cos(turn) * across + np.sin(turn) * np.cross(axis, across)
             pose[:3, 1] = np.cross(axis, pose[:3, 0])
             pose[:3, 2] = axis
-            pose[:3, 3] = middle + (params.lift + stitch.needle.radius + height) * up
+            pose[:3, 3] = middle + (params.lift + stitch.needle.radius + height) * to_eyes
             places.append(pose)
     return np.array(places)
