@@ -25,7 +25,7 @@ class Reach:
     def __init__(self, chain: SerialChain, q: Vector) -> None:
         """Take the joint positions, shape (poses, 6)."""
         self._chain, self._q = chain, q
-        self._free = 2.0 * np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)
+        self._free = _free(chain, q)
         turns = np.abs(np.diff(q, axis=0))
         self._jump = float(np.delete(turns, chain.prismatic, axis=1).max(initial=0.0))
         self.margin = float(self._free.min()) if self._jump <= _JUMP else -1.0 - self._jump
@@ -57,8 +57,7 @@ def room(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
     `base`: of the arm in the world, shape (4, 4). Below 0 a pose is out of reach.
     """
     found = np.stack([_wound(q, turn) for q in _two(chain, base, tips) for turn in _TURNS])  # (6, n, joints)
-    free = 2.0 * np.minimum(found - chain.lower, chain.upper - found) / (chain.upper - chain.lower)
-    most: Vector = free.min(axis=-1).max(axis=0)
+    most: Vector = _free(chain, found).min(axis=-1).max(axis=0)
     return most
 
 
@@ -75,6 +74,12 @@ def reach(chain: SerialChain, base: Vector, tips: Vector, roll: float | None = N
         turns = _TURNS if roll is None else (2.0 * pi * round((roll - q[0, 3]) / (2.0 * pi)),)
         found += [Reach(chain, _wound(q, turn)) for turn in turns]
     return max(found, key=lambda each: each.margin)
+
+
+def _free(chain: SerialChain, q: Vector) -> Vector:
+    """Return the share of half of each joint's range that is left, of the shape of `q`, (..., joints)."""
+    free: Vector = 2.0 * np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)
+    return free
 
 
 def _two(chain: SerialChain, base: Vector, tips: Vector) -> Vector:

@@ -15,7 +15,7 @@ import numpy as np
 
 from controllers.expert.hand import Hand, framed
 from controllers.stitching.geometry import Stitch
-from controllers.stitching.handing import Hold, handing
+from controllers.stitching.handing import Handing, Hold
 from controllers.stitching.params import StitchParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import stitch_through
@@ -192,7 +192,7 @@ class GuidedSurgeon(Procedure):
             hands = (self.driver, self.puller)
             plan = way_on(params, *hands, stitch, state.needle, state.holder)
             return replace(plan, exchanged=self.handing.exchanged, alone=self.handing.alone)
-        plan = handing(params, self.hands, stitch, state.needle, self._held, state.park)
+        plan = Handing(params, self.hands, stitch, state.needle, self._held, state.park).plan()
         if plan is None:
             super()._way_on()  # says which joint fails
             raise MotionError(
@@ -209,7 +209,7 @@ class GuidedSurgeon(Procedure):
                 grip = inverse_pose(self.state.needle) @ framed(hand.measured)
                 return Hold(hand, grip, behind_tip(grip, hand, self.stitch))
         if self.state.holder:
-            super()._way_on()
+            super()._way_on()  # says that it is neither
         return None
 
     def _go_on(self) -> None:

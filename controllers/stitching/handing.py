@@ -29,7 +29,7 @@ from controllers.stitching.way_on import HandOver, WayOn, raised
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Hold", "handing"]
+__all__ = ["Handing", "Hold"]
 
 _APART = radians(45.0)
 """Of the arc: so far from one jaw the other takes hold."""
@@ -71,15 +71,8 @@ class _Goal:
     alone: bool
 
 
-def handing(
-    params: StitchParams,
-    hands: tuple[Hand, Hand],
-    stitch: Stitch,
-    needle: Vector,
-    held: Hold | None,
-    rests: Vector,
-) -> WayOn | None:
-    """Return how `stitch` is made with the fewest hand-overs, or None if it cannot be made.
+class Handing:
+    """The search for a way with the fewest hand-overs.
 
     Args:
         params: how a stitch is made.
@@ -89,17 +82,6 @@ def handing(
         held: by whom and how; None: it lies there.
         rests: where the tips of the hands stand when they have nothing to do, shape (2, 7).
     """
-    search = _Search(params, hands, stitch, needle, held, rests)
-    for alone in (False, True):
-        goals = search.goals(alone=alone)
-        for way in (search.in_hand, search.once, search.twice):
-            if (found := way(goals)) is not None:
-                return found
-    return None
-
-
-class _Search:
-    """What can be looked up while ways are compared."""
 
     def __init__(
         self,
@@ -115,11 +97,20 @@ class _Search:
         self._drive = np.array(driving(stitch, params.emerge, params.lift))
         self._pull = np.array(pulling(stitch, params.emerge, params.lift))
         self._up = raised(params, needle)
-        self._rooms = dict[int, Vector]()
-        self._meetings = dict[tuple[int, int], Vector]()
+        self._rooms = dict[Hold, Vector]()
+        self._meetings = dict[tuple[Hold, Hold], Vector]()
         self._places = _places(stitch, params)
 
-    def goals(self, *, alone: bool) -> list[_Goal]:
+    def plan(self) -> WayOn | None:
+        """Return how the stitch is made; None if it cannot be made."""
+        for alone in (False, True):
+            goals = self._goals(alone=alone)
+            for way in (self._in_hand, self._once, self._twice):
+                if (found := way(goals)) is not None:
+                    return found
+        return None
+
+    def _goals(self, *, alone: bool) -> list[_Goal]:
         """Return how the stitch can be driven and pulled, by two hands or by one alone, the best first."""
         params, stitch, found = self._params, self._stitch, list[_Goal]()
         require_room(params.grip, stitch, params.emerge)
@@ -166,7 +157,7 @@ class _Search:
             for grip in _grips(hand, behind, self._stitch)
         ]
 
-    def in_hand(self, goals: Sequence[_Goal]) -> WayOn | None:
+    def _in_hand(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way without a hand-over: it is picked up, or held, as it is driven."""
         for goal, start in product(goals, self._starts):
             same = start.hand is goal.driver.hand and np.allclose(start.grip, goal.driver.grip)
@@ -174,11 +165,11 @@ class _Search:
                 return found
         return None
 
-    def once(self, goals: Sequence[_Goal]) -> WayOn | None:
+    def _once(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way with one hand-over."""
         return self._best(((start, goal.driver), goal) for goal in goals for start in self._starts)
 
-    def twice(self, goals: Sequence[_Goal]) -> WayOn | None:
+    def _twice(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way by the other hand and back."""
         return self._best(
             ((start, between, goal.driver), goal)
@@ -207,17 +198,17 @@ class _Search:
 
     def _room(self, hold: Hold) -> Vector:
         """Return what is left of the joints' ranges at each place for a hand-over, shape (n,)."""
-        if id(hold) not in self._rooms:
+        if hold not in self._rooms:
             tips = self._places @ hold.grip
             away = tips.copy()
             away[:, :3, 3] -= BACK * tips[:, :3, 2]
             chain, base = hold.hand.chain, hold.hand.base
-            self._rooms[id(hold)] = np.minimum(room(chain, base, tips), room(chain, base, away))
-        return self._rooms[id(hold)]
+            self._rooms[hold] = np.minimum(room(chain, base, tips), room(chain, base, away))
+        return self._rooms[hold]
 
     def _meeting(self, giver: Hold, taker: Hold) -> Vector:
         """Return the lesser room of both at each place, shape (n,); -1 where the instruments would meet."""
-        key = id(giver), id(taker)
+        key = giver, taker
         if key not in self._meetings:
             rooms = np.minimum(self._room(giver), self._room(taker))
             at = np.flatnonzero(rooms >= 0.0)
@@ -242,14 +233,18 @@ class _Search:
         going[driver.hand].lead(self._drive[0], driver.grip)
         going[driver.hand].follow(self._drive[1:], driver.grip)
         going[driver.hand].leave(None if goal.alone else rests[driver.hand])
+        other = next(hand for hand in self._hands if hand is not goal.puller)
+        at_least = going[other].margin
+        if at_least < 0.0 or not self._is_clear(going):
+            return None
         for grip in goal.pullers:
             if not (goal.alone or self._can_take_out(driver, goal.puller, grip)):
                 continue
             pulling = going[goal.puller].copy()
             pulling.take(self._drive[-1], grip)
             pulling.follow(self._pull, grip)
-            margin = min(each.margin for each in ({**going, goal.puller: pulling}).values())
-            if margin >= 0.0 and self._is_clear(going):
+            margin = min(at_least, pulling.margin)
+            if margin >= 0.0:
                 return self._way_on(goal, first, grip, needles, holds[1:], margin)
         return None
 

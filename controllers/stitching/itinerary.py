@@ -18,7 +18,7 @@ from robots import rotation
 from robots.dvrk.cart import inverse_pose
 from schemas.vectors import Vector
 
-__all__ = ["Itinerary", "away"]
+__all__ = ["Itinerary"]
 
 _SLICE, _TURN = 5.0e-3, 0.2
 """m and rad: at most between two poses of a line that are looked at."""
@@ -53,12 +53,12 @@ class Itinerary:
 
     def take(self, needle: Vector, grip: Vector) -> None:
         """Come along the fingers, and take the needle."""
-        self.go(away(needle @ grip))
+        self.go(_away(needle @ grip))
         self.go(needle @ grip)
 
     def leave(self, rest: Vector | None = None) -> None:
         """Go back along the fingers, and to where it rests, shape (7,)."""
-        self.go(away(self._tips[-1][-1]))
+        self.go(_away(self._tips[-1][-1]))
         if rest is not None:
             self.go(framed(rest))
 
@@ -73,7 +73,7 @@ class Itinerary:
         return min((float(np.linalg.norm(way - place, axis=1).min()) for way in ways), default=np.inf)
 
 
-def away(tip: Vector) -> Vector:
+def _away(tip: Vector) -> Vector:
     """Return the pose (4, 4) from which a tip comes to `tip`, and to which it goes back."""
     return framed(before(tip, BACK))
 

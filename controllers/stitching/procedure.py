@@ -16,17 +16,17 @@ import numpy as np
 from controllers.expert.hand import Hand, framed, pose_of
 from controllers.stitching.geometry import Stitch, before
 from controllers.stitching.params import StitchParams
+from controllers.stitching.parts import Parts
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import BEFORE, BEYOND
 from controllers.stitching.rejoin import BACK, OPEN, OPENED, SHUT, Rejoin
 from controllers.stitching.way_on import WayOn, way_on
-from hub.participant import Record, array, choice, flag, integer, number
 from robots import rotation
 from robots.dvrk.cart import inverse_pose
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["ATTEMPTS", "HOVER", "Procedure", "ProcedureState"]
+__all__ = ["ATTEMPTS", "HOVER", "Procedure"]
 
 HOVER = 0.020
 """m, against its fingers: from where the driver picks the needle up, to where it comes down from."""
@@ -49,66 +49,12 @@ ATTEMPTS = 3
 """To take hold of the needle, and to go on with a stitch in which it was lost."""
 
 
-class ProcedureState(Record):
-    """All of the procedure that changes."""
-
-    phase = choice(Phase.BEGIN)
-    stitch = integer(1)
-    """Number of the pair of holes at work."""
-    attempts = integer()
-    """To take hold of the needle, in succession."""
-    recoveries = integer()
-    """Of a needle that was lost, in this stitch."""
-    free = flag()
-    """Whether no jaw is to hold the needle, though the phase is one in which a hand does."""
-    picked_for = choice(Phase.LIFT)
-    """The phase that follows when the driver has taken the needle up."""
-    waited = number()
-    """s since the hand at work has arrived."""
-    unheld = number()
-    """s for which nothing has held the needle."""
-    needle = array(4, 4)
-    holder = number()
-    grip = array(4, 4)
-    """Pose of the holding hand's tip in the needle's frame."""
-    planned = array(2, 4, 4)
-    """Of driver and puller, as planned."""
-    park = array(2, 7)
-    """Where the hands stand when they have nothing to do."""
-    angle = array(1)
-    """Of the needle's tip on its way, commanded, rad."""
-    deviation = array(1)
-    """Of the measured needle from its way, m."""
-    made = array(1)
-    done = array(1)
-    failed = array(1)
-
-
-class HandingState(Record):
-    """Which hand does what, and how the needle comes into the jaw that drives it."""
-
-    exchanged = flag()
-    """Whether driver and puller have exchanged their parts."""
-    alone = flag()
-    """Whether the driver pulls, too."""
-    pending = flag()
-    """Whether the needle, once picked up, is handed over before it is driven."""
-    left = integer()
-    """Hand-overs that follow the next one: after an even number the driver has it."""
-    needles = array(2, 4, 4)
-    """Where the needle is handed over, the last place first."""
-    between = array(4, 4)
-    """How the puller takes it, to give it back."""
-    pick = array(4, 4)
-    """How it is picked up, if it is handed over then."""
-
-
-class Procedure(ABC):
+class Procedure(Parts, ABC):
     """Two hands and a needle; which stitch it is, and what comes before and after, others say."""
 
     def __init__(self, params: StitchParams, driver: Hand, puller: Hand) -> None:
-        self.params, self.hands = params, (driver, puller)
-        self.state, self.handing = ProcedureState(), HandingState()
+        super().__init__((driver, puller))
+        self.params = params
         self.rejoin = Rejoin(driver, puller)
         self._needle = params.needle[1].shape
         self._status: list[str] = []
@@ -141,16 +87,6 @@ class Procedure(ABC):
         }
 
     @property
-    def driver(self) -> Hand:
-        """The hand that drives the needle in."""
-        return self.hands[self.handing.exchanged]
-
-    @property
-    def puller(self) -> Hand:
-        """The hand that pulls it out."""
-        return self.driver if self.handing.alone else self._other(self.driver)
-
-    @property
     @abstractmethod
     def stitch(self) -> Stitch:
         """The stitch at work. Raises MotionError if it is not feasible."""
@@ -166,20 +102,6 @@ class Procedure(ABC):
     @abstractmethod
     def _recover(self, why: str) -> None:
         """Go on, or do not, after a failure."""
-
-    @property
-    def settles(self) -> tuple[bool, bool]:
-        """Whether the tips of the hands are to be brought exactly where they were sent."""
-        phase = self.state.phase
-        if phase in (Phase.HOVER, Phase.DESCEND):
-            at_work = self._picker
-        elif phase in (Phase.ALIGN, Phase.DRIVE):
-            at_work = self.driver
-        elif phase in (Phase.COME, Phase.TAKE, Phase.COME_BACK, Phase.TAKE_BACK):
-            at_work = self._taker
-        else:
-            at_work = self.puller if phase is Phase.PULL else None
-        return self.hands[0] is at_work, self.hands[1] is at_work
 
     def statuses(self) -> tuple[str, ...]:
         """Return what was said in this step, and forget it."""
@@ -211,7 +133,7 @@ class Procedure(ABC):
     def _follow(self, plan: WayOn) -> None:
         """Let the hands go to where a plan goes on."""
         state = self.state
-        self._take_over_parts(plan)
+        self._assign(plan)
         state.planned[0], state.planned[1] = plan.driver, plan.puller
         state.angle[0], state.attempts, state.failed[0] = plan.angle, 0, 0.0
         state.picked_for, state.free = plan.picked_for, plan.holder is None
@@ -219,18 +141,6 @@ class Procedure(ABC):
             self._grasped(plan.holder)
         self.rejoin.begin(plan, state.grip, state.park)
         self._enter(Phase.BEGIN)
-
-    def _take_over_parts(self, plan: WayOn) -> None:
-        handing, handed = self.handing, plan.handed
-        handing.exchanged, handing.alone = plan.exchanged, plan.alone
-        handing.left = max(0, len(handed) - 1)
-        handing.pending = bool(handed) and plan.phase is Phase.HOVER
-        for i, each in enumerate(reversed(handed)):
-            handing.needles[i] = each.needle
-        if len(handed) > 1:
-            handing.between[:] = handed[-2].grip
-        if plan.pick is not None:
-            handing.pick[:] = plan.pick
 
     def _come_back(self) -> None:
         """Let the hands go on to where the stitch goes on."""
@@ -256,41 +166,6 @@ class Procedure(ABC):
         state.grip[:3, 3] += share * (now[:3, 3] - state.grip[:3, 3])
         turn = rotation.log(rotation.from_matrix(now[:3, :3] @ state.grip[:3, :3].T))
         state.grip[:3, :3] = rotation.matrix(rotation.exp(share * turn)) @ state.grip[:3, :3]
-
-    @property
-    def _holding(self) -> Hand | None:
-        phase = self.state.phase
-        if self.state.free:
-            return None
-        if phase is Phase.LIFT:
-            return self._picker
-        if phase is Phase.LEAVE_BACK:
-            return self._taker
-        if Phase.PRESENT <= phase <= Phase.HOLD_BACK:
-            return self._giver
-        if Phase.APPROACH <= phase <= Phase.HOLD:
-            return self.driver
-        return self.puller if Phase.LEAVE <= phase <= Phase.RAISE else None
-
-    @property
-    def _taker(self) -> Hand:
-        """The hand that takes the needle over next."""
-        if self.handing.pending or Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK:
-            return self._other(self.driver) if self.handing.left % 2 else self.driver
-        return self.puller
-
-    @property
-    def _giver(self) -> Hand:
-        """The hand that gives it."""
-        return self._other(self._taker)
-
-    def _other(self, hand: Hand) -> Hand:
-        return self.hands[hand is self.hands[0]]
-
-    @property
-    def _picker(self) -> Hand:
-        """The hand that picks it up."""
-        return self._giver if self.handing.pending else self.driver
 
     def _enter(self, phase: Phase) -> None:
         self.state.phase, self.state.waited = phase, 0.0

@@ -1,0 +1,144 @@
+"""Which hand does what: driver and puller are parts that the two hands of a stitch may exchange. SI units."""
+
+from __future__ import annotations
+
+from controllers.expert.hand import Hand
+from controllers.stitching.phase import Phase
+from controllers.stitching.way_on import WayOn
+from hub.participant import Record, array, choice, flag, integer, number
+
+__all__ = ["HandingState", "Parts", "ProcedureState"]
+
+
+class ProcedureState(Record):
+    """All of the procedure that changes."""
+
+    phase = choice(Phase.BEGIN)
+    stitch = integer(1)
+    """Number of the pair of holes at work."""
+    attempts = integer()
+    """To take hold of the needle, in succession."""
+    recoveries = integer()
+    """Of a needle that was lost, in this stitch."""
+    free = flag()
+    """Whether no jaw is to hold the needle, though the phase is one in which a hand does."""
+    picked_for = choice(Phase.LIFT)
+    """The phase that follows when the driver has taken the needle up."""
+    waited = number()
+    """s since the hand at work has arrived."""
+    unheld = number()
+    """s for which nothing has held the needle."""
+    needle = array(4, 4)
+    holder = number()
+    grip = array(4, 4)
+    """Pose of the holding hand's tip in the needle's frame."""
+    planned = array(2, 4, 4)
+    """Of driver and puller, as planned."""
+    park = array(2, 7)
+    """Where the hands stand when they have nothing to do."""
+    angle = array(1)
+    """Of the needle's tip on its way, commanded, rad."""
+    deviation = array(1)
+    """Of the measured needle from its way, m."""
+    made = array(1)
+    done = array(1)
+    failed = array(1)
+
+
+class HandingState(Record):
+    """Which hand does what, and how the needle comes into the jaw that drives it."""
+
+    exchanged = flag()
+    """Whether driver and puller have exchanged their parts."""
+    alone = flag()
+    """Whether the driver pulls, too."""
+    pending = flag()
+    """Whether the needle, once picked up, is handed over before it is driven."""
+    left = integer()
+    """Hand-overs that follow the next one: after an even number the driver has it."""
+    needles = array(2, 4, 4)
+    """Where the needle is handed over, the last place first."""
+    between = array(4, 4)
+    """How the puller takes it, to give it back."""
+    pick = array(4, 4)
+    """How it is picked up, if it is handed over then."""
+
+
+class Parts:
+    """Two hands, and the part of each in every phase of a stitch."""
+
+    def __init__(self, hands: tuple[Hand, Hand]) -> None:
+        self.hands = hands
+        self.state, self.handing = ProcedureState(), HandingState()
+
+    @property
+    def driver(self) -> Hand:
+        """The hand that drives the needle in."""
+        return self.hands[self.handing.exchanged]
+
+    @property
+    def puller(self) -> Hand:
+        """The hand that pulls it out."""
+        return self.driver if self.handing.alone else self._other(self.driver)
+
+    @property
+    def settles(self) -> tuple[bool, bool]:
+        """Whether the tips of the hands are to be brought exactly where they were sent."""
+        phase = self.state.phase
+        if phase in (Phase.HOVER, Phase.DESCEND):
+            at_work = self._picker
+        elif phase in (Phase.ALIGN, Phase.DRIVE):
+            at_work = self.driver
+        elif phase in (Phase.COME, Phase.TAKE, Phase.COME_BACK, Phase.TAKE_BACK):
+            at_work = self._taker
+        else:
+            at_work = self.puller if phase is Phase.PULL else None
+        return self.hands[0] is at_work, self.hands[1] is at_work
+
+    @property
+    def _holding(self) -> Hand | None:
+        phase = self.state.phase
+        if self.state.free:
+            return None
+        if phase is Phase.LIFT:
+            return self._picker
+        if phase is Phase.LEAVE_BACK:
+            return self._taker
+        if Phase.PRESENT <= phase <= Phase.HOLD_BACK:
+            return self._giver
+        if Phase.APPROACH <= phase <= Phase.HOLD:
+            return self.driver
+        return self.puller if Phase.LEAVE <= phase <= Phase.RAISE else None
+
+    @property
+    def _taker(self) -> Hand:
+        """The hand that takes the needle over next."""
+        if self.handing.pending or Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK:
+            return self._other(self.driver) if self.handing.left % 2 else self.driver
+        return self.puller
+
+    @property
+    def _giver(self) -> Hand:
+        """The hand that gives it."""
+        return self._other(self._taker)
+
+    def _other(self, hand: Hand) -> Hand:
+        return self.hands[hand is self.hands[0]]
+
+    @property
+    def _picker(self) -> Hand:
+        """The hand that picks it up."""
+        return self._giver if self.handing.pending else self.driver
+
+    def _assign(self, plan: WayOn) -> None:
+        """Let each hand do what a plan says."""
+        handing, handed = self.handing, plan.handed
+        handing.exchanged, handing.alone = plan.exchanged, plan.alone
+        handing.left = max(0, len(handed) - 1)
+        handing.pending = bool(handed) and plan.phase is Phase.HOVER
+        for i, each in enumerate(reversed(handed)):
+            handing.needles[i] = each.needle
+        if len(handed) > 1:
+            handing.between[:] = handed[-2].grip
+        if plan.pick is not None:
+            handing.pick[:] = plan.pick
