@@ -5,6 +5,7 @@ import yaml
 
 from hub.planning.scenario_file import installed_scenarios
 from schemas.ros import Header, Point, PointStamped, StringMessage
+from schemas.visualization import MarkerAction
 from tests.devices.ros.any_gateway import middleware, rclpy_python
 
 __all__ = ["middleware", "rclpy_python"]
@@ -46,7 +47,8 @@ class Surgeon:
         """Wait until the path is shown, and return the names of what is shown with it."""
         while True:
             markers = self.peer.heard(self.rows["/stitch/markers"], 60.0).markers
-            if "stitch/path" in (shown := {marker.ns for marker in markers}):
+            shown = {marker.ns for marker in markers if marker.action != MarkerAction.DELETE}
+            if "stitch/path" in shown:
                 return shown
 
 
