@@ -39,7 +39,7 @@ Queued = tuple[int, int, bytes]
 class ChunkData:
     """The records of one chunk, uncompressed, and the channel, time and offset of each message.
 
-    The arrays have the shape (messages,).
+    The arrays have the shape (messages,), in no order.
     """
 
     records: bytes
@@ -51,26 +51,26 @@ class ChunkData:
 def chunk_data(queued: Sequence[Queued], blocks: Sequence[VectorBlock] = ()) -> ChunkData:
     """Return what was queued, in this order, as the records of one chunk."""
     numbers, times, contents = zip(*queued, strict=True)
-    of_number: dict[int, list[int]] = {}
-    for place, number in enumerate(numbers):
-        of_number.setdefault(max(number, _ALONE), []).append(place)
     times_ns = np.array(times, np.int64)
-    heads, records = [b""] * len(queued), list[bytes](contents)
-    parts: list[_Part] = []
-    for number, places in of_number.items():
-        if number == _ALONE:
-            filled, made = heads, _headers([queued[place] for place in places])
-            channels, offsets = np.array([numbers[place] for place in places])[:, None], _AT_START
-        else:
-            block = blocks[number - FIRST_BLOCK]
-            filled, made = records, block.records(times_ns[places], [contents[place] for place in places])
-            channels, offsets = block.channels, block.offsets
-        for place, one in zip(places, made, strict=True):
-            filled[place] = one
-        parts.append((np.array(places), channels, offsets))
+    kinds: NDArray[np.int64] = np.maximum(numbers, _ALONE)
+    sizes = np.empty(len(queued), np.int64)
     pieces = [b""] * (2 * len(queued))  # not joined by twos: an image would be copied once more
-    pieces[0::2], pieces[1::2] = heads, records
-    sizes = np.fromiter(map(len, pieces), np.int64, len(pieces)).reshape(-1, 2).sum(axis=1)
+    pieces[1::2] = contents
+    parts: list[_Part] = []
+    kind: int
+    for kind in np.unique(kinds).tolist():
+        places = np.flatnonzero(kinds == kind)
+        at = places.tolist()
+        if kind == _ALONE:
+            made, sizes[places] = _headers([queued[place] for place in at])
+            channels, offsets, first = np.array([numbers[place] for place in at])[:, None], _AT_START, 0
+        else:
+            block = blocks[kind - FIRST_BLOCK]
+            made = block.records(times_ns[places], [contents[place] for place in at])
+            channels, offsets, first, sizes[places] = block.channels, block.offsets, 1, block.size
+        for place, one in zip(at, made, strict=True):
+            pieces[2 * place + first] = one
+        parts.append((places, channels, offsets))
     return _located(b"".join(pieces), sizes, times_ns, parts)
 
 
@@ -86,16 +86,16 @@ def _located(
         part = found[:, at:end].reshape(3, len(places), len(offsets))
         part[0], part[1], part[2] = channels, times_ns[places, None], starts[places, None] + offsets
         at = end
-    channels, times, offsets = found[:, found[2].argsort()]
-    return ChunkData(records, channels, times, offsets)
+    return ChunkData(records, *found)
 
 
-def _headers(queued: Sequence[Queued]) -> list[bytes]:
-    """Return what is in front of the payload of each message, which stands alone."""
+def _headers(queued: Sequence[Queued]) -> tuple[list[bytes], NDArray[np.int64]]:
+    """Return what is in front of the payload of each message, which stands alone, and the bytes of both."""
     channels, times, payloads = zip(*queued, strict=True)
+    sizes = np.fromiter(map(len, payloads), np.int64, len(payloads)) + MESSAGE.itemsize
     headers = np.zeros(len(payloads), MESSAGE)
     headers["opcode"] = Opcode.MESSAGE
-    headers["length"] = [len(payload) + (MESSAGE.itemsize - RECORD_HEADER_BYTES) for payload in payloads]
+    headers["length"] = sizes - RECORD_HEADER_BYTES
     headers["channel"] = channels
     headers["log_time"] = headers["publish_time"] = times
-    return headers.view(f"V{MESSAGE.itemsize}").tolist()
+    return headers.view(f"V{MESSAGE.itemsize}").tolist(), sizes

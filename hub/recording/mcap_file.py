@@ -43,6 +43,8 @@ _CHUNK = struct.Struct("<BQQQQII3sQ")
 """What is in front of a chunk's compressed records (https://mcap.dev/spec#chunk-op0x06)."""
 _COPIED_BYTES = 2**20
 """Of the chunks' indexes at once, when a file is finished."""
+_INDEX_BYTES = 2**16
+"""Of the chunks' indexes in memory: for each call of the system the recorder waits for the interpreter."""
 
 
 class McapFile:
@@ -64,6 +66,8 @@ class McapFile:
         # An hour has tens of thousands of chunks: their indexes wait for the summary on disk, not in memory.
         self._index: BinaryIO = TemporaryFile(dir=path.parent, buffering=0)  # noqa: SIM115 - closed in `close`
         self._index_size = 0
+        self._indexes: list[bytes] = []
+        """Those that are not in the file of indexes yet."""
         self._append(MCAP0_MAGIC + _bytes_of(Header("ros2", "trocar")))
 
     def attach(self, name: str, data: bytes) -> None:
@@ -89,16 +93,22 @@ class McapFile:
         head = _CHUNK.pack(Opcode.CHUNK, length, start, end, size, checksum, 3, b"lz4", len(compressed))
         index = message_index(data)
         record = chunk_index(data, index, self.size, len(head) + len(compressed), len(compressed))
-        self._index.seek(self._index_size)
-        _write(self._index, record)
-        # if this fails, the record is overwritten by the next one
+        if sum(map(len, self._indexes)) > _INDEX_BYTES:
+            self._put_indexes_aside()
         self._append(b"".join((head, compressed, index.records)))
-        self._index_size += len(record)
+        self._indexes.append(record)
         self._start_ns = min(self._start_ns, start) if self._chunks else start
         self._end_ns = max(self._end_ns, end)
         self._chunks += 1
         for channel, count in zip(index.channels.tolist(), index.counts.tolist(), strict=True):
             self._counts[channel] = self._counts.get(channel, 0) + count
+
+    def _put_indexes_aside(self) -> None:
+        records = b"".join(self._indexes)
+        self._index.seek(self._index_size)
+        _write(self._index, records)
+        self._index_size += len(records)
+        self._indexes.clear()
 
     @property
     def statistics(self) -> Statistics:
@@ -157,6 +167,7 @@ class McapFile:
                 raise OSError(errno.EIO, "the index of the chunks cannot be read back")
             left -= len(part)
             yield part
+        yield from self._indexes
 
     def close(self) -> None:
         """Close the file, finished or not."""

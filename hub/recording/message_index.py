@@ -38,7 +38,7 @@ class MessageIndex(NamedTuple):
 
 def message_index(data: ChunkData) -> MessageIndex:
     """Return the message index records of a chunk, one of each channel."""
-    order = np.argsort(data.channels, kind="stable")
+    order = np.lexsort((data.offsets, data.channels))
     entries = np.empty(len(order), _ENTRY)
     entries["time"], entries["offset"] = data.times_ns[order], data.offsets[order]
     counts = np.bincount(data.channels)

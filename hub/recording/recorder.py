@@ -29,11 +29,14 @@ from schemas.vectors import VectorCodec
 __all__ = ["Recorder", "RecorderSummary"]
 
 CHUNK_BYTES = 192 * 2**10
-"""A killed process loses about this much.
+"""A chunk is made when this much is there, so a killed process loses about this much.
 
 Vectors of many steps are laid out by a few calls of numpy, whatever their number: of a chunk of 64 KiB these
 calls were two fifths of the cost (docs/decisions/0061-fewer-calls.md).
 """
+
+MOST_CHUNK_BYTES = 256 * 2**10
+"""What was queued until the thread had its turn goes into the same chunk, up to this much."""
 
 CHUNK_AGE_S = 1.0
 """A chunk is written after this much wall time at the latest."""
@@ -181,7 +184,8 @@ class Recorder:
             self._wake.wait(CHUNK_AGE_S)
             self._wake.clear()
             with self._lock:
-                queue, self._queue, self._queued_bytes = self._queue, [], 0
+                queue, self._queue = self._queue, []
+                size, self._queued_bytes = self._queued_bytes, 0
                 channels = list(self._channels)
             if (
                 self._error is not None
@@ -191,21 +195,25 @@ class Recorder:
             written = 0
             try:
                 self._declare(channels)
-                for part in self._chunks(queue):
+                for part in self._chunks(queue, size):
                     self._file.add_chunk(chunk_data(part, self._blocks))
                     written += len(part)
             except Exception as error:  # noqa: BLE001 - whatever it is, the session goes on and the recording is marked
                 self._fail(error)
                 self._dropped += self._messages(queue[written:])
 
-    def _chunks(self, queue: Sequence[Queued]) -> Iterator[Sequence[Queued]]:
-        """Cut `queue` into parts of at most about `CHUNK_BYTES`, each with at least one message."""
+    def _chunks(self, queue: Sequence[Queued], queued_bytes: int) -> Iterator[Sequence[Queued]]:
+        """Cut `queue` into parts of at most `MOST_CHUNK_BYTES`, each with at least one message."""
+        if 0 < queued_bytes <= MOST_CHUNK_BYTES:
+            yield queue
+            return
         start, size = 0, 0
-        for end, one in enumerate(queue, 1):
-            size += self._size(one)
-            if size >= CHUNK_BYTES:
-                yield queue[start:end]
-                start, size = end, 0
+        for place, one in enumerate(queue):
+            more = self._size(one)
+            if size and size + more > MOST_CHUNK_BYTES:
+                yield queue[start:place]
+                start, size = place, 0
+            size += more
         if start < len(queue):
             yield queue[start:]
 
