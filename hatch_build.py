@@ -1,4 +1,4 @@
-"""Compiles robots/_kinematics.c into the wheel, or beside its source where the package is editable.
+"""Compiles the modules in C into the wheel, or beside their sources where the package is editable.
 
 Without a C compiler the wheel is one of pure Python: its results are the same to the bit, and it is slower.
 """
@@ -18,25 +18,32 @@ from setuptools.errors import BaseError, CCompilerError
 _FLAGS = [] if sys.platform == "win32" else ["-ffp-contract=off", "-fno-fast-math", "-fvisibility=hidden"]
 
 
-class CompileKinematics(BuildHookInterface[Any]):
+_EXTENSIONS = (
+    Extension(
+        "robots._kinematics",
+        ["robots/_kinematics.c", "robots/_closed_form.c"],
+        depends=["robots/_kinematics.h"],
+        include_dirs=[np.get_include()],
+        extra_compile_args=_FLAGS,
+    ),
+    Extension("hub.recording._chunk", ["hub/recording/_chunk.c"], extra_compile_args=_FLAGS),
+)
+
+
+class Compile(BuildHookInterface[Any]):
     """The step of the build that needs a compiler, and may fail."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
         """Compile, and add what came of it to the wheel."""
-        extension = Extension(
-            "robots._kinematics",
-            ["robots/_kinematics.c", "robots/_closed_form.c"],
-            depends=["robots/_kinematics.h"],
-            include_dirs=[np.get_include()],
-            extra_compile_args=_FLAGS,
-        )
-        command = build_ext(Distribution({"ext_modules": [extension]}))
-        command.inplace = True
-        command.ensure_finalized()
-        try:
-            command.run()
-        except (BaseError, CCompilerError) as error:
-            self.app.display_warning(f"robots/_kinematics.c is left out, its Python is slower: {error}")
-            return
-        build_data["artifacts"].append(command.get_ext_filename("robots._kinematics"))
-        build_data["pure_python"], build_data["infer_tag"] = False, True
+        for extension in _EXTENSIONS:
+            command = build_ext(Distribution({"ext_modules": [extension]}))
+            command.inplace = True
+            command.ensure_finalized()
+            try:
+                command.run()
+            except (BaseError, CCompilerError) as error:
+                self.app.display_warning(f"{extension.name} is left out, its Python is slower: {error}")
+                continue
+            name: str = command.get_ext_filename(extension.name)
+            build_data["artifacts"].append(name)
+            build_data["pure_python"], build_data["infer_tag"] = False, True

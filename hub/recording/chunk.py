@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from hub.recording.vector_block import MESSAGE, RECORD_HEADER_BYTES, VectorBlock
 
-__all__ = ["FIRST_BLOCK", "ChunkData", "Queued", "chunk_data"]
+try:
+    from hub.recording import _chunk as compiled
+except ImportError:  # there was no compiler: the same bytes, and a session waits longer for its recorder
+    compiled = None
+
+__all__ = ["FIRST_BLOCK", "ChunkData", "Queued", "chunk_data", "compiled"]
 
 FIRST_BLOCK = 2**16
 """Blocks have numbers from here on; a channel's has 16 bits."""
@@ -39,7 +44,7 @@ Queued = tuple[int, int, bytes]
 class ChunkData:
     """The records of one chunk, uncompressed, and the channel, time and offset of each message.
 
-    The arrays have the shape (messages,), in no order.
+    The arrays have the shape (messages,).
     """
 
     records: bytes
@@ -48,8 +53,18 @@ class ChunkData:
     offsets: NDArray[np.int64]
 
 
-def chunk_data(queued: Sequence[Queued], blocks: Sequence[VectorBlock] = ()) -> ChunkData:
-    """Return what was queued, in this order, as the records of one chunk."""
+def chunk_data(queued: list[Queued], blocks: Sequence[VectorBlock] = ()) -> ChunkData:
+    """Return what was queued, in this order, as the records of one chunk.
+
+    Raises ValueError if bytes are no vectors of their block.
+    """
+    if compiled is None:
+        return _by_numpy(queued, blocks)
+    records, places = compiled.lay_out(queued, [block.layout for block in blocks], FIRST_BLOCK)
+    return ChunkData(records, *np.frombuffer(places, np.int64).reshape(3, -1))
+
+
+def _by_numpy(queued: Sequence[Queued], blocks: Sequence[VectorBlock]) -> ChunkData:
     numbers, times, contents = zip(*queued, strict=True)
     times_ns = np.array(times, np.int64)
     kinds: NDArray[np.int64] = np.maximum(numbers, _ALONE)
@@ -86,7 +101,7 @@ def _located(
         part = found[:, at:end].reshape(3, len(places), len(offsets))
         part[0], part[1], part[2] = channels, times_ns[places, None], starts[places, None] + offsets
         at = end
-    return ChunkData(records, *found)
+    return ChunkData(records, *found[:, found[2].argsort()])
 
 
 def _headers(queued: Sequence[Queued]) -> tuple[list[bytes], NDArray[np.int64]]:

@@ -202,7 +202,7 @@ class Recorder:
                 self._fail(error)
                 self._dropped += self._messages(queue[written:])
 
-    def _chunks(self, queue: Sequence[Queued], queued_bytes: int) -> Iterator[Sequence[Queued]]:
+    def _chunks(self, queue: list[Queued], queued_bytes: int) -> Iterator[list[Queued]]:
         """Cut `queue` into parts of at most `MOST_CHUNK_BYTES`, each with at least one message."""
         if 0 < queued_bytes <= MOST_CHUNK_BYTES:
             yield queue

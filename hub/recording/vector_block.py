@@ -11,11 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from mcap.opcode import Opcode
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from schemas.vectors import VectorCodec
 
-__all__ = ["MESSAGE", "RECORD_HEADER_BYTES", "VectorBlock"]
+__all__ = ["MESSAGE", "RECORD_HEADER_BYTES", "Layout", "VectorBlock"]
 
 MESSAGE = np.dtype(
     [
@@ -33,6 +33,14 @@ RECORD_HEADER_BYTES = 9
 
 _TIME = np.dtype([("ns", "<u8"), ("sec", "<i4"), ("nanosec", "<u4")])
 """A time as MCAP has it, and as a stamp in CDR."""
+
+
+Layout = tuple[bytes, int, bytes, bytes, bytes, bytes]
+"""Records without times and numbers, the bytes of all vectors, and tables of i64.
+
+These are: where times are, where stamps are, parts of the vectors (place in the records, place in the
+vectors, bytes), and messages (channel, place).
+"""
 
 
 class VectorBlock:
@@ -57,6 +65,8 @@ class VectorBlock:
         """For each byte of the records, its place in template, vectors and time, one after the other."""
         self._rows = self._new_rows(0)
         """Template, vectors and time of each step, shape (steps, bytes); the template stays."""
+        self.layout = self._layout(vectors)
+        """The same for `_chunk.c`."""
 
     def _places(self, vectors: Sequence[tuple[int, VectorCodec]]) -> NDArray[np.intp]:
         places = np.arange(self.size)
@@ -71,6 +81,20 @@ class VectorBlock:
                 places[payload + begin : payload + end] = range(number + part.start, number + part.stop)
             number += 8 * codec.size
         return places
+
+    def _layout(self, vectors: Sequence[tuple[int, VectorCodec]]) -> Layout:
+        times: list[int] = []
+        stamps: list[int] = []
+        spans: list[tuple[int, int, int]] = []
+        number = 0
+        for start, (_, codec) in zip(self.offsets.tolist(), vectors, strict=True):
+            payload = start + MESSAGE.itemsize
+            times += payload - 16, payload - 8
+            stamps += [] if codec.stamp is None else [payload + codec.stamp.start]
+            spans += [(payload + begin, number + part.start, end - begin) for begin, end, part in codec.spans]
+            number += 8 * codec.size
+        messages = np.stack((self.channels, self.offsets), axis=1)
+        return self._template, number, _table(times), _table(stamps), _table(spans), _table(messages)
 
     def _new_rows(self, steps: int) -> NDArray[np.uint8]:
         rows = np.empty((steps, self._vectors.stop + _TIME.itemsize), np.uint8)
@@ -89,6 +113,10 @@ class VectorBlock:
         rows[:, self._vectors] = np.frombuffer(b"".join(vectors), np.uint8).reshape(steps, -1)
         rows[:, self._vectors.stop :] = times.view(np.uint8).reshape(steps, -1)
         return rows.take(self._sources, axis=1).view(f"V{self.size}").ravel().tolist()
+
+
+def _table(numbers: ArrayLike) -> bytes:
+    return np.array(numbers, np.int64).tobytes()
 
 
 def _header(channel: int, codec: VectorCodec) -> bytes:
