@@ -16,8 +16,6 @@ from setuptools.errors import BaseError, CCompilerError
 
 # A product and a sum that become one instruction are rounded once instead of twice. MSVC does not fuse them.
 _FLAGS = [] if sys.platform == "win32" else ["-ffp-contract=off", "-fno-fast-math", "-fvisibility=hidden"]
-
-
 _EXTENSIONS = (
     Extension(
         "robots._kinematics",

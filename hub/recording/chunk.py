@@ -1,4 +1,4 @@
-"""The messages of one chunk of an MCAP file, laid out by numpy.
+"""The messages of one chunk of an MCAP file, laid out by `_chunk.c` or, where it is missing, by numpy.
 
 The record types are those of the `mcap` package. Its `Writer` takes messages one by one, at two to three
 times the cost (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop.
@@ -56,7 +56,7 @@ class ChunkData:
 def chunk_data(queued: list[Queued], blocks: Sequence[VectorBlock] = ()) -> ChunkData:
     """Return what was queued, in this order, as the records of one chunk.
 
-    Raises ValueError if bytes are no vectors of their block.
+    Raises ValueError if bytes are no vectors of their block, and OverflowError for a negative time.
     """
     if compiled is None:
         return _by_numpy(queued, blocks)

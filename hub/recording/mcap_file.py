@@ -1,6 +1,6 @@
 """Writes MCAP files of ROS 2 messages, a whole chunk at a time, and the rosbag2 metadata beside them.
 
-The records are those of the `mcap` package; the many index entries of a chunk are made by numpy. Format:
+The records are those of the `mcap` package; the many index entries of a chunk are made together. Format:
 https://mcap.dev/spec; rosbag2 metadata version 9 as ROS 2 Jazzy writes it.
 """
 
@@ -66,7 +66,7 @@ class McapFile:
         # An hour has tens of thousands of chunks: their indexes wait for the summary on disk, not in memory.
         self._index: BinaryIO = TemporaryFile(dir=path.parent, buffering=0)  # noqa: SIM115 - closed in `close`
         self._index_size = 0
-        self._indexes: list[bytes] = []
+        self._indexes_in_memory: list[bytes] = []
         """Those that are not in the file of indexes yet."""
         self._append(MCAP0_MAGIC + _bytes_of(Header("ros2", "trocar")))
 
@@ -93,10 +93,10 @@ class McapFile:
         head = _CHUNK.pack(Opcode.CHUNK, length, start, end, size, checksum, 3, b"lz4", len(compressed))
         index = message_index(data)
         record = chunk_index(data, index, self.size, len(head) + len(compressed), len(compressed))
-        if sum(map(len, self._indexes)) > _INDEX_BYTES:
+        if sum(map(len, self._indexes_in_memory)) > _INDEX_BYTES:
             self._put_indexes_aside()
         self._append(b"".join((head, compressed, index.records)))
-        self._indexes.append(record)
+        self._indexes_in_memory.append(record)
         self._start_ns = min(self._start_ns, start) if self._chunks else start
         self._end_ns = max(self._end_ns, end)
         self._chunks += 1
@@ -104,11 +104,11 @@ class McapFile:
             self._counts[channel] = self._counts.get(channel, 0) + count
 
     def _put_indexes_aside(self) -> None:
-        records = b"".join(self._indexes)
+        records = b"".join(self._indexes_in_memory)
         self._index.seek(self._index_size)
         _write(self._index, records)
         self._index_size += len(records)
-        self._indexes.clear()
+        self._indexes_in_memory.clear()
 
     @property
     def statistics(self) -> Statistics:
@@ -167,7 +167,7 @@ class McapFile:
                 raise OSError(errno.EIO, "the index of the chunks cannot be read back")
             left -= len(part)
             yield part
-        yield from self._indexes
+        yield from self._indexes_in_memory
 
     def close(self) -> None:
         """Close the file, finished or not."""
