@@ -1,6 +1,6 @@
 """Where the messages of each channel are in a chunk, as records of an MCAP file.
 
-A session has up to two hundred channels, each with an index in every chunk: `_chunk.c` or numpy makes them together.
+A session has up to two hundred channels, each with an index in every chunk: they are made together.
 Format: https://mcap.dev/spec#message-index-op0x07, https://mcap.dev/spec#chunk-index-op0x08.
 """
 

@@ -35,6 +35,8 @@ _TIME = np.dtype([("ns", "<u8"), ("sec", "<i4"), ("nanosec", "<u4")])
 """A time as MCAP has it, and as a stamp in CDR."""
 
 
+_Span = tuple[int, int, int]
+"""Of a part of the vectors its place in the records, its place in the vectors, and its bytes."""
 Layout = tuple[bytes, int, bytes, bytes, bytes, bytes]
 """Records without times and numbers, the bytes of all vectors, and tables of i64.
 
@@ -61,31 +63,28 @@ class VectorBlock:
         """Bytes of the records of one step."""
         self._template = b"".join(_header(channel, codec) + codec.template for channel, codec in vectors)
         self._vectors = slice(self.size, self.size + sum(8 * codec.size for _, codec in vectors))
-        self._sources = self._places(vectors)
+        times, stamps, spans = self._tables(vectors)
+        self._sources = self._places(times, stamps, spans)
         """For each byte of the records, its place in template, vectors and time, one after the other."""
         self._rows = self._new_rows(0)
         """Template, vectors and time of each step, shape (steps, bytes); the template stays."""
-        self.layout = self._layout(vectors)
+        messages = np.stack((self.channels, self.offsets), axis=1)
+        size = self._vectors.stop - self._vectors.start
+        self.layout: Layout = (
+            self._template,
+            size,
+            _table(times),
+            _table(stamps),
+            _table(spans),
+            _table(messages),
+        )
         """The same for `_chunk.c`."""
 
-    def _places(self, vectors: Sequence[tuple[int, VectorCodec]]) -> NDArray[np.intp]:
-        places = np.arange(self.size)
-        number, time = self._vectors.start, self._vectors.stop
-        stamp = time + 8
-        for start, (_, codec) in zip(self.offsets.tolist(), vectors, strict=True):
-            payload = start + MESSAGE.itemsize
-            places[payload - 16 : payload] = 2 * [*range(time, time + 8)]
-            if codec.stamp is not None:
-                places[payload + codec.stamp.start : payload + codec.stamp.stop] = range(stamp, stamp + 8)
-            for begin, end, part in codec.spans:
-                places[payload + begin : payload + end] = range(number + part.start, number + part.stop)
-            number += 8 * codec.size
-        return places
-
-    def _layout(self, vectors: Sequence[tuple[int, VectorCodec]]) -> Layout:
+    def _tables(self, vectors: Sequence[tuple[int, VectorCodec]]) -> tuple[list[int], list[int], list[_Span]]:
+        """Return where times and stamps are in the records, and the parts of the vectors."""
         times: list[int] = []
         stamps: list[int] = []
-        spans: list[tuple[int, int, int]] = []
+        spans: list[_Span] = []
         number = 0
         for start, (_, codec) in zip(self.offsets.tolist(), vectors, strict=True):
             payload = start + MESSAGE.itemsize
@@ -93,8 +92,21 @@ class VectorBlock:
             stamps += [] if codec.stamp is None else [payload + codec.stamp.start]
             spans += [(payload + begin, number + part.start, end - begin) for begin, end, part in codec.spans]
             number += 8 * codec.size
-        messages = np.stack((self.channels, self.offsets), axis=1)
-        return self._template, number, _table(times), _table(stamps), _table(spans), _table(messages)
+        return times, stamps, spans
+
+    def _places(
+        self, times: Sequence[int], stamps: Sequence[int], spans: Sequence[_Span]
+    ) -> NDArray[np.intp]:
+        places = np.arange(self.size)
+        number, time = self._vectors.start, self._vectors.stop
+        stamp, end = time + 8, time + _TIME.itemsize
+        for at in times:
+            places[at : at + 8] = range(time, stamp)
+        for at in stamps:
+            places[at : at + 8] = range(stamp, end)
+        for at, part, size in spans:
+            places[at : at + size] = range(number + part, number + part + size)
+        return places
 
     def _new_rows(self, steps: int) -> NDArray[np.uint8]:
         rows = np.empty((steps, self._vectors.stop + _TIME.itemsize), np.uint8)
