@@ -1,9 +1,13 @@
-"""CDR codecs over `rosbags`: every message model to bytes and back, with .msg texts and RIHS01 hashes."""
+"""CDR codecs: every message model to bytes and back, with .msg texts and RIHS01 hashes.
+
+`rosbags` does it all; where there was a compiler, `_cdr.c` encodes: hundreds of messages in a second are
+encoded between two steps (docs/decisions/0104-messages-encoded-in-c.md).
+"""
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Literal, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from annotated_types import MaxLen
 from pydantic import ValidationError
@@ -12,12 +16,22 @@ from rosbags.typesys.store import Typestore
 
 from schemas import crtk, ros, trocar_msgs, visualization
 from schemas.errors import MessageError, did_you_mean
-from schemas.message import Message, msg_text
+from schemas.message import Message, field_types, msg_text
+
+try:
+    from schemas import _cdr as compiled
+except ImportError:  # there was no compiler: the same bytes, later
+    compiled = None
+
+if TYPE_CHECKING:
+    from schemas._cdr import Encoder
 
 __all__ = [
     "check_first_sequence",
+    "compiled",
     "decode",
     "encode",
+    "encode_as",
     "message_type",
     "message_types",
     "rihs01",
@@ -34,6 +48,22 @@ The largest plausible message, an uncompressed 1080p stereo image, has 12 MB.
 
 _PLAIN_CDR = (b"\x00\x00", b"\x00\x01")
 """The representation identifiers CDR_BE and CDR_LE of OMG DDSI-RTPS."""
+
+_KINDS = {
+    "bool": "?",
+    "byte": "b",
+    "uint8": "B",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+    "string": "s",
+}
+"""How `_cdr.c` calls them; `m` is a message."""
+_ONE, _SEQUENCE = -1, 0
+"""How it counts what is no array of fixed length."""
 
 M = TypeVar("M", bound=Message)
 
@@ -69,7 +99,41 @@ def typestore() -> Typestore:
 
 def encode(message: Message) -> bytes:
     """Return `message` as little-endian CDR with its encapsulation header."""
+    encoder = _encoder(type(message), lists=False)
+    encoded = None if encoder is None else encoder.encode(message)
+    return _by_rosbags(message) if encoded is None else encoded
+
+
+def encode_as(model: type[Message], values: object) -> bytes:
+    """Return the message of type `model` that has the attributes of `values`, in CDR.
+
+    Numbers may be in lists, and are not validated: it is for the step loop, which has made them. Raises
+    MessageError for values that such a message cannot have.
+    """
+    encoder = _encoder(model, lists=True)
+    encoded = None if encoder is None else encoder.encode(values)
+    return _by_rosbags(validated(model, values)) if encoded is None else encoded
+
+
+def _by_rosbags(message: Message) -> bytes:
     return bytes(typestore().serialize_cdr(message, message.ros_type))
+
+
+@cache
+def _encoder(model: type[Message], *, lists: bool) -> Encoder | None:
+    if compiled is None:
+        return None
+    fields = [(name, *_field(text, lists=lists)) for name, text in field_types(model).items()]
+    return compiled.Encoder(fields, lists=lists)
+
+
+def _field(text: str, *, lists: bool) -> tuple[str, int, Encoder | None]:
+    """Return kind, count and, of a message, encoder of a field, from its type as a .msg file has it."""
+    element, is_array, count = text.partition("[")
+    number = int(count[:-1] or _SEQUENCE) if is_array else _ONE
+    if element in _KINDS:
+        return _KINDS[element], number, None
+    return "m", number, _encoder(message_type(element.replace("/", "/msg/")), lists=lists)
 
 
 def decode(model: type[M], payload: bytes) -> M:

@@ -34,6 +34,7 @@ __all__ = [
     "UInt32Array",
     "UInt64",
     "UInt64Array",
+    "field_types",
     "fixed_float64",
     "msg_text",
 ]
@@ -128,7 +129,12 @@ class Message(BaseModel):
 
 def msg_text(model: type[Message]) -> str:
     """Return the .msg definition of `model`, one line a field, derived from its annotations."""
-    return "".join(f"{_field_type(model, name)} {name}\n" for name in model.model_fields)
+    return "".join(f"{ros_type} {name}\n" for name, ros_type in field_types(model).items())
+
+
+def field_types(model: type[Message]) -> dict[str, str]:
+    """Return the type of each field of `model` as a .msg file has it, such as `float64[]`, by name."""
+    return {name: _field_type(model, name) for name in model.model_fields}
 
 
 def _field_type(model: type[Message], name: str) -> str:

@@ -74,10 +74,8 @@ class Monitor:
         """The same, by participant and port: to make a key takes as long as to record a message."""
         self._channels: dict[str, int] = {}
         self._ack_channels: dict[str, int] = {}
-        self._acks: list[Queued] = []
-        """Acks that are not yet given to the recorder."""
-        self._values: list[Queued] = []
-        """Values of this process that are not yet given to the recorder; they follow the acks."""
+        self._unrecorded: list[Queued] = []
+        """What the step loop has passed on and the recorder does not have yet."""
         self._next_energy_ns = 0
         for planned in plan.participants.values():
             for port in planned.ports:
@@ -157,7 +155,7 @@ class Monitor:
 
         def receive(step: int, time_ns: int, data: bytes) -> None:
             if block is not None:
-                self._values.append((block, time_ns, data))
+                self._unrecorded.append((block, time_ns, data))
             for port, part in measured if step > INITIAL else ():
                 self.measures.take(planned.name, port, np.frombuffer(data[part]), time_ns)
 
@@ -168,25 +166,35 @@ class Monitor:
 
         It is called with step, time (ns) at which the value is valid, and value. None: nothing receives it.
         """
-        recorded, channel = self._recorder is not None, self._output(planned, port).channel
+        is_recorded = self._recorder is not None
         is_measured = (planned.name, port.name) in self.measures.by_port
-        last: Message | None = None
-        payload = b""
-
-        def record(time_ns: int, message: Message) -> None:
-            nonlocal last, payload
-            if message is not last:  # a signal that stays the same object is encoded once
-                last, payload = message, encode(message)
-            self._values.append((channel, time_ns, payload))
+        if not is_recorded and not is_measured:
+            return None
+        record = self._recording(self._output(planned, port).channel)
+        if port.variability == "signal" and not is_measured:
+            return record
 
         def receive(step: int, time_ns: int, value: Any) -> None:
             for message in value if port.variability == "event" else (value,):
                 if is_measured and step > INITIAL:
                     self.measures.take(planned.name, port.name, message, time_ns)
-                if recorded:
-                    record(time_ns, message)
+                if is_recorded:
+                    record(step, time_ns, message)
 
-        return receive if recorded or is_measured else None
+        return receive
+
+    def _recording(self, channel: int) -> Callable[[int, int, Message], None]:
+        """Return what records messages of a channel; one that stays the same object is encoded once."""
+        last: Message | None = None
+        payload = b""
+
+        def record(_: int, time_ns: int, message: Message) -> None:
+            nonlocal last, payload
+            if message is not last:
+                last, payload = message, encode(message)
+            self._unrecorded.append((channel, time_ns, payload))
+
+        return record
 
     def _output(self, planned: PlannedParticipant, port: Port) -> _Watched:
         return self._by_port[planned.name, port.name]
@@ -253,10 +261,12 @@ class Monitor:
         """Receive a grant and the device samples in it."""
         if self._recorder is None:
             return
-        time_ns, channel = grant.start_ns, self._channel(self._keys.grant, GrantMessage.ros_type)
-        inlets = [(self._by_port.get((one.participant, one.port)), one.payload) for one in grant.inlets]
-        entering = [(to.channel, time_ns, held.tobytes()) for to, held in inlets if to and held.size]
-        self._recorder.write_all([(channel, time_ns, payload), *entering])
+        time_ns = grant.start_ns
+        self._unrecorded.append((self._channel(self._keys.grant, GrantMessage.ros_type), time_ns, payload))
+        for one in grant.inlets:
+            watched, held = self._by_port.get((one.participant, one.port)), one.payload
+            if watched is not None and held.size:
+                self._unrecorded.append((watched.channel, time_ns, held.tobytes()))
 
     def ack(self, planned: PlannedParticipant, ack: Ack, time_ns: int, payload: bytes | None) -> None:
         """Receive an ack; `payload` are its bytes if it is from the wire."""
@@ -266,33 +276,32 @@ class Monitor:
             if channel is None:  # declared by the first ack: channels have the order of their first message
                 channel = self._channel(self._keys.ack(planned.name), AckMessage.ros_type)
                 self._ack_channels[planned.name] = channel
-            self._acks.append((channel, time_ns, pack_ack(ack) if payload is None else payload))
+            self._unrecorded.append((channel, time_ns, pack_ack(ack) if payload is None else payload))
 
-    def flush(self) -> None:
-        """Give the recorder the acks and values so far."""
-        if self._recorder is not None and (self._acks or self._values):
-            self._recorder.write_all([*self._acks, *self._values])
-            self._acks.clear()
-            self._values.clear()
+    def record(self, least: int = 1) -> None:
+        """Give the recorder what the step loop has passed on, if these are at least `least` messages."""
+        if self._recorder is not None and len(self._unrecorded) >= least:
+            self._recorder.write_all(self._unrecorded)
+            self._unrecorded.clear()
 
     def books(self, time_ns: int) -> dict[str, bytes]:
-        """Return the energy book of each bond, in CDR, and record them; empty unless they are due."""
+        """Return the energy book of each bond, in CDR, to be recorded; empty unless they are due."""
         if time_ns < self._next_energy_ns:
             return {}
         self._next_energy_ns = time_ns + _ENERGY_PERIOD_NS
-        books = {message.bond: encode(message) for message in self.energy.messages(time_ns)}
+        books = self.energy.encoded(time_ns)
         if self._recorder is not None:
             for bond, payload in books.items():
                 channel = self._channel(self._keys.energy(bond), CouplingEnergy.ros_type)
-                self._recorder.write(channel, time_ns, payload)
+                self._unrecorded.append((channel, time_ns, payload))
         return books
 
     def status(self, status: SessionStatus) -> None:
-        """Record a status of the session."""
+        """Record a status of the session, and all before it."""
         if self._recorder is not None:
-            self._recorder.write(
-                self._channel(self._keys.status, status.ros_type), status.sim_time_ns, encode(status)
-            )
+            channel = self._channel(self._keys.status, status.ros_type)
+            self._unrecorded.append((channel, status.sim_time_ns, encode(status)))
+            self.record()
 
     def profile(self, profile: Profile) -> None:
         """Record a profile of the session."""

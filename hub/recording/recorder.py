@@ -126,7 +126,7 @@ class Recorder:
 
     def write_all(self, queued: Sequence[Queued]) -> None:
         """Queue messages and vectors, all or none of them, as `write` does one."""
-        size = sum(map(self._size, queued))
+        size = sum(self._sizes(queued))
         with self._lock:
             before = self._queued_bytes
             if self._refusing or before > MAX_QUEUED_BYTES or len(self._queue) >= MAX_QUEUED_MESSAGES:
@@ -137,12 +137,13 @@ class Recorder:
         if before < CHUNK_BYTES <= after:
             self._wake.set()
 
-    def _size(self, one: Queued) -> int:
-        """Return the bytes of what was queued, as records."""
-        number, _, content = one
-        if number < FIRST_BLOCK:
-            return MESSAGE_HEADER_BYTES + len(content)
-        return self._blocks[number - FIRST_BLOCK].size
+    def _sizes(self, queued: Iterable[Queued]) -> list[int]:
+        """Return the bytes of each of what was queued, as records."""
+        blocks = self._blocks
+        return [
+            MESSAGE_HEADER_BYTES + len(content) if number < FIRST_BLOCK else blocks[number - FIRST_BLOCK].size
+            for number, _, content in queued
+        ]
 
     def _messages(self, queued: Iterable[Queued]) -> int:
         """Return the number of messages."""
@@ -208,8 +209,7 @@ class Recorder:
             yield queue
             return
         start, size = 0, 0
-        for place, one in enumerate(queue):
-            more = self._size(one)
+        for place, more in enumerate(self._sizes(queue)):
             if size and size + more > MOST_CHUNK_BYTES:
                 yield queue[start:place]
                 start, size = place, 0

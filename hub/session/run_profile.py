@@ -78,7 +78,7 @@ class RunProfile:
         """Time participants, values that arrive, and the recording; before a Host is made of them."""
         self.process.prepare(stepped, wire)
         recording = self.process.watch.phase("recording", "recorder")
-        for method in (self._monitor.grant, self._monitor.flush, self._monitor.status):
+        for method in (self._monitor.grant, self._monitor.record, self._monitor.status):
             self.process.watch.time(method, recording)
         for method in (self._monitor.listener, self._monitor.vectors_listener):
             self.process.watch.time_returned(method, recording)

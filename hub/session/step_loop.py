@@ -22,6 +22,9 @@ log = logging.getLogger(__name__)
 
 _PROGRESS_S = 0.1
 _STATUS_S = 0.5
+"""Everything so far goes to the recorder with a status."""
+_RECORDED_TOGETHER = 64
+"""Or as soon as it is so much: a call of the recorder costs as much as some ten messages."""
 _VALUES_S = 5.0
 """How long values of the last steps may take that come over Zenoh, when the acks have arrived."""
 
@@ -208,7 +211,7 @@ class StepLoop:
             if self._on_ack is not None:
                 self._on_ack(planned, ack)
         self._unbooked.clear()
-        monitor.flush()
         if self._run.recorded or any(publisher.needed for publisher in self._energy.values()):
             for bond, payload in monitor.books(self._run.clock.time_ns).items():
                 self._energy[bond].put(payload)
+        monitor.record(_RECORDED_TOGETHER)

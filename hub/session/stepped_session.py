@@ -165,8 +165,8 @@ class SteppedSession:
         self._host.run(grant, self._book)
         self.step += count
         if self._monitor is not None:
-            self._monitor.flush()
             self._monitor.books(self.time_ns)
+            self._monitor.record()
 
     def _book(self, planned: PlannedParticipant, ack: Ack) -> None:
         self._digests.take(planned.name, ack.state_hash)

@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 from hub.observation.energy import EnergyBooks
 from hub.participant import BondPlan, ForceSide, Inputs, MotionSide
 from hub.planning.plan import Plan, PlannedBond
+from schemas.codec import decode
 from schemas.lockstep import Ack
 from schemas.ports import BondSide
 from schemas.scenario import Bond
+from schemas.trocar_msgs import CouplingEnergy
 from tests.strategies import vectors
 
 K = 80.0
@@ -133,12 +135,13 @@ def test_the_books_take_the_columns_of_each_participant_in_declared_order():
     books.take("other", Ack(0, 0, 0, [1], [1], [1.75]))
     books.take("camera", Ack(0, 0, 0, [1], [1], []))
     assert books.residual_j == pytest.approx(0.5 - 0.25)
-    left, right = books.messages(7)
+    left, right = (decode(CouplingEnergy, book) for book in books.encoded(7_000_000_009).values())
+    assert list(books.encoded(0)) == [left.bond, right.bond]
     assert (left.bond, left.motion_work_j, left.force_work_j, left.residual_j, left.header.stamp.ns) == (
         "robot/left",
         1.0,
         1.5,
         0.5,
-        7,
+        7_000_000_009,
     )
     assert (right.bond, right.residual_j) == ("robot/right", -0.25)
