@@ -130,10 +130,14 @@ class SessionDevices:
 
     def _take(self, device: str, sample: Sample, arrival_ns: int, stamp: Stamp) -> None:
         source = device, sample.port
-        if source not in self._connected and not self._monitor.watches(*source):
+        enters = source in self._connected
+        if not enters and not self._monitor.watches(*source):
             return
+        payload = sample.encode()
         try:
-            self._offer(*source, sample.encode(), arrival_ns, stamp)
+            if enters:
+                self.inlets.offer(*source, payload, arrival_ns, stamp)
+            self._monitor.device_here(device, sample, self._time_ns, payload, enters=enters)
         except LateError as error:
             self._refusals.refuse(f"{device}.{sample.port}", error)
 

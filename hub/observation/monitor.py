@@ -16,6 +16,7 @@ import zenoh
 
 from hub.observation.energy import EnergyBooks
 from hub.observation.measures import Measures
+from hub.participant import Sample, VectorSample
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.chunk import Queued
 from hub.recording.recorder import Recorder
@@ -244,9 +245,10 @@ class Monitor:
         return self._recorder is not None or (participant, port) in self.measures.by_port
 
     def device(self, device: str, port: str, time_ns: int, payload: bytes, *, enters: bool) -> None:
-        """Receive a message of a device; one that enters the simulation is recorded with its grant.
+        """Receive a message of a device from the wire.
 
-        Raises MessageError if it is no message of the port.
+        One that enters the simulation is recorded with its grant. Raises MessageError if it is no message of
+        the port.
         """
         watched = self._by_port[device, port]
         measured = (device, port) in self.measures.by_port
@@ -256,6 +258,21 @@ class Monitor:
                 self.measures.take(device, port, value, time_ns)
         if self._recorder is not None and not enters:
             self._recorder.write(watched.channel, time_ns, payload)
+
+    def device_here(self, device: str, sample: Sample, time_ns: int, payload: bytes, *, enters: bool) -> None:
+        """Receive a sample of a device in this process, and its bytes, in the thread of the step loop.
+
+        Otherwise it is as `device`.
+        """
+        watched = self._by_port[device, sample.port]
+        measured = (device, sample.port) in self.measures.by_port
+        checked = isinstance(sample, VectorSample) and sample.is_of(watched.codec.vector)
+        if measured or not (enters or checked):
+            value = watched.codec.accept(payload)
+            if measured:
+                self.measures.take(device, sample.port, value, time_ns)
+        if self._recorder is not None and not enters:
+            self._unrecorded.append((watched.channel, time_ns, payload))
 
     def grant(self, grant: Grant, payload: bytes) -> None:
         """Receive a grant and the device samples in it."""

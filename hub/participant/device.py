@@ -61,6 +61,10 @@ class VectorSample(Sample):
         made = vars(self)["message"] = self._codec.to_message(self._value, self._time_ns)
         return made
 
+    def is_of(self, codec: VectorCodec | None) -> bool:
+        """Return whether it has the type, frame and names of the codec's port: its bytes need no check."""
+        return codec is not None and self._codec.template == codec.template
+
     def encode(self) -> bytes:
         """Return the message as CDR."""
         return self._codec.encode(self._value, self._time_ns)
