@@ -40,10 +40,12 @@ def test_the_program_of_the_documentation_moves_an_arm(rclpy_python, domain, tmp
         finally:
             session.state.shutdown()
 
+    programs = []
     with ThreadPoolExecutor(1) as pool:
-        ran = pool.submit(program)
-        session.run()
-    assert ran.result().returncode == 0, ran.result().stderr
-    there, back = ran.result().stdout.splitlines()
+        # it waits 20 s for an arm, of which the start of a session is not to take a part
+        session.run(lambda _: programs or programs.append(pool.submit(program)))
+    ran = programs[0].result()
+    assert ran.returncode == 0, ran.stderr
+    there, back = ran.stdout.splitlines()
     assert there.startswith("at [-0.20")
     assert back.startswith(("at [0.00", "at [-0.00"))
