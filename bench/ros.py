@@ -2,12 +2,13 @@
 
 Also moves and homing in long repetition.
 
-python -m bench.ros ros2-zenoh|ros2-dds|ros1 [bare session face live servo moves cycles] [--output FILE]
+python -m bench.ros ros2-zenoh|ros2-dds|ros1 [bare session face live vrep servo moves cycles] [--output FILE]
 
 `bare`: a gateway alone in a process, told joint states of two PSMs and the ECM and stereo pictures of 320 x
 288 at 60 Hz; `session`: the same in a session of motion controller and MuJoCo, H = 2 ms, in real time. The
 pictures are noise that nobody draws: what is measured is the gateway. `live`: the scenario `ros` as it is
-shipped, with its endoscope; the console listens to the joint states of all arms and to both pictures.
+shipped, with its endoscope; the console listens to the joint states of all arms and to both pictures. `vrep`:
+`ros-vrep` likewise, with its joint states at 220 Hz.
 `servo`: from a `servo_jp` to the joint; `moves`, `cycles`: `move_jp(...).wait()`, and unhome, disable,
 enable, home. The console is always a
 process of its own, and its ages are from stamp to receipt (one machine, one clock). Times depend on the
@@ -64,6 +65,17 @@ LIVE = [
     for name in (*STATES, "PSM3/measured_js", "PSM3/jaw/measured_js")
 ] + LISTENED[len(STATES) :]
 """What the console of `live` listens to."""
+VREP = [
+    [f"/dvrk/{name}", "sensor_msgs/msg/JointState"]
+    for name in (
+        "PSM1/state_joint_current",
+        "PSM1/state_jaw_current",
+        "PSM2/state_joint_current",
+        "PSM2/state_jaw_current",
+        "ECM/state_joint_current",
+    )
+] + [[f"/stereo/{eye}/image_raw", "sensor_msgs/msg/Image"] for eye in ("left", "right")]
+"""What the console of `vrep` listens to."""
 
 SCENARIO: dict[str, Any] = {
     "name": "ros_figures",
@@ -254,12 +266,14 @@ def session(kind: str, place: Place, seconds: float, *, everything: bool = False
     return result
 
 
-def live(kind: str, place: Place, seconds: float) -> dict[str, Any]:
-    """Measure the scenario `ros` as it is shipped, with its cameras."""
+def live(
+    kind: str, place: Place, seconds: float, *, scenario: str = "ros", topics: list[list[str]] = LIVE
+) -> dict[str, Any]:
+    """Measure a scenario as it is shipped, with its cameras."""
     changes = {"kind": kind, **place.params}
     overrides = [f"participants.ros.{name}={value}" for name, value in changes.items()]
-    task = {"topics": LIVE, "seconds": seconds}
-    return _with_console(launch(load("ros", overrides), endpoint=ENDPOINT), kind, place, "listen", task)
+    task = {"topics": topics, "seconds": seconds}
+    return _with_console(launch(load(scenario, overrides), endpoint=ENDPOINT), kind, place, "listen", task)
 
 
 def servo(kind: str, place: Place, count: int) -> dict[str, Any]:
@@ -295,6 +309,7 @@ def main() -> None:
         "session": lambda kind, place, a: session(kind, place, a.seconds),
         "face": lambda kind, place, a: session(kind, place, a.seconds, everything=True),
         "live": lambda kind, place, a: live(kind, place, a.seconds),
+        "vrep": lambda kind, place, a: live(kind, place, a.seconds, scenario="ros-vrep", topics=VREP),
         "servo": lambda kind, place, a: servo(kind, place, a.pulses),
         "moves": lambda kind, place, a: endless(kind, place, "moves", a.moves),
         "cycles": lambda kind, place, a: endless(kind, place, "cycles", a.cycles),
