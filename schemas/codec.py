@@ -20,7 +20,7 @@ from schemas.message import Message, field_types, msg_text
 
 try:
     from schemas import _cdr as compiled
-except ImportError:  # there was no compiler: the same bytes, later
+except ImportError:  # there was no compiler: the same bytes, more slowly
     compiled = None
 
 if TYPE_CHECKING:
