@@ -7,10 +7,9 @@ python -m bench.ros ros2-zenoh|ros2-dds|ros1 [bare session face live vrep servo 
 `bare`: a gateway alone in a process, told joint states of two PSMs and the ECM and stereo pictures of 320 x
 288 at 60 Hz; `session`: the same in a session of motion controller and MuJoCo, H = 2 ms, in real time. The
 pictures are noise that nobody draws: what is measured is the gateway. `live`: the scenario `ros` as it is
-shipped, with its endoscope; the console listens to the joint states of all arms and to both pictures. `vrep`:
-`ros-vrep` likewise, with its joint states at 220 Hz.
-`servo`: from a `servo_jp` to the joint; `moves`, `cycles`: `move_jp(...).wait()`, and unhome, disable,
-enable, home. The console is always a
+shipped, with its endoscope; the console listens to the joint states of all arms and to both pictures.
+`vrep`: `ros-vrep` likewise, with its joint states at 220 Hz. `servo`: from a `servo_jp` to the joint;
+`moves`, `cycles`: `move_jp(...).wait()`, and unhome, disable, enable, home. The console is always a
 process of its own, and its ages are from stamp to receipt (one machine, one clock). Times depend on the
 machine and on who else uses it: its load stands beside.
 """

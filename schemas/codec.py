@@ -1,7 +1,7 @@
 """CDR codecs: every message model to bytes and back, with .msg texts and RIHS01 hashes.
 
-`rosbags` does it all; where there was a compiler, `_cdr.c` encodes: hundreds of messages in a second are
-encoded between two steps (docs/decisions/0104-messages-encoded-in-c.md).
+`rosbags` does it all; where there was a compiler, `_cdr.c` encodes: a session encodes thousands of messages
+a second between its steps (docs/decisions/0104-messages-encoded-in-c.md).
 """
 
 from __future__ import annotations

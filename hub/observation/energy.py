@@ -6,45 +6,40 @@ the energy that the coupling created or lost.
 
 from __future__ import annotations
 
-import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from hub.planning.plan import Plan, PlannedBond
-from schemas.codec import encode
+from hub.planning.plan import Plan
+from schemas.codec import encode_as
 from schemas.lockstep import Ack
-from schemas.ros import Header
+from schemas.ros import Header, Time
 from schemas.trocar_msgs import CouplingEnergy
 
 __all__ = ["EnergyBooks"]
 
 
-_STAMP, _WORKS = struct.Struct("<iI"), struct.Struct("<ddd")
-"""What changes in the CDR of a `CouplingEnergy`: its first field and its last ones."""
-_CDR_HEADER_BYTES = 4
-
-
 @dataclass
 class _Book:
+    """The attributes of a `CouplingEnergy`."""
+
     bond: str
-    template: bytes
-    """A book in CDR."""
-    motion_j: float = 0.0
-    force_j: float = 0.0
+    header: Header = field(default_factory=Header)
+    motion_work_j: float = 0.0
+    force_work_j: float = 0.0
 
     @property
     def residual_j(self) -> float:
-        return self.force_j - self.motion_j
+        return self.force_work_j - self.motion_work_j
 
 
 class EnergyBooks:
     """The books of all bonds of a session, kept from the acks."""
 
     def __init__(self, plan: Plan) -> None:
-        self._books = [_book(planned) for planned in plan.bonds]
+        self._books = [_Book(planned.bond.name) for planned in plan.bonds]
         self._rows: dict[str, list[tuple[_Book, str]]] = {}
         for book, bond in zip(self._books, (planned.bond for planned in plan.bonds), strict=True):
-            self._rows.setdefault(bond.motion.participant, []).append((book, "motion_j"))
-            self._rows.setdefault(bond.force.participant, []).append((book, "force_j"))
+            self._rows.setdefault(bond.motion.participant, []).append((book, "motion_work_j"))
+            self._rows.setdefault(bond.force.participant, []).append((book, "force_work_j"))
 
     def take(self, participant: str, ack: Ack) -> None:
         """Book the work (J since the start) that a participant states in the last step of its ack."""
@@ -60,18 +55,7 @@ class EnergyBooks:
 
     def encoded(self, time_ns: int) -> dict[str, bytes]:
         """Return the book of each bond, a `CouplingEnergy` in CDR."""
-        stamp = divmod(time_ns, 10**9)
-        return {book.bond: _encoded(book, stamp) for book in self._books}
-
-
-def _book(planned: PlannedBond) -> _Book:
-    name = planned.bond.name
-    empty = CouplingEnergy(header=Header(), bond=name, motion_work_j=0.0, force_work_j=0.0, residual_j=0.0)
-    return _Book(name, encode(empty))
-
-
-def _encoded(book: _Book, stamp: tuple[int, int]) -> bytes:
-    encoded = bytearray(book.template)
-    _STAMP.pack_into(encoded, _CDR_HEADER_BYTES, *stamp)
-    _WORKS.pack_into(encoded, len(encoded) - _WORKS.size, book.motion_j, book.force_j, book.residual_j)
-    return bytes(encoded)
+        header = Header(stamp=Time.from_ns(time_ns))
+        for book in self._books:
+            book.header = header
+        return {book.bond: encode_as(CouplingEnergy, book) for book in self._books}

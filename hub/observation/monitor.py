@@ -250,12 +250,7 @@ class Monitor:
         One that enters the simulation is recorded with its grant. Raises MessageError if it is no message of
         the port.
         """
-        watched = self._by_port[device, port]
-        measured = (device, port) in self.measures.by_port
-        if measured or not enters:
-            value = watched.codec.accept(payload)
-            if measured:
-                self.measures.take(device, port, value, time_ns)
+        watched = self._measure(device, port, time_ns, payload, checked=enters)
         if self._recorder is not None and not enters:
             self._recorder.write(watched.channel, time_ns, payload)
 
@@ -264,15 +259,21 @@ class Monitor:
 
         Otherwise it is as `device`.
         """
-        watched = self._by_port[device, sample.port]
-        measured = (device, sample.port) in self.measures.by_port
-        checked = isinstance(sample, VectorSample) and sample.is_of(watched.codec.vector)
-        if measured or not (enters or checked):
-            value = watched.codec.accept(payload)
-            if measured:
-                self.measures.take(device, sample.port, value, time_ns)
+        codec = self._by_port[device, sample.port].codec
+        checked = enters or (isinstance(sample, VectorSample) and sample.is_of(codec.vector))
+        watched = self._measure(device, sample.port, time_ns, payload, checked=checked)
         if self._recorder is not None and not enters:
             self._unrecorded.append((watched.channel, time_ns, payload))
+
+    def _measure(self, device: str, port: str, time_ns: int, payload: bytes, *, checked: bool) -> _Watched:
+        """Measure a message of a device; raise MessageError if it is not `checked` and none of the port."""
+        watched = self._by_port[device, port]
+        measured = (device, port) in self.measures.by_port
+        if measured or not checked:
+            value = watched.codec.accept(payload)
+            if measured:
+                self.measures.take(device, port, value, time_ns)
+        return watched
 
     def grant(self, grant: Grant, payload: bytes) -> None:
         """Receive a grant and the device samples in it."""
