@@ -27,7 +27,9 @@ PACKAGES = (
     *("configs", "controllers", "devices", "engines", "hub", "learning", "robots", "schemas", "tasks"),
     *("trocar", "webconsole"),
 )
-REFERRING = frozenset("what which that who whose those one ones it its they them other".split())
+REFERRING = frozenset(
+    {*("what", "which", "that", "who", "whose", "those", "one", "ones", "it", "its", "they", "them", "other")}
+)
 MAX_REFERRING = 0.035
 PREPOSITIONS = ("Of", "By", "From", "As", "Between", "In")
 MAX_ONE_WORD = 0.45
