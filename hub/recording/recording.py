@@ -47,10 +47,12 @@ class Recording(Bag):
     """The recording of one session, read from a rosbag2 directory or an MCAP file.
 
     Examples:
+        ```python
         recording = Recording("recordings/palpation")
-        recording.ports                                          # what there is
-        recording["robot.PSM1/measured_js"]["position"]          # (n, 6), rad and m
-        recording["tissue.probe/wrench"].to_frame().plot()       # with pandas
+        recording.ports  # names and types
+        recording["robot.PSM1/measured_js"]["position"]  # (n, 6), rad and m
+        recording["tissue.probe/wrench"].to_frame().plot()  # with pandas
+        ```
     """
 
     @cached_property
