@@ -17,6 +17,7 @@ Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `recover` f
                   short; `write_bag` for samples to play
 Participants      `Stepped`, `Controller`, `Device`, `Params`, `Setup`, `Port`, `Inputs`, `Outputs`,
                   `Sample`, `Value`, `state_hash`, `restore_arrays`
+Ports             `signal_in`, `signal_out`, `event_in`, `event_out`: each returns a `Port`
 Power bonds       `BondSide`, `BondPlan`, `ForceSide`, `MotionSide`
 Conformance       `check_engine`, `check_device`
 Kinematics        `chain`, `inverse`
@@ -45,7 +46,11 @@ if TYPE_CHECKING:
         Setup,
         Stepped,
         Value,
+        event_in,
+        event_out,
         restore_arrays,
+        signal_in,
+        signal_out,
         state_hash,
     )
     from hub.recording.recording import Recording
@@ -85,6 +90,8 @@ __all__ = [
     "chain",
     "check_device",
     "check_engine",
+    "event_in",
+    "event_out",
     "fork",
     "inverse",
     "load_scenario",
@@ -92,6 +99,8 @@ __all__ = [
     "restore_arrays",
     "run",
     "run_in_process",
+    "signal_in",
+    "signal_out",
     "state_hash",
     "verify",
     "write_bag",
@@ -112,7 +121,11 @@ _MODULES = {
         "Setup",
         "Stepped",
         "Value",
+        "event_in",
+        "event_out",
         "restore_arrays",
+        "signal_in",
+        "signal_out",
         "state_hash",
     ),
     "hub.recording.ros_bag_writer": ("write_bag",),
