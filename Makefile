@@ -2,22 +2,24 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 RECORDING := recordings/palpation-$(shell date +%Y%m%d-%H%M%S)
+# Tests by what they need: markers in pyproject.toml. Three processes on two cores, as a third of the time they wait.
+NEEDS := ros or browser or release or search
+PYTEST := pytest -n 3 --dist loadgroup
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: demo test check docs format clean
+.PHONY: demo test test-all check docs format clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.all ## run the palpation scenario, record it and write a report
 	trocar run palpation --record $(RECORDING)
 	trocar report $(RECORDING) -o $(RECORDING).html
 
-test: check ## everything that must hold before a change is merged; tests/docs builds the documentation
-	@# three on two cores, as a third of the time they wait; then those that take all cores, one after the other;
-	@# one whose patience ends beside the others must pass by itself (exit code 1: all tests were run)
-	pytest -n 3 --dist loadgroup -m "not alone"; others=$$?; [ $$others -le 1 ] && \
-	{ pytest -m alone; alone=$$?; [ $$alone -le 1 ]; } && \
-	{ [ $$others$$alone = 00 ] || \
-	{ python tests/failed_tests.py > .pytest_cache/failed && pytest @.pytest_cache/failed; }; }
+test: check ## the behaviour of the code: tests that need Python, a C compiler and two cores, and nothing else
+	$(PYTEST) -m "not ($(NEEDS)) and not alone"
+
+test-all: test ## everything: also tests with ROS, a browser, fresh environments, long searches, all cores
+	$(PYTEST) -m "($(NEEDS)) and not (alone or browser)"
+	pytest -m "alone or browser"
 
 docs: $(VENV)/.dev ## the documentation, in build/site
 	NO_MKDOCS_2_WARNING=1 mkdocs build --strict

@@ -1,11 +1,10 @@
-"""Settings of all tests: Hypothesis draws the same examples every time, and no test depends on how long it
-takes; numpy computes as in the hosts; a run that ends with one of its workers has an exit code of its own.
+"""Settings of all tests: Hypothesis draws the same examples every time, and no test depends on its duration;
+numpy computes as in the hosts; markers follow from fixtures.
 """
 
 from __future__ import annotations
 
 import os
-from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -13,22 +12,22 @@ from hypothesis import HealthCheck, settings
 from hub.hosting.numerics import pin_numerics
 
 pin_numerics(os.environ)  # before any test imports numpy: a process with other kernels has other hashes
-settings.register_profile(
-    "trocar", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
-settings.load_profile("trocar")
+for _name, _examples in (("local", 20), ("ci", 100)):
+    settings.register_profile(
+        _name,
+        max_examples=_examples,
+        derandomize=True,
+        deadline=None,
+        suppress_health_check=[HealthCheck.too_slow],
+    )
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "local"))
 
-WORKER_DIED = 6
-"""Exit code, behind those of pytest: tests were left out, so it is no use to repeat those that failed."""
-
-_died = pytest.StashKey[bool]()
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_testnodedown(node: Any, error: object | None) -> None:
-    node.config.stash[_died] = node.config.stash.get(_died, False) or error is not None
+MARKERS = {"browser": "browser", "rclpy_python": "ros"}
+"""Markers of the tests that use a fixture, by the fixture's name."""
 
 
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    if session.config.stash.get(_died, False):
-        session.exitstatus = WORKER_DIED
+@pytest.hookimpl(tryfirst=True)  # before pytest deselects by markers
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        for fixture in MARKERS.keys() & set(getattr(item, "fixturenames", ())):
+            item.add_marker(MARKERS[fixture])

@@ -10,7 +10,10 @@ import pytest
 
 from hub.planning.registry import kinds
 
-pytestmark = pytest.mark.xdist_group("site")  # its fixtures are expensive: made once, in one process
+pytestmark = [
+    pytest.mark.release,
+    pytest.mark.xdist_group("site"),  # its fixtures are expensive: made once, in one process
+]
 
 pytest.importorskip("mkdocs")
 ROOT = Path(__file__).parents[2]

@@ -10,7 +10,10 @@ import pytest
 
 from tests.wheel.environments import install, succeed, with_our_packages
 
-pytestmark = pytest.mark.xdist_group("examples")  # its fixtures are expensive: made once, in one process
+pytestmark = [
+    pytest.mark.release,
+    pytest.mark.xdist_group("examples"),  # its fixtures are expensive: made once, in one process
+]
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PACKAGES = sorted(file.parent for file in EXAMPLES.glob("*/pyproject.toml"))

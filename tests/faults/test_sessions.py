@@ -12,6 +12,7 @@ CASES = {
 }
 
 
+@pytest.mark.search
 @pytest.mark.skipif(sys.platform != "linux", reason="it looks for what is left in /proc")
 def test_a_session_of_which_a_part_is_killed_ends_as_it_should():
     done = subprocess.run(

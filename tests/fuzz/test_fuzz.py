@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the inputs are tried in forked processes")
+pytestmark = [
+    pytest.mark.search,
+    pytest.mark.skipif(sys.platform != "linux", reason="the inputs are tried in forked processes"),
+]
 
 
 @pytest.mark.parametrize(

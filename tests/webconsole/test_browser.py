@@ -21,8 +21,6 @@ from webconsole.listening import on_loopback
 from webconsole.live import Live
 from webconsole.recorded import Recorded
 
-pytestmark = pytest.mark.alone
-
 TIP = "trocar.scene.tips[0].axes.parent.position.toArray()"
 GAMEPAD = """
 let pressed = 0

@@ -40,7 +40,6 @@ def test_what_cannot_be_picked_is_refused(participant, picture, why):
         guiding(participant, Pick(do="pick", picture=picture, x=0.0, y=0.0))
 
 
-@pytest.mark.alone
 def test_a_stitch_is_clicked_in_a_picture_and_consented_to(browser, tmp_path):
     with running(tmp_path, "suturing-by-hand") as (_, invite):
         person = Person(browser, invite("operator"))

@@ -10,8 +10,6 @@ from tests.webconsole.test_browser import GAMEPAD, Person
 from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
 
-pytestmark = pytest.mark.alone
-
 IWER = Path(__file__).parent / "vendor/iwer.min.js"
 WORN = """
 window.headset = new IWER.XRDevice(IWER.metaQuest3)

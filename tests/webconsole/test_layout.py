@@ -20,9 +20,6 @@ OUTSIDE = """
 """
 
 
-pytestmark = pytest.mark.alone
-
-
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
     directory = tmp_path_factory.mktemp("layout") / "palpation"

@@ -148,7 +148,6 @@ def test_links_name_what_others_can_reach(certificates):
         assert chosen.names[0] == "127.0.0.1"
 
 
-@pytest.mark.alone
 def test_a_browser_shows_the_page_by_tls(browser, certificates, tmp_path):
     """Its context is secure, without which there is no headset (WebXR)."""
     write_scene(tmp_path / "scene", 10)

@@ -106,7 +106,6 @@ def test_a_server_does_not_show_what_its_own_pages_have_started(recording, tmp_p
     assert [file.name for file in tmp_path.iterdir()] == ["table"], "it was recorded where the server runs"
 
 
-@pytest.mark.alone
 def test_the_form_on_the_page(browser, recording):
     with served(Recorded(recording)) as server:
         one = Person(browser, f"http://127.0.0.1:{server.port}{server.gate.invite('operator')}")

@@ -20,6 +20,7 @@ from tests.hub.authorities import free_port
 from tests.wheel.environments import CLEAN, bare, install, run, succeed, with_our_packages
 
 pytestmark = [
+    pytest.mark.release,
     pytest.mark.xdist_group("wheel"),  # its fixtures are expensive: made once, in one process
     pytest.mark.timeout(600),  # they fetch packages
 ]

@@ -21,7 +21,7 @@ from tests.devices.ros.crtk_table import Peer
 from tests.devices.ros.helpers import until
 from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.rclpy_peer import RclpyPeer, free_domain
-from tests.devices.ros.rospy_peer import Program, master, rospy_python
+from tests.devices.ros.rospy_peer import Program, master, needs_rospy
 from tests.devices.ros.rospy_peer import TablePeer as RospyPeer
 from tests.devices.ros.zenoh.test_gateway import TablePeer as ZenohTable
 from tests.devices.ros.zenoh.zenoh_peer import Peer as ZenohPeer
@@ -90,7 +90,13 @@ def rospy_program(ros) -> Iterator[Peer]:
         yield RospyPeer(console)
 
 
-@pytest.fixture(params=["dds", "ros1", "zenoh"])
+@pytest.fixture(
+    params=[
+        pytest.param("dds", marks=pytest.mark.ros),
+        pytest.param("ros1", marks=[pytest.mark.ros, needs_rospy]),
+        "zenoh",
+    ]
+)
 def middleware(request, tmp_path):
     """Each of the gateways' kinds."""
     if request.param == "dds":
@@ -99,8 +105,6 @@ def middleware(request, tmp_path):
         yield Middleware("ros2-dds", {"domain": domain}, lambda _: RclpyPeer(python, domain), tmp_path)
     elif request.param == "zenoh":
         yield Middleware("ros2-zenoh", {}, zenoh_program, tmp_path)
-    elif rospy_python() is None:
-        pytest.skip("needs rospy")
     else:
         with master(tmp_path) as ros:
             yield Middleware("ros1", {"master": ros.uri}, lambda _: rospy_program(ros), tmp_path)

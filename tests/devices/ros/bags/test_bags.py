@@ -302,6 +302,7 @@ with rosbag.Bag(sys.argv[1]) as bag:
 """
 
 
+@pytest.mark.ros
 @needs_rospy
 def test_ros_1_reads_it_once_it_is_converted(bag, tmp_path):
     converter = Path(sys.executable).with_name("rosbags-convert")

@@ -103,6 +103,7 @@ with rosbag.Bag(sys.argv[1], "w", compression="bz2") as bag:
 """
 
 
+@pytest.mark.ros
 @needs_rospy
 def test_a_bag_that_ros_1_itself_has_written(tmp_path):
     python, path = rospy_python()

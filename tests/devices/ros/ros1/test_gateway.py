@@ -20,7 +20,7 @@ from tests.devices.ros.helpers import joint_fields, received, until, wanted
 from tests.devices.ros.rospy_peer import Program, TablePeer, master, needs_rospy
 from tests.hub.authorities import free_port
 
-pytestmark = needs_rospy
+pytestmark = [pytest.mark.ros, needs_rospy]
 
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
 STATE, COMMAND, EVENT, STATE_COMMAND = (

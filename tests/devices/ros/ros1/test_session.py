@@ -18,7 +18,7 @@ from tests.devices.ros.ideal_robot import IdealRobot, motion
 from tests.devices.ros.rospy_peer import Program, master, needs_rospy
 
 pytest.importorskip("ruckig")
-pytestmark = needs_rospy
+pytestmark = [pytest.mark.ros, needs_rospy]
 
 ARMS = {"PSM1": {"instrument": "400006"}}
 HOME = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
