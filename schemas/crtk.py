@@ -32,7 +32,7 @@ def _empty() -> NDArray[np.float64]:
 
 
 class OperatingState(Message):
-    """State of a device: `DISABLED`, `ENABLED`, `PAUSED` or `FAULT`; whether it is homed, and busy."""
+    """State of a device: `DISABLED`, `ENABLED`, `PAUSED` or `FAULT`; homed or not, busy or not."""
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/OperatingState"
     header: Header = Header()
@@ -44,7 +44,7 @@ class OperatingState(Message):
 class StringStamped(Message):
     """A text at a time.
 
-    As `state_command` it is one of `enable`, `disable`, `home`, `unhome`, `pause`, `resume`.
+    Texts of `state_command`: `enable`, `disable`, `home`, `unhome`, `pause`, `resume`.
     """
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/StringStamped"
@@ -68,14 +68,14 @@ class CartesianState(Message):
 class CartesianImpedanceHalfPlaneGains(Message):
     """Gains per axis on one side of a goal.
 
-    N/m and N s/m of a displacement, N m/rad and N m s/rad of a rotation; those of a spring are negative.
+    N/m and N s/m of a displacement, N m/rad and N m s/rad of a rotation; gains of a spring are negative.
     """
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains"
     p: Vector3 = Vector3()
     d: Vector3 = Vector3()
     bias: Vector3 = Vector3()
-    """What is added, N or N m."""
+    """Added force or torque, N or N m."""
     deadband: Vector3 = Vector3()
     """Distance from the goal, m or rad, beyond which `p` acts."""
 

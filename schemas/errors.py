@@ -2,18 +2,18 @@
 
 TrocarError
 ├── ScenarioError          the scenario cannot be run as written (exit code 2)
-│   ├── MissingExtraError  a package that an optional part needs is not installed
-│   └── TrustError         a recording asks for code or files that were not allowed
-├── MessageError           bytes or values that are not a valid message
-│   └── LateError          a message that arrives after a newer one
+│   ├── MissingExtraError  an optional part needs a missing package
+│   └── TrustError         a recording asks for code or files without permission
+├── MessageError           invalid bytes or values of a message
+│   └── LateError          a message arrives after a newer message
 ├── SessionError           the running session ended before its time (exit code 1)
 │   ├── ParticipantError   a participant raised, died or stopped answering
 │   └── StateError         a participant cannot save or restore its state
 ├── RecordingError         a recording cannot be written, read or re-simulated
-│   └── CutShortError      a recording has no end: `trocar recover` saves what is whole
-├── MotionError            an arm cannot be or go where it was asked to
-├── DeviceError            hardware, or the program that drives it, cannot be used now
-└── ConnectError           no hub, or not the hub that was asked for
+│   └── CutShortError      a recording has no end: `trocar recover` saves the whole chunks
+├── MotionError            an arm cannot reach or hold a commanded position
+├── DeviceError            hardware or its driver cannot be used now
+└── ConnectError           no hub, or another hub than the expected hub
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ __all__ = [
 
 
 class TrocarError(Exception):
-    """Root of all errors that Trocar raises on purpose."""
+    """Root of all errors raised by Trocar on purpose."""
 
 
 class ScenarioError(TrocarError):
-    """The scenario cannot be run as written; the message states where and what was allowed."""
+    """The scenario cannot be run as written; the message states the place and the allowed values."""
 
     def __init__(self, message: str, *, path: tuple[str | int, ...] = ()) -> None:
         """Raise with `path` of the invalid value in the scenario: `("participants", "robot", "kind")`."""
@@ -54,10 +54,10 @@ class ScenarioError(TrocarError):
 
 
 class MissingExtraError(ScenarioError):
-    """A part of the scenario needs a package that is not installed here."""
+    """A part of the scenario needs a missing package."""
 
     def __init__(self, part: str, extra: str, package: str, distribution: str = "trocar") -> None:
-        """Raise for `part`, which needs `package` from the extra `extra` of `distribution`."""
+        """Raise for `part`, in need of `package` from the extra `extra` of `distribution`."""
         super().__init__(
             f"{part} needs the package '{package}', which is not installed. Install it with: pip install"
             f" '{distribution}[{extra}]'"
@@ -66,15 +66,15 @@ class MissingExtraError(ScenarioError):
 
 
 class TrustError(ScenarioError):
-    """A recording asks for code that is not installed, or for files, and the user has not allowed it."""
+    """A recording asks for foreign code or for files, without the user's permission."""
 
 
 class MessageError(TrocarError):
-    """Bytes or values that are not a valid message."""
+    """Invalid bytes or values of a message."""
 
 
 class LateError(MessageError):
-    """A message that arrives after a newer one."""
+    """A message arrives after a newer message."""
 
 
 class SessionError(TrocarError):
@@ -82,7 +82,7 @@ class SessionError(TrocarError):
 
 
 class ParticipantError(SessionError):
-    """A participant raised, died or stopped answering; `participant` and `step` are which and when."""
+    """A participant raised, died or stopped answering; see `participant`, `step` and `cause`."""
 
     def __init__(self, participant: str, step: int, cause: str) -> None:
         super().__init__(f"participant '{participant}' failed at step {step}: {cause}")
@@ -104,23 +104,23 @@ class CutShortError(RecordingError):
 
 
 class MotionError(TrocarError):
-    """An arm cannot be or go where it was asked to; the message states why and what was allowed."""
+    """An arm cannot reach or hold a commanded position; the message states the reason and the limits."""
 
 
 class DeviceError(TrocarError):
-    """Hardware, or the program that drives it, cannot be used now; the message states what to do."""
+    """Hardware or its driver cannot be used now; the message states the remedy."""
 
 
 class ConnectError(TrocarError):
-    """No hub, or not the hub that was asked for."""
+    """No hub, or another hub than the expected hub."""
 
 
 _MOST_NAMES = 30
-"""Known names that are listed although one of them is probably meant."""
+"""Largest number of known names listed beside a suggestion."""
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return `" Did you mean 'x'?"` for a near miss, then what is known; a long list if nothing is near."""
+    """Return `" Did you mean 'x'?"` for a near miss, then the known names; a long list is left out then."""
     names = sorted(known)
     close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
     hint = f" Did you mean '{close[0]}'?" if close else ""

@@ -13,7 +13,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 def valid_name(name: str) -> bool:
     """Return whether `name` is a valid name of a session, a participant or a part of a port.
 
-    It begins with a letter; letters, digits and underscores follow.
+    A name begins with a letter; letters, digits and underscores follow.
     """
     return _NAME.fullmatch(name) is not None
 
@@ -52,36 +52,36 @@ class Keys:
     def signals(self, participant: str, reader: str) -> str:
         """Key of the signals of a participant for a wall-clock device or an observer.
 
-        A reader that is too slow misses some of them, and delays no other participant.
+        A slow reader misses some messages and delays no other participant.
         """
         return f"{self.prefix}/engine/{participant}/signals/{reader}"
 
     def view(self, participant: str, port: str) -> str:
-        """Key of what pages see of an output; nothing waits for them."""
+        """Key of an output as published for pages; the simulation never waits for pages."""
         return f"{self.prefix}/engine/{participant}/view/{port}"
 
     def uses(self, device: str, participant: str) -> str:
-        """Key on which a wall-clock device publishes which signals of a participant it uses."""
+        """Key of a wall-clock device's list of used signals of a participant."""
         return f"{self.prefix}/device/{device}/uses/{participant}"
 
     def host_profile(self, host: str) -> str:
-        """Key on which a host of the hub's machine answers with its part of the profile; `*` for all."""
+        """Key of the profile of a host of the hub's machine (a query); `*` for all."""
         return f"{self.prefix}/host/{host}/profile"
 
     def refused(self, role: str, participant: str) -> str:
-        """Key on which a host reports messages that it dropped, under one of its participants' names."""
+        """Key of a host's reports of dropped messages, under the name of one of the host's participants."""
         return f"{self.prefix}/{role}/{participant}/refused"
 
     def observer_status(self, observer: str) -> str:
-        """Key on which the host of an observer publishes the observer's status; `*` for all."""
+        """Key of an observer's status; `*` for all."""
         return f"{self.prefix}/engine/{observer}/status"
 
     def device_status(self, device: str) -> str:
-        """Key on which the host of a device publishes the device's status; `*` for all."""
+        """Key of a device's status; `*` for all."""
         return f"{self.prefix}/device/{device}/status"
 
     def link(self, device: str) -> str:
-        """Key on which the hub publishes the network link that a device shall have."""
+        """Key of the network link commanded for a device."""
         return f"{self.prefix}/hub/link/{device}"
 
     def control(self, verb: str) -> str:
@@ -89,7 +89,7 @@ class Keys:
         return f"{self.prefix}/control/{verb}"
 
     def join(self, host: str) -> str:
-        """Key on which the host `host` joins, which no other host may use; `**` for all."""
+        """Key of the host `host` to join, forbidden to any other host; `**` for all."""
         return self.control(f"join/{host}")
 
     def alive(self, role: str, name: str) -> str:

@@ -1,7 +1,7 @@
 """The base of every message: a pydantic model that is also a ROS 2 message.
 
-A field's annotation has its ROS type, so the .msg text of a type is derived from the model and cannot drift
-from it. Numbers must be finite: a NaN never leaves or enters a simulation.
+A field's annotation has the field's ROS type, so the .msg text of a type is derived from the model and cannot
+drift. Numbers must be finite: a NaN never leaves or enters a simulation.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _SINGLE = struct.Struct("<f")
 
 
 class RosType:
-    """Marks an annotation with the ROS 2 type it stands for; for arrays also with the numpy type."""
+    """Marks an annotation with its ROS 2 type, an array also with its numpy type."""
 
     def __init__(self, name: str, dtype: Any = None) -> None:
         """Mark with the type `name`, as in a .msg file, and the element type of an array."""
@@ -87,7 +87,7 @@ class RosType:
 
 
 def _single(value: float) -> float:
-    """Round to single precision, so that a message is what arrives of it."""
+    """Round to single precision, so that sender and receiver have the same message."""
     try:
         return cast("float", _SINGLE.unpack(_SINGLE.pack(value))[0])
     except OverflowError:

@@ -35,10 +35,10 @@ __all__ = [
 
 _FACTOR = r"(?:1|%|°?[^\W\d]\w*)(?:(?:\^|\*\*)-?\d)?"
 _UNIT = re.compile(rf"\(*{_FACTOR}\)*(?:(?:\s*[*/]\s*|\s+)\(*{_FACTOR}\)*)*")
-"""What is passed to pint, which evaluates more than units: `9**9**9` would keep it busy for ever."""
+"""Units passed on to pint, a parser of more than units: `9**9**9` would keep pint busy for ever."""
 MAX_LENGTH = 100
-"""Characters of a quantity, and of a unit: pint recurses at each parenthesis, and tries every prefix
-and suffix of a name that it does not know.
+"""Most characters of a quantity and of a unit: pint recurses at each parenthesis, and tries every prefix and
+suffix of an unknown name.
 """
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.ASCII)
 
@@ -58,7 +58,7 @@ _FACTORS = {
     ("kN/m", "N/m"): 1e3,
     ("mm/s", "m/s"): 1e-3,
 }
-"""Of the units that scenarios name most, as pint has them: a session that needs no other starts half a second
+"""Factors of the most frequent units, as pint has them: a session with no other unit starts half a second
 sooner.
 """
 
@@ -71,7 +71,7 @@ def _registry() -> Any:
 
 
 def _converted(number: float, unit: str, target: str) -> float:
-    """Return `number` in unit `target`. Raises ValueError if `unit` cannot be converted to it."""
+    """Return `number` in unit `target`; raises ValueError if `unit` has another dimension."""
     if unit == target:
         return number
     if factor := _FACTORS.get((unit, target)):
@@ -91,7 +91,7 @@ def _converted(number: float, unit: str, target: str) -> float:
 def to_si(value: Any, unit: str) -> float:
     """Return `value`, a number or a text such as `80 mm`, in the SI unit `unit`.
 
-    Raises ValueError if it is not a finite quantity of that dimension.
+    Raises ValueError if `value` is no finite quantity of the dimension of `unit`.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a quantity in {unit}, such as '1 {unit}'")

@@ -80,13 +80,13 @@ class GrantMessage(Message):
 
 
 class AckMessage(Message):
-    """A participant has done the steps of one grant. The arrays hold one entry per step it took in it."""
+    """A participant has done the steps of a grant. The arrays hold an entry for each of its steps."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/Ack"
     run: UInt64
     epoch: UInt32
     step: Int64
-    """First step of the grant that is acknowledged; -1 says that the participant is configured and ready."""
+    """First step of the acknowledged grant; -1: the participant is configured and ready."""
     state_hash: UInt64Array = Field(default_factory=lambda: np.zeros(0, np.uint64))
     compute_ns: UInt64Array = Field(default_factory=lambda: np.zeros(0, np.uint64))
     work_j: Float64Array = Field(default_factory=lambda: np.zeros(0))
@@ -97,10 +97,7 @@ class AckMessage(Message):
 
 
 class CouplingEnergy(Message):
-    """The energy book of one bond, in J since the start.
-
-    It contains what the motion side gave, what the force side received, and the difference.
-    """
+    """The energy book of a bond, J since the start: work given, work received, difference."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/CouplingEnergy"
     header: Header
@@ -108,11 +105,11 @@ class CouplingEnergy(Message):
     motion_work_j: Float64
     force_work_j: Float64
     residual_j: Float64
-    """`force_work_j - motion_work_j`: energy that the coupling created (positive) or lost."""
+    """`force_work_j - motion_work_j`: energy created (positive) or lost by the coupling."""
 
 
 class ContactPlane(Message):
-    """A surface near a hand, as flat: it pushes what is below it back along its normal.
+    """A surface near a hand, taken as flat: a hand below the plane is pushed back along the normal.
 
     With depth = distance + velocity age - normal . x of a hand at x, the force is normal max(0, stiffness
     depth - damping v_n), and friction across it.
@@ -120,21 +117,21 @@ class ContactPlane(Message):
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ContactPlane"
     normal: Vector3
-    """Unit vector out of the body, towards where the hand is free."""
+    """Unit vector out of the body, towards the free side."""
     distance: Float64
-    """Of the surface from the frame's origin along the normal, m, at the stamp of the model."""
+    """Distance of the surface from the frame's origin along the normal at the stamp of the model, m."""
     velocity: Float64 = 0.0
-    """Of the surface along its normal, m/s."""
+    """Velocity of the surface along its normal, m/s."""
     stiffness: Annotated[Float64, Field(ge=0.0)]
-    """N/m."""
+    """Contact stiffness, N/m."""
     damping: Annotated[Float64, Field(ge=0.0)] = 0.0
-    """N s/m."""
+    """Contact damping, N s/m."""
     friction: Annotated[Float64, Field(ge=0.0)] = 0.0
-    """Coefficient."""
+    """Coefficient of Coulomb friction."""
 
 
 class ContactModel(Message):
-    """All that a haptic device needs to render contact until the next one arrives.
+    """Contact as a haptic device renders it until the next model arrives.
 
     The frame in `header.frame_id` is the device's base frame.
     """
@@ -142,7 +139,7 @@ class ContactModel(Message):
     ros_type: ClassVar[str] = "trocar_msgs/msg/ContactModel"
     header: Header
     planes: Annotated[list[ContactPlane], Field(max_length=4)] = Field(default_factory=list[ContactPlane])
-    """None: the hand is free."""
+    """Planes near the hand; empty: the hand is free."""
 
 
 class SoftBodyState(Message):
@@ -158,20 +155,20 @@ class SoftBodyState(Message):
 
 
 class ShownMarkers(Message):
-    """All markers of a scene at a time, as arrays: what a camera draws without asking what came before.
+    """All markers of a scene at an instant, as arrays: a camera draws them without earlier messages.
 
-    One that moves with its frame is in that frame, any other in `world`. m, quaternions (x, y, z, w), colours
+    A marker locked to its frame is in that frame, any other in `world`. m, quaternions (x, y, z, w), colours
     (r, g, b, a) from 0 to 1.
     """
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ShownMarkers"
     header: Header
-    """The stamp is of the last change."""
+    """Header with the stamp of the last change."""
     namespaces: StringArray = Field(default_factory=list[str])
-    """With the id, the name of each of the n markers."""
+    """Namespaces of the n markers; namespace and id together name a marker."""
     ids: Int32Array = Field(default_factory=lambda: np.zeros(0, np.int32))
     types: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
-    """As in visualization_msgs/Marker."""
+    """Types of visualization_msgs/Marker."""
     frames: StringArray = Field(default_factory=list[str])
     poses: Float64Array = Field(default_factory=lambda: np.zeros(0))
     """Seven numbers each: position, quaternion."""
@@ -180,17 +177,17 @@ class ShownMarkers(Message):
     colors: Float32Array = Field(default_factory=lambda: np.zeros(0, np.float32))
     """Four numbers each."""
     expires_ns: UInt64Array = Field(default_factory=lambda: np.zeros(0, np.uint64))
-    """Simulated time from which on each is gone; 0: it stays."""
+    """Simulated time at which each marker vanishes; 0: never."""
     texts: StringArray = Field(default_factory=list[str])
-    """Of each: what is written, or the object whose shape it has."""
+    """Text of each marker, or the name of the object with the same shape."""
     point_counts: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
-    """How many of the points each has."""
+    """Number of points of each marker."""
     points_m: Float64Array = Field(default_factory=lambda: np.zeros(0))
     """x, y, z in the markers' own frames, one marker after the other."""
     color_counts: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
-    """How many of the points' colours each has: as many as points, or none."""
+    """Number of point colours of each marker: as many as points, or 0."""
     point_colors: Float32Array = Field(default_factory=lambda: np.zeros(0, np.float32))
-    """Four numbers for each point with a colour of its own."""
+    """Colours (r, g, b, a) of the points of markers with a colour per point."""
 
 
 class TissueGrasp(Message):
@@ -202,13 +199,13 @@ class TissueGrasp(Message):
     """`grasped`, `released` (the fingers opened) or `torn` (the pull was too strong)."""
     body: String
     nodes: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
-    """The nodes of the body that are, or were, held."""
+    """Indices of the nodes held, or held until now."""
     force_n: Float64
     """Pull of the instrument on the tissue just before."""
 
 
 class TaskEvent(Message):
-    """Something that happened in a training task."""
+    """An event of a training task."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/TaskEvent"
     header: Header
@@ -218,13 +215,13 @@ class TaskEvent(Message):
     `pulled out`) and `withdrawn`.
     """
     object: String = ""
-    """The object of which it is; empty: none."""
+    """Name of the object; empty: none."""
     arm: String = ""
-    """The arm that did it; of a hand-over the one that has the object now; empty: none."""
+    """Name of the acting arm, after a hand-over of the receiving arm; empty: none."""
     place: String = ""
-    """Where an object was placed."""
+    """Place where an object was put."""
     value: Float64 = 0.0
-    """How much, in `unit`: the height of a lift or a drop, the impulse of a collision."""
+    """Height of a lift or a drop, or impulse of a collision, in `unit`."""
     unit: String = ""
 
 
@@ -233,16 +230,16 @@ class ScoreValue(Message):
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ScoreValue"
     name: String
-    """Such as `drops`; of one arm `PSM1/path_length`."""
+    """Name of the number, such as `drops` or, for a single arm, `PSM1/path_length`."""
     value: Float64 = 0.0
-    """In `unit`; it says nothing if there is a `reason`."""
+    """Value in `unit`; without meaning where there is a `reason`."""
     unit: String = ""
     reason: String = ""
-    """Why there is no value; empty: there is one."""
+    """Reason for a missing value; empty: the value is valid."""
 
 
 class RuleScore(Message):
-    """What one set of rules says about a trial."""
+    """Scores of a trial by one set of rules."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/RuleScore"
     rules: String
@@ -250,14 +247,14 @@ class RuleScore(Message):
 
 
 class ScoreCard(Message):
-    """How well a training task is done so far: metrics, and the scores by each set of rules."""
+    """Progress of a training task: metrics, and the scores by each set of rules."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ScoreCard"
     header: Header
     task: String
     """Kind of the task."""
     goals: UInt32
-    """That the task has."""
+    """Number of goals of the task."""
     reached: UInt32
     """Goals reached so far."""
     metrics: list[ScoreValue] = Field(default_factory=list[ScoreValue])
@@ -265,7 +262,7 @@ class ScoreCard(Message):
 
 
 class ParticipantStatus(Message):
-    """Where one participant lives and how far it is."""
+    """Host, process and step of a participant."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ParticipantStatus"
     name: String
@@ -276,14 +273,14 @@ class ParticipantStatus(Message):
 
 
 class Latency(Message):
-    """How long the messages of one stream took on one part of their way, since the start of the session."""
+    """Times of the messages of a stream on one part of their way, since the start of the session."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/Latency"
     way: String
-    """`device to grant`: from when a device had a sample to the communication point at which it entered the
-    simulation; `grant to state`: from a grant to the acknowledgement of all its steps; `state to force`: from
-    when a value was there to when it was written to a device; `state to picture`: from when a state was there
-    to when an observer had drawn and published it.
+    """`device to grant`: from the sample of a device to the communication point of its entry;
+    `grant to state`: from a grant to the acknowledgement of all its steps; `state to force`: from a computed
+    value to its writing to a device; `state to picture`: from a computed state to the published picture of
+    an observer.
     """
     stream: String
     """`device.port`, `source.port -> device.port`, the observer, or `all participants`."""
@@ -294,16 +291,16 @@ class Latency(Message):
 
 
 class DeviceStatus(Message):
-    """What the host of a device tells of it, once a second."""
+    """Report of the host of a device, once a second."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/DeviceStatus"
     device: String
     offset_ns: Int64 = 0
-    """Added to the monotonic clock of the device's host it gives that of the hub."""
+    """Monotonic clock of the hub minus the monotonic clock of the device's host."""
     round_trip_ns: Int64 = -1
-    """Of the exchange that measured the offset, which is exact within half of it.
+    """Round trip of the exchange that measured the offset; its half bounds the error of the offset.
 
-    -1: there was no exchange yet, or the host is the hub's own.
+    -1: there was no exchange yet, or the device is in the hub's process.
     """
     link: String = ""
     """The network link between device and hub, as the scenario or a later change sets it; empty: none."""
@@ -311,25 +308,25 @@ class DeviceStatus(Message):
 
 
 class ObserverStatus(Message):
-    """What the host of an observer tells of it, once a second: a participant that looks in its own time."""
+    """Report of the host of an observer, once a second. An observer looks on in its own time."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ObserverStatus"
     observer: String
     step: Int64
-    """The communication step whose state it saw last; -1: none."""
+    """Communication step of the last observed state; -1: none."""
     states: UInt64
-    """States that it saw, and drew if it is a camera."""
+    """Number of observed states; a camera has drawn each of them."""
     dropped: UInt64
-    """States at its period that it did not see, because it or the network was too slow."""
+    """Number of due states not observed, because observer or network were too slow."""
     rate: Float64
-    """States per second of wall time that it saw, from the session's start to the last one."""
+    """Observed states per second of wall time, from the session's start to the last state."""
     attainable_rate: Float64
-    """States per second that it could have seen, by the time that one took."""
+    """States per second that the observer could have processed, from its time per state."""
     latencies: list[Latency] = Field(default_factory=list[Latency])
 
 
 class SessionStatus(Message):
-    """What a session is doing now."""
+    """State of a session."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/SessionStatus"
     session: String
@@ -348,27 +345,24 @@ class SessionStatus(Message):
 
 
 class ProfileRow(Message):
-    """What one phase of a host's stepping thread took, or all threads of one kind of its process.
-
-    Times are sums since the first step.
-    """
+    """Time spent in one phase of the step thread of a host, or in one group of threads, since the first step."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ProfileRow"
     host: String
     taker: String
-    """Who used the time: `participant NAME`, `device NAME`, `hub`, `connections`, `wire`, `recorder` and the
+    """User of the time: `participant NAME`, `device NAME`, `hub`, `connections`, `wire`, `recorder` and the
     like.
     """
     phase: String = ""
-    """Of the stepping thread; empty for other threads."""
+    """Phase of the step thread; empty for other threads."""
     wall_s: Float64 = 0.0
-    """Of the wall clock, for a phase."""
+    """Wall time of a phase."""
     core_s: Float64
-    """Of a processor core."""
+    """Processor time."""
 
 
 class LateCause(Message):
-    """How many steps were late for one cause."""
+    """Number of steps late for one cause."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/LateCause"
     cause: String
@@ -376,11 +370,11 @@ class LateCause(Message):
 
 
 class LateStep(Message):
-    """A step that took longer than the time it simulates."""
+    """A step longer than its simulated time."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/LateStep"
     time_ns: Int64
-    """Simulated time at its end."""
+    """Simulated time at the end of the step."""
     took_s: Float64
     cause: String
 
@@ -396,9 +390,9 @@ class Profile(Message):
     steps: Int64
     rows: list[ProfileRow] = Field(default_factory=list[ProfileRow])
     late: list[LateCause] = Field(default_factory=list[LateCause])
-    """The most frequent cause first."""
+    """Causes, the most frequent first."""
     worst: list[LateStep] = Field(default_factory=list[LateStep])
-    """The longest step first; not all."""
+    """The longest steps, the longest first."""
 
 
 class GatewayClient(Message):
@@ -410,7 +404,7 @@ class GatewayClient(Message):
 
 
 class GatewayTopic(Message):
-    """What has gone over one ROS topic or service of a gateway."""
+    """Traffic of one ROS topic or service of a gateway."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/GatewayTopic"
     topic: String
@@ -421,14 +415,14 @@ class GatewayTopic(Message):
     messages: UInt64 = 0
     refused: UInt64 = 0
     reason: String = ""
-    """Why the last one was refused."""
+    """Reason of the last refusal."""
 
 
 class GatewayStatus(Message):
-    """Who is connected to a gateway to ROS, and what goes through it."""
+    """Clients and traffic of a gateway to ROS."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/GatewayStatus"
     kind: String
     clients: list[GatewayClient] = Field(default_factory=list[GatewayClient])
     topics: list[GatewayTopic] = Field(default_factory=list[GatewayTopic])
-    """Those over which anything has gone."""
+    """Topics and services with traffic."""

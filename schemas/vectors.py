@@ -1,9 +1,8 @@
 """Values of signal ports as float64 vectors, and their CDR form without going through message objects.
 
-The layout of a port's message is fixed once its size, names and frame are known: only the stamp and one or
-more blocks of doubles change from step to step. `VectorCodec` writes them into a template that was encoded
-once (3 us against 28 us through the models, `bench/engine_steps.py` on a slow machine), and reads them back
-after comparing all other bytes.
+Size, names and frame fix the layout of a port's message: only the stamp and the blocks of doubles change from
+step to step. `VectorCodec` writes stamp and blocks into an encoded template (3 us against 28 us through the
+models, `bench/engine_steps.py` on a slow machine), and reads blocks after a comparison of all other bytes.
 """
 
 from __future__ import annotations
@@ -49,8 +48,7 @@ _LAYOUTS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     AccelStamped.ros_type: (("accel.linear", _XYZ), ("accel.angular", _XYZ)),
     JointState.ros_type: (),
 }
-"""Per type: the blocks of numbers, each with the names of its elements (none: an array or a single number).
-"""
+"""Blocks of numbers by ROS type, each with the names of the elements; no names: an array or a number."""
 
 _QUATERNION_TOLERANCE = 1e-3
 _NANOSEC = struct.Struct("<I")
@@ -58,7 +56,7 @@ _NONE: Vector = np.zeros(0)
 
 
 def has_vector(type_name: str) -> bool:
-    """Return whether values of this ROS type are vectors."""
+    """Return whether values of a ROS type are vectors."""
     return type_name in _LAYOUTS
 
 
@@ -75,19 +73,19 @@ class VectorCodec:
     """The vector form of one port: `size` numbers, `fields` by name, to and from CDR and message models."""
 
     def __init__(self, port: Port) -> None:
-        """Find the layout of `port`; raises MessageError if its type has none."""
+        """Find the layout of `port`; raises MessageError if values of the port's type are not vectors."""
         if not has_vector(port.type):
             raise MessageError(f"port '{port.name}': values of {port.type} are not vectors")
         self.port = port
         self.model = message_type(port.type)
         self.fields: dict[str, slice] = {}
-        """Position of each block in the vector, and of each number with a name, by its full path and by the
-        block's last word: `position`, `position.z`.
+        """Positions of blocks and named numbers in the vector, by full path and by the block's last word:
+        `position`, `position.z`.
         """
         self._blocks = list(self._layout())
         self.size: int = self._blocks[-1][2].stop
         self.neutral = np.zeros(self.size)
-        """The value before any is set: zeros, and the unit quaternion."""
+        """Value of an unset port: zeros, and the unit quaternion."""
         self._is_pose = "pose.orientation" in self.fields
         if self._is_pose:
             self.neutral[6] = 1.0
@@ -109,10 +107,7 @@ class VectorCodec:
             at += count
 
     def _compile(self) -> None:
-        """Find the positions of the stamp and the blocks in the CDR bytes.
-
-        They are found by serialising numbers that occur nowhere else.
-        """
+        """Find the positions of the stamp and the blocks in the CDR bytes, by encoding unique numbers."""
         marks: Vector = np.random.default_rng(0).random(self.size)
         template = bytearray(encode(self.to_message(marks, 0)))
         starts = [
@@ -120,9 +115,9 @@ class VectorCodec:
             for _, _, block in self._blocks
         ]
         self.spans = [(start, start + end - begin, slice(begin, end)) for start, begin, end in starts]
-        """Where each block begins and ends in the message, and which of the vector's bytes it is."""
+        """Begin and end of each block in the message, and the block's bytes in the vector."""
         self.stamp = slice(4, 12) if self._has_stamp else None
-        """Where the stamp is in the message: seconds (int32) and nanoseconds (uint32)."""
+        """Bytes of the stamp in the message: seconds (int32) and nanoseconds (uint32)."""
         self._fixed: list[tuple[int, int, bytes]] = []
         at = 0
         for start, stop in [
@@ -135,7 +130,7 @@ class VectorCodec:
             self._fixed.append((at, start, bytes(template[at:start])))
             at = stop
         self.template = bytes(template)
-        """A message in CDR, in which stamp and blocks are to be filled in."""
+        """Message in CDR, with stamp and blocks to be filled in."""
         self._length = len(template)
 
     def encode(self, value: Vector, time_ns: int) -> bytes:
@@ -149,9 +144,9 @@ class VectorCodec:
         return bytes(buffer)
 
     def decode(self, payload: bytes) -> Vector:
-        """Return the vector, shape (size,), in CDR bytes that another `VectorCodec` of the same port wrote.
+        """Return the vector, shape (size,), in CDR bytes written by a `VectorCodec` of the same port.
 
-        Raises MessageError on any other length, frame, name or layout and on numbers that are not finite.
+        Raises MessageError on another length, frame, name or layout and on numbers that are not finite.
         """
         if len(payload) != self._length:
             raise MessageError(
@@ -165,7 +160,7 @@ class VectorCodec:
         return found
 
     def found(self, payload: bytes) -> Vector | None:
-        """Return the vector, shape (size,), in bytes of which `fits` is true; otherwise None.
+        """Return the vector, shape (size,), in bytes that fit; otherwise None.
 
         Raises MessageError for numbers that are not valid.
         """
@@ -176,7 +171,7 @@ class VectorCodec:
         return self.checked(np.frombuffer(numbers))
 
     def unpack(self, numbers: bytes) -> Vector:
-        """Return the vector, shape (size,), of these bytes; raises MessageError if it is invalid."""
+        """Return the vector, shape (size,), of the bytes of its numbers; raises MessageError if invalid."""
         if len(numbers) != self.neutral.nbytes:
             raise MessageError(
                 f"port '{self.port.name}': {len(numbers)} bytes of numbers, expected {self.neutral.nbytes}"
@@ -209,10 +204,7 @@ class VectorCodec:
         return values
 
     def fits(self, payload: bytes) -> bool:
-        """Return whether all bytes except the numbers and the stamp are as this codec writes them.
-
-        The stamp may have any valid value.
-        """
+        """Return whether the bytes are the template with other numbers and another valid stamp."""
         if len(payload) != self._length or (
             self._has_stamp and not _NANOSEC.unpack_from(payload, 8)[0] < 10**9
         ):
@@ -223,7 +215,7 @@ class VectorCodec:
         return True
 
     def checked(self, value: Vector) -> Vector:
-        """Return `value` if it is valid: float64 of the right shape, finite, any quaternion a unit one."""
+        """Return a valid `value`: float64 of shape (size,), finite, quaternions of norm 1."""
         try:
             fits = value.shape == (self.size,) and value.dtype == np.float64
         except AttributeError:  # no array
@@ -244,7 +236,7 @@ class VectorCodec:
         return value
 
     def to_message(self, value: Vector, time_ns: int) -> Message:
-        """Return `value`, shape (size,), as a message; that of joints is not validated."""
+        """Return `value`, shape (size,), as a message; a JointState is not validated."""
         if self.port.type == JointState.ros_type:
             return self._joint_state(value, time_ns)
         tree: dict[str, Any] = {}
@@ -262,9 +254,9 @@ class VectorCodec:
         return self.model.model_validate(tree)
 
     def _joint_state(self, value: Vector, time_ns: int) -> JointState:
-        """Return the positions of joints and the like as a message.
+        """Return a JointState, without validation: the vector was checked by its sender.
 
-        Commands go as such to an arm's controller in every step; the vector was checked where it is from.
+        An arm's controller receives commands in this form in every step.
         """
         numbers = {path: value[block].copy() for path, _, block in self._blocks}
         header = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
@@ -279,8 +271,7 @@ class VectorCodec:
     def from_message(self, message: Message) -> Vector:
         """Return the vector, shape (size,), of a validated message from outside.
 
-        Joints may come in any order if they are named. Raises MessageError if frame, names or sizes do not
-        fit the port.
+        Named joints may come in any order. Raises MessageError if frame, names or sizes do not fit the port.
         """
         if not isinstance(message, self.model):
             raise MessageError(f"port '{self.port.name}': {message.ros_type}, expected {self.port.type}")
@@ -318,8 +309,7 @@ class VectorCodec:
 def _layout_of(shape: tuple[int, ...]) -> MultiArrayLayout:
     """Return the layout of a dense array, row-major.
 
-    As in std_msgs/MultiArrayLayout, the stride of a dimension is the number of elements in it and all after
-    it.
+    The stride of a dimension is the number of elements from this dimension on (std_msgs/MultiArrayLayout).
     """
     labels = ("rows", "cols") if len(shape) == 2 else tuple(f"dim{axis}" for axis in range(len(shape)))
     rows = zip(labels, shape, strict=True)

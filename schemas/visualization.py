@@ -1,6 +1,6 @@
 """The messages of `visualization_msgs`, field for field as ROS 2 Jazzy has them: markers in a scene.
 
-`tests/schemas` compares each one with the type store of `rosbags`.
+`tests/schemas` compares each message with the type store of `rosbags`.
 """
 
 from __future__ import annotations
@@ -27,11 +27,13 @@ __all__ = [
 ]
 
 MOST_MARKERS = 4000
-"""In one message, and shown at a time: twice what the V-REP scenes draw, 1000 points of each colour."""
+"""Most markers in a message, and on show at a time: twice the number of the V-REP scenes (1000 points of each
+colour).
+"""
 
 
 class MarkerType(IntEnum):
-    """What a marker looks like (visualization_msgs/Marker.msg)."""
+    """Shape of a marker (visualization_msgs/Marker.msg)."""
 
     ARROW = 0
     CUBE = 1
@@ -49,7 +51,7 @@ class MarkerType(IntEnum):
 
 
 class MarkerAction(IntEnum):
-    """What is to be done with a marker (visualization_msgs/Marker.msg); MODIFY is ADD."""
+    """Change of a marker (visualization_msgs/Marker.msg); MODIFY is ADD."""
 
     ADD = 0
     DELETE = 2
@@ -85,7 +87,7 @@ class ColorRGBA(Message):
 
 
 class UVCoordinate(Message):
-    """Where a vertex lies in a texture."""
+    """Place of a vertex in a texture."""
 
     ros_type: ClassVar[str] = "visualization_msgs/msg/UVCoordinate"
     u: Float32 = 0.0
@@ -101,7 +103,7 @@ class MeshFile(Message):
 
 
 class Marker(Message):
-    """One thing to show, called `ns` and `id`; metres, in the frame of the header."""
+    """A shape or text to show, named by `ns` and `id`; metres, in the frame of the header."""
 
     ros_type: ClassVar[str] = "visualization_msgs/msg/Marker"
     header: Header = Header()
@@ -115,12 +117,12 @@ class Marker(Message):
     scale: Vector3 = Vector3()
     color: ColorRGBA = ColorRGBA()
     lifetime: DurationMessage = DurationMessage()
-    """0: until it is deleted."""
+    """Time until the marker vanishes; 0: never."""
     frame_locked: Bool = False
-    """It moves with its frame; otherwise it stays in the world where the frame was when it came."""
+    """True: the marker moves with its frame. False: the marker stays at its first place in the world."""
     points: list[Point] = Field(default_factory=list[Point])
     colors: list[ColorRGBA] = Field(default_factory=list[ColorRGBA])
-    """One for each of `points`, or none: then all have `color`."""
+    """Colour of each point; empty: all points have `color`."""
     texture_resource: String = ""
     texture: CompressedImage = CompressedImage()
     uv_coordinates: list[UVCoordinate] = Field(default_factory=list[UVCoordinate])
