@@ -345,7 +345,7 @@ class SessionStatus(Message):
 
 
 class ProfileRow(Message):
-    """Time spent in one phase of the step thread of a host, or in one group of threads, since the first step."""
+    """Time spent in a phase of the step thread of a host, or in a group of threads, since the first step."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ProfileRow"
     host: String
