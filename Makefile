@@ -29,6 +29,7 @@ check: $(VENV)/.dev
 	ruff format --check .
 	pyright
 	lint-imports
+	python docs/tools/decisions.py
 
 format: $(VENV)/.dev
 	ruff check --fix .

@@ -43,15 +43,12 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the generated pages to the site, and the kinds and decisions to its navigation."""
+    """Add the generated pages to the site, and the kinds to its navigation."""
     kinds = [f"reference/kinds/{name}.md" for name in registry.kinds()]
-    decisions = sorted(file.src_uri for file in files if re.match(r"decisions/\d", file.src_uri))
     for section in config.nav or []:
         for title, pages in section.items():
             if title == "Reference":
                 pages[pages.index("reference/kinds.md")] = {"Kinds": ["reference/kinds.md", *kinds]}
-            if title == "Decisions":
-                pages.extend(decisions)
     for path, text in generated().items():
         files.append(File.generated(config, path, content=text))
     return files

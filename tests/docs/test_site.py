@@ -58,13 +58,6 @@ def test_every_kind_has_a_page_with_its_parameters(site):
         assert "Ports" in text, name
 
 
-def test_every_decision_is_in_the_index():
-    folder = ROOT / "docs" / "decisions"
-    index = (folder / "index.md").read_text("utf-8")
-    for page in folder.glob("0*.md"):
-        assert f"({page.name})" in index, page
-
-
 def test_the_figures_are_those_of_the_script(tmp_path):
     text = "import sys; sys.path.insert(0, 'docs/tools'); import figures, pathlib;"
     text += f" figures.FOLDER = pathlib.Path({str(tmp_path)!r}); figures.main()"
