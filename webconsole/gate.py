@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import secrets
 from collections.abc import Mapping, Sequence
-from http.cookies import CookieError, SimpleCookie
 from time import monotonic_ns
 from typing import Literal
 from urllib.parse import parse_qs, urlsplit
@@ -27,10 +26,12 @@ log = logging.getLogger(__name__)
 
 Role = Literal["viewer", "operator"]
 
+MOST_HEAD_BYTES = 4096
+"""Size of a request's target and headers together; a browser's own take about 1 KB."""
 _TOKEN_BYTES = 32
 _LOGGED_PER_S = 5.0
-_MOST_COOKIES = 64
-"""Browsers that may be let in; each took a link of its own."""
+_MOST_BROWSERS = 64
+"""Browsers that may be let in for each role, so that no viewer takes an operator's place."""
 _HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:;"
@@ -85,16 +86,23 @@ class Gate:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
+        if (size := _head_bytes(scope)) > MOST_HEAD_BYTES:
+            why = (
+                f"the request's head has {size} bytes, at most {MOST_HEAD_BYTES} are allowed: delete the"
+                " cookies that other servers of this host have set"
+            )
+            await self._refuse(why, scope, receive, send, status=431)
+            return
         headers = Headers(scope=scope)
         token = parse_qs(scope["query_string"].decode("ascii", "replace")).get("token", [""])[0]
         if scope["type"] == "websocket" and scope["path"] in self._links:
             await self._linked(token, headers, scope, receive, send)
             return
         problem = self._foreign(scope, headers)
-        if not problem and token and scope["type"] == "http":
-            await self._admit(token, self._role(headers), scope, receive, send)
-            return
         role = self._role(headers)
+        if not problem and token and scope["type"] == "http" and scope["method"] == "GET":
+            await self._admit(token, role, scope, receive, send)
+            return
         if problem or role is None:
             why = problem or "not let in: open the link that the server has printed"
             await self._refuse(why, scope, receive, send)
@@ -140,12 +148,13 @@ class Gate:
         return ""
 
     def _role(self, headers: Mapping[str, str]) -> Role | None:
-        try:
-            cookies = SimpleCookie(headers.get("cookie", ""))
-        except CookieError:
-            return None
-        held = cookies.get(self._cookie)
-        return None if held is None else _looked_up(self._in, held.value)
+        """Return the role of a browser by its cookie; None if it has no valid cookie of this server."""
+        # not by http.cookies: it takes a time that grows with the square of a quoted value's length
+        for pair in headers.get("cookie", "").split(";"):
+            name, _, value = pair.strip().partition("=")
+            if name == self._cookie:
+                return _looked_up(self._in, value)
+        return None
 
     async def _admit(
         self, token: str, known: Role | None, scope: Scope, receive: Receive, send: Send
@@ -155,8 +164,12 @@ class Gate:
         if role is None and known is not None:
             await RedirectResponse("/", status_code=303, headers=_HEADERS)(scope, receive, send)
             return
-        if role is None or len(self._in) >= _MOST_COOKIES:
+        if role is None:
             await self._refuse("this link was used, or is not this server's", scope, receive, send)
+            return
+        if [*self._in.values()].count(role) >= _MOST_BROWSERS:
+            why = f"{_MOST_BROWSERS} browsers are let in as {role}s, and no more: start the server again"
+            await self._refuse(why, scope, receive, send)
             return
         self._invited = {other: kept for other, kept in self._invited.items() if other != token}
         cookie = secrets.token_urlsafe(_TOKEN_BYTES)
@@ -165,14 +178,20 @@ class Gate:
         answer.set_cookie(self._cookie, cookie, httponly=True, samesite="strict", secure=self._secure)
         await answer(scope, receive, send)
 
-    async def _refuse(self, why: str, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _refuse(self, why: str, scope: Scope, receive: Receive, send: Send, status: int = 403) -> None:
         if self._log.spend(monotonic_ns()):
             client = scope.get("client") or ("?", 0)
             log.warning("refused %s %r from %s:%s: %s", scope["type"], scope["path"][:80], *client, why)
         if scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008, "reason": why[:100]})
             return
-        await PlainTextResponse(f"{why}\n", status_code=403, headers=_HEADERS)(scope, receive, send)
+        await PlainTextResponse(f"{why}\n", status_code=status, headers=_HEADERS)(scope, receive, send)
+
+
+def _head_bytes(scope: Scope) -> int:
+    """Return the size of a request's path, query and headers."""
+    target = len(scope["path"]) + len(scope["query_string"])
+    return target + sum(len(name) + len(value) for name, value in scope["headers"])
 
 
 def _looked_up(known: Mapping[str, Role], token: str) -> Role | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from math import isfinite
@@ -22,7 +23,7 @@ from webconsole.assets import asset, compress_all, compressed
 from webconsole.commands import MOST_BYTES
 from webconsole.console import Console
 from webconsole.fork import fork_form, tree_of
-from webconsole.gate import Gate
+from webconsole.gate import MOST_HEAD_BYTES, Gate, Role
 from webconsole.listening import Listening
 from webconsole.page import Page
 from webconsole.start import start_form
@@ -30,6 +31,8 @@ from webconsole.start import start_form
 __all__ = ["Server"]
 
 _MOST_PAGES = 16
+_MOST_VIEWERS = 12
+"""Pages of viewers among them: the rest are kept for operators."""
 _AHEAD_S = 0.2
 _MOST_BUCKETS = 4000
 _BINARY = "application/octet-stream"
@@ -60,7 +63,7 @@ class Server:
     ) -> None:
         self._console, self._socket = console, listening.socket
         self.port = listening.port
-        self._pages = 0
+        self._pages: Counter[Role] = Counter()
         app = Starlette(
             lifespan=self._ahead,
             routes=[
@@ -85,6 +88,8 @@ class Server:
                 log_level="warning",
                 access_log=False,
                 lifespan="on",
+                http="h11",  # httptools, where it is installed, has no limit of a head
+                h11_max_incomplete_event_size=MOST_HEAD_BYTES,
                 ws=_WebSocket,
                 ws_max_size=MOST_BYTES,
                 ws_per_message_deflate=False,
@@ -127,14 +132,15 @@ class Server:
             making.cancel()
 
     async def _page(self, websocket: WebSocket) -> None:
-        if self._pages >= _MOST_PAGES:
-            await websocket.close(1013, f"{_MOST_PAGES} pages are open already")
+        role: Role = websocket.state.role
+        if self._pages.total() >= _MOST_PAGES or (role == "viewer" and self._pages[role] >= _MOST_VIEWERS):
+            await websocket.close(1013, f"{self._pages.total()} pages are open already")
             return
-        self._pages += 1
+        self._pages[role] += 1
         try:
-            await Page(websocket, websocket.state.role, self._console, self.gate).run()
+            await Page(websocket, role, self._console, self.gate).run()
         finally:
-            self._pages -= 1
+            self._pages[role] -= 1
 
     async def _scene(self, _request: Request) -> Response:
         stage = await self._console.stage()

@@ -72,6 +72,30 @@ def test_a_link_opens_the_page_once(visitor):
     assert visitor.get(link).status == 403
 
 
+def test_a_look_ahead_does_not_use_up_the_link(visitor):
+    link = visitor.server.gate.invite("operator")
+    assert visitor.get(link, method="HEAD").status == 403
+    assert visitor.get(link).status == 303
+
+
+def test_viewers_do_not_take_the_places_of_operators(visitor):
+    gate = visitor.server.gate
+    assert {visitor.get(gate.invite("viewer")).status for _ in range(64)} == {303}
+    refused = visitor.get(gate.invite("viewer"))
+    assert (refused.status, b"64 browsers are let in as viewers" in refused.body) == (403, True)
+    assert visitor.admit().get().status == 200
+
+
+def test_a_long_head_is_refused_before_its_cookies_are_read(visitor):
+    """Python's `http.cookies` takes 8 s for such a cookie, and the event loop waits for it."""
+    long = f'{visitor.admit().cookie}; other="' + "\\377" * 15_000
+    assert visitor.get(Cookie=long).status in (400, 431), "by HTTP's parser, or by the gate"
+    refused = visitor.get(Cookie=long[:4200])
+    assert (refused.status, b"at most 4096 are allowed" in refused.body) == (431, True)
+    assert visitor.page(Cookie=long[:4200], Origin=f"http://{visitor.host}") in (400, 403)
+    assert visitor.get(Cookie=f"other=1; a;; ={'x' * 99}; {visitor.cookie}").status == 200
+
+
 def test_who_is_in_may_use_the_old_link(visitor):
     link = visitor.server.gate.invite("operator")
     visitor.cookie = visitor.get(link).headers["Set-Cookie"].partition(";")[0]

@@ -157,6 +157,18 @@ def test_a_seventeenth_page_is_refused(console_of_recording):
     run(body, console_of_recording)
 
 
+def test_viewers_leave_pages_for_operators(console_of_recording):
+    async def body(_):
+        async with AsyncExitStack() as stack:
+            for _ in range(12):
+                await stack.enter_async_context(opened(console_of_recording, "viewer"))
+            with pytest.raises(InvalidStatus, match="403"):
+                await stack.enter_async_context(opened(console_of_recording, "viewer"))
+            await stack.enter_async_context(opened(console_of_recording))
+
+    run(body, console_of_recording)
+
+
 def test_a_message_that_is_too_long_ends_the_connection(console_of_recording):
     async def body(socket):
         await socket.send("x" * 20_000)
