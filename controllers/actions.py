@@ -40,6 +40,8 @@ _Angle = Annotated[Angle, Field(gt=0.0)]
 class ActionsParams(Params):
     """Which hands act, how far an action goes, and where the tips may be."""
 
+    open_to_pages: ClassVar[bool] = True
+
     arms: Arms
     mounting: Mounting = "free"
     setup_joints: SetupJoints = SetupJoints()

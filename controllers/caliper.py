@@ -33,6 +33,8 @@ _OPEN, _CLOSED = HAND.command("caliper", 0.0), HAND.command("caliper", 1.0)
 class CaliperParams(Params):
     """Which hand measures, how fast it closes, and when it has touched."""
 
+    open_to_pages: ClassVar[bool] = True
+
     arm: ArmName
     touch: Force = Field(default=0.05, gt=0, description="force on a fingertip at which its finger stops")
     rate: float = Field(

@@ -55,6 +55,8 @@ _FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
 class EcmMastersParams(Params):
     """How two masters lead the endoscope."""
 
+    open_to_pages: ClassVar[bool] = True
+
     scale: float = Field(
         default=1.0, gt=0.0, description="metres of insertion per metre that the masters are pulled"
     )

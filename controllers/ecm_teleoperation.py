@@ -83,6 +83,8 @@ class EcmButtons(Params):
 class EcmTeleoperationParams(Params):
     """How a head leads the endoscope."""
 
+    open_to_pages: ClassVar[bool] = True
+
     endoscope: ecm.Endoscope = Field(
         default="straight",
         description="as the ECM has it: where it looks, along its shaft or 30 degrees up or down",

@@ -44,6 +44,8 @@ It is that of 0.3 % of the limits for a second.
 class MirrorParams(Params):
     """Which arms follow real ones."""
 
+    open_to_pages: ClassVar[bool] = True
+
     arms: Arms
     max_age: Duration = Field(
         default=100_000_000, gt=0, description="an arm holds when its real one has been silent for longer"

@@ -132,6 +132,8 @@ Step = Annotated[
 class RoutineParams(Params):
     """The steps, and how long any of them may take."""
 
+    open_to_pages: ClassVar[bool] = True
+
     steps: tuple[Step, ...] = Field(min_length=1)
     limit: Duration = Field(
         default=10 * 10**9,

@@ -36,6 +36,8 @@ _TRIANGLES = np.concatenate([_FACES[:, [0, 1, 2]], _FACES[:, [0, 2, 3]]]).reshap
 class SwayingPhantomParams(Params):
     """Where it is, and how much it moves."""
 
+    open_to_pages: ClassVar[bool] = True
+
     position: tuple[Length, Length, Length] = Field(description="of its middle in the world, on average")
     turn: Duration = Field(default=_TURN_NS, gt=0, description="time in which it sways once")
     scale: float = Field(default=1.0, ge=0.0, description="of the authors' motion")

@@ -31,6 +31,8 @@ _UNKNOWN = np.pi**2
 class TipTrackerParams(Params):
     """The arms, the cameras and the noise of their pictures."""
 
+    open_to_pages: ClassVar[bool] = True
+
     arms: Arms
     mounting: Mounting = "free"
     setup_joints: SetupJoints = SetupJoints()

@@ -51,6 +51,8 @@ _SETUP: tuple[tuple[CartArm, int], ...] = (("PSM1", 5), ("PSM2", 5), ("ECM", 4))
 class VrepSceneParams(Params):
     """Which arms there are, as the scenario states them for the robot."""
 
+    open_to_pages: ClassVar[bool] = True
+
     arms: Arms
     setup_joints: SetupJoints = Field(
         default=SetupJoints(), description="their positions, as the scenario states them for the robot"

@@ -46,6 +46,8 @@ _FIRST_WORD = "Teleoperation"
 class VrepSuturesParams(Params):
     """Where the banner is."""
 
+    open_to_pages: ClassVar[bool] = True
+
     camera: str = Field(default="endoscope", description="whose pictures the banner is in")
     banner: tuple[Length, Length, Length] = Field(
         default=(BASELINE / 2.0, -42e-3, 0.1),

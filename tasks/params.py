@@ -6,7 +6,7 @@ Arms, mounting and objects are those of the scenario's `scene`. Poses are in the
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, GetPydanticSchema
 
@@ -27,6 +27,8 @@ _Point = tuple[Length, Length, Length]
 
 class TaskParams(Params):
     """What the task watches, and from which value on something counts."""
+
+    open_to_pages: ClassVar[bool] = True
 
     arms: Annotated[
         dict[CartArm, MountedPsm | MountedEcm], GetPydanticSchema(lambda _, handler: handler(MountedArms))

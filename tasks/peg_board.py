@@ -26,6 +26,8 @@ _UPRIGHT = 0.7
 class PegBoardParams(TaskParams):
     """Which board, and what of its rules the task itself asks for."""
 
+    open_to_pages: ClassVar[bool] = True
+
     legs: int | None = Field(
         default=1,
         ge=1,

@@ -25,6 +25,8 @@ _MARGIN, _BELOW, _ABOVE = 0.05, 0.01, 0.15
 class PickAndPlaceParams(TaskParams):
     """Which piece belongs in which dish."""
 
+    open_to_pages: ClassVar[bool] = True
+
     goals: dict[str, str] = Field(
         min_length=1, description="of each piece the dish where it belongs: `{piece1: left, ...}`"
     )

@@ -36,6 +36,8 @@ _SIGNALS = (("depth", "m"), ("resistance", "N"), ("trauma", "m^2"))
 class SuturingParams(TaskParams):
     """Which phantom and needle, and how many stitches."""
 
+    open_to_pages: ClassVar[bool] = True
+
     fixtures: dict[str, FixtureParams] = Field(description="as in the scene: one of them is the phantom")
     objects: dict[str, Any] = Field(description="as in the scene: one of them is the needle")
     stitches: int = Field(default=4, ge=1, description="after which the task is done")

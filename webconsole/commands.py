@@ -25,6 +25,7 @@ __all__ = [
     "Show",
     "Start",
     "Watch",
+    "asked_for",
     "command",
 ]
 
@@ -35,6 +36,14 @@ _MOST_NUMBERS = 24
 Finite = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
 Share = Annotated[float, Field(allow_inf_nan=False, ge=-1.0, le=1.0)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
+Scalar = (
+    bool
+    | Annotated[int, Field(ge=-(2**53), le=2**53)]
+    | Annotated[float, Field(allow_inf_nan=False)]
+    | Annotated[str, Field(max_length=100)]
+    | None
+)
+"""A value of JSON without parts."""
 
 
 class _Command(BaseModel):
@@ -96,8 +105,8 @@ class Invite(_Command):
 class _Begun(_Command):
     """A session in a process of its own."""
 
-    changes: Annotated[list[Annotated[str, Field(min_length=1, max_length=400)]], Field(max_length=50)] = []
-    """`a.b.c=value`, as on the command line."""
+    changes: Annotated[dict[Name, Scalar], Field(max_length=50)] = {}
+    """New values by their path: `duration`, or participant and parameter, `teleop.scale`."""
     lead: Annotated[list[Name], Field(max_length=8)] = []
     """Devices that pages lead from then on."""
     pace: Literal["fast", "realtime"] | None = None
@@ -210,6 +219,18 @@ Command = Annotated[
     Field(discriminator="do"),
 ]
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Command)
+
+
+class _Asked(BaseModel):
+    do: Annotated[str, Field(max_length=20)] = ""
+
+
+def asked_for(text: str) -> str:
+    """Return the `do` of a message that may be no command; empty if it has none."""
+    try:
+        return _Asked.model_validate_json(text).do
+    except ValidationError:
+        return ""
 
 
 def command(text: str) -> Command:

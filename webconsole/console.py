@@ -11,6 +11,7 @@ from hub.devices.network_link_control import NetworkLinkRequest
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError, ScenarioError
 from schemas.trocar_msgs import ScoreCard
+from webconsole.changes import wrong_fields
 from webconsole.commands import Control, Fork, Network, Pick, Say, Start
 from webconsole.fork import fork_arguments, fork_modules
 from webconsole.frame import Section, SectionKind, pose_content
@@ -21,7 +22,7 @@ from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
 from webconsole.source import Value
 from webconsole.stage import Stage
-from webconsole.start import start_arguments, wrong_fields
+from webconsole.start import start_arguments
 from webconsole.started import Started
 
 __all__ = ["Console"]

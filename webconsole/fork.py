@@ -5,16 +5,20 @@ The past is simulated again by `trocar fork`, as if the command had been typed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
 from hub.planning import registry
 from hub.planning.plan import Plan
 from hub.recording.family import family
 from hub.recording.recording import Recording
+from schemas.errors import ScenarioError
+from schemas.quantity import to_si
 from schemas.scenario import Scenario
-from webconsole.changes import WORD, require_harmless
+from webconsole.changes import overrides
 from webconsole.commands import Fork
+from webconsole.fields import Field, participant_fields
 from webconsole.started import page_devices, recorded_in
 
 __all__ = ["fork_arguments", "fork_form", "fork_modules", "tree_of"]
@@ -46,30 +50,33 @@ def fork_modules(scenario: Scenario) -> list[str]:
 
 
 def _parameters(scenario: Scenario, plan: Plan) -> Iterator[str]:
-    """Yield `participant.parameter=value` for the numbers, switches and words of what is stepped."""
+    """Yield `participant.parameter=value` for the numbers, switches and choices of what is stepped."""
     for name in plan.order:
         spec = scenario.participants[name]
-        if spec.kind not in registry.kinds():
-            continue
-        for key, field in registry.load(spec.kind).params_model.model_fields.items():
-            value = spec.params.get(key, field.default)
-            if isinstance(value, bool | int | float):
-                yield f"{name}.{key}={str(value).lower()}"
-            elif isinstance(value, str) and WORD.fullmatch(value):
-                yield f"{name}.{key}={value}"
+        for field in participant_fields(name, spec.kind):
+            with suppress(ValueError, ScenarioError):  # a stranger's recording may hold anything
+                if (value := _value(field, spec.params)) is not None:
+                    yield field.override(value)
+
+
+def _value(field: Field, params: Mapping[str, Any]) -> Any:
+    """Return a recorded parameter in the unit of its field; raises ValueError if it is no such quantity."""
+    if field.label not in params:
+        return field.in_unit(field.default)
+    value = params[field.label]
+    return to_si(value, field.unit) if field.unit and isinstance(value, str) else value
 
 
 def fork_arguments(recording: Recording, order: Fork) -> list[str]:
     """Return the arguments of `trocar` that fork a recording as a page asks.
 
-    Raises MessageError if a change names a class, a file or a device that is not there, and ScenarioError if
-    it is none.
+    Raises MessageError if a page may not change a value or a device is not there, ScenarioError if a value
+    is not of its type.
     """
     scenario = recording.scenario()
-    changes = [*page_devices(scenario, order.lead), *order.changes]
+    changes = [*page_devices(scenario, order.lead), *overrides(scenario, order.changes)]
     if order.duration is not None:
         changes.append(f"duration={order.duration:g}")
-    require_harmless(scenario, changes)
     arguments = ["fork", str(recording.file), "--at", f"{order.time:.9f} s"]
     arguments += [f"--set={change}" for change in changes]
     if order.pace is not None:

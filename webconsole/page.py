@@ -30,6 +30,7 @@ from webconsole.commands import (
     Show,
     Start,
     Watch,
+    asked_for,
     command,
 )
 from webconsole.console import Console
@@ -130,7 +131,7 @@ class Page:
                 raise MessageError("a viewer may look, and nothing else: ask the operator for a link")
             answer = await self._do(order)
         except TrocarError as error:
-            await self._refuse(asked, str(error))
+            await self._refuse(asked or asked_for(text or ""), str(error))
             return
         if answer is not None:
             await self._tell({"is": "answer", "to": asked, **answer})

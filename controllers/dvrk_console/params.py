@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -17,6 +17,8 @@ ComponentName = Annotated[str, Field(pattern=r"^MTM[LR]_PSM[123]$")]
 
 class DvrkConsoleParams(Params):
     """Which arms there are, and which master may lead which of them."""
+
+    open_to_pages: ClassVar[bool] = True
 
     arms: tuple[CartArm, ...] = Field(
         min_length=1, description="simulated arms that `system/power_on`, `power_off` and `home` are for"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -27,6 +27,8 @@ class _Object(Params):
 
 class ExpertParams(Params):
     """The scene, the hands that work in it, and where things belong."""
+
+    open_to_pages: ClassVar[bool] = True
 
     arms: Arms
     mounting: Mounting = "free"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -110,6 +110,8 @@ class SetupJoints(Params):
 
 class MotionParams(Params):
     """Which arms are driven, and to which frame their Cartesian ports refer."""
+
+    open_to_pages: ClassVar[bool] = True
 
     arms: Arms
     mounting: Mounting = Field(

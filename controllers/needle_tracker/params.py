@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -46,6 +46,8 @@ class SlipParams(Params):
 
 class TrackerParams(Params):
     """Which needle, in which gripper, and what is known of both."""
+
+    open_to_pages: ClassVar[bool] = True
 
     arms: Arms
     mounting: Mounting = "free"

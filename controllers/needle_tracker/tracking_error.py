@@ -33,6 +33,8 @@ _NUMBERS = {
 class TrackingErrorParams(Params):
     """Which arm holds which needle, and where the arm stands."""
 
+    open_to_pages: ClassVar[bool] = True
+
     arms: Arms
     mounting: Mounting = "free"
     setup_joints: SetupJoints = SetupJoints()

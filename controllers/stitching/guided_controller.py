@@ -33,6 +33,8 @@ _FIRST_WORDS = "Pick entry and exit"
 class GuidedStitchingParams(StitchParams):
     """The scene, the two hands, and the camera in whose pictures the stitch is shown."""
 
+    open_to_pages: ClassVar[bool] = True
+
     camera: str = Field(default="endoscope", description="whose pictures the banner is in")
     width: int = Field(default=endoscope.WIDTH, ge=1, description="of its pictures, in pixels")
     height: int = Field(default=endoscope.HEIGHT, ge=1, description="of its pictures, in pixels")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import radians
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -77,6 +77,8 @@ class StitchParams(Params):
 
 class StitchingParams(StitchParams):
     """Which stitches are made, one after the other."""
+
+    open_to_pages: ClassVar[bool] = True
 
     stitches: int = Field(
         default=4, ge=1, le=4, description="how many, from the phantom's first pair of holes"

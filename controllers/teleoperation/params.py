@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -55,6 +55,8 @@ class _LedArm(Params):
 
 class TeleoperationParams(PsmTool, _LedArm):
     """How a hand leads an arm; the fingers of a hand that it may hold stay folded."""
+
+    open_to_pages: ClassVar[bool] = True
 
     instrument: InstrumentName = Field(
         default_factory=_held,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -23,6 +23,8 @@ _Point = tuple[Length, Length]
 
 class ServoingParams(Params):
     """What the target looks like, where it should be seen, and how the endoscope moves there."""
+
+    open_to_pages: ClassVar[bool] = True
 
     endoscope: ecm.Endoscope = Field(default="straight", description="as the ECM has it")
     baseline: Length = Field(

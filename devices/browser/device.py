@@ -34,6 +34,8 @@ _WAY_NS = 2_000_000
 class BrowserParams(Params):
     """What a page moves, how fast it moves, and when a silent page is no longer obeyed."""
 
+    open_to_pages: ClassVar[bool] = True
+
     stands_for: Annotated[
         StandsFor,
         Field(

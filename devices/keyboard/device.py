@@ -34,6 +34,8 @@ _LONGEST_NS = 100_000_000
 class KeyboardParams(Params):
     """What the keys move, and how fast it moves."""
 
+    open_to_pages: ClassVar[bool] = True
+
     stands_for: Annotated[
         StandsFor,
         Field(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -31,6 +31,8 @@ _Maker = Callable[[int], Sample]
 
 class ScriptedParams(Params):
     """What is played, and how."""
+
+    open_to_pages: ClassVar[bool] = True
 
     samples: Annotated[
         Path,

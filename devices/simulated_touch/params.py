@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInfo, field_validator
 
@@ -107,6 +107,8 @@ class SimulatedStylusParams(Params):
 
 class SimulatedTouchParams(Params):
     """The styluses of one simulated device."""
+
+    open_to_pages: ClassVar[bool] = True
 
     styluses: Annotated[
         dict[Annotated[str, StringConstraints(pattern=r"^[A-Za-z]\w*$")], SimulatedStylusParams],

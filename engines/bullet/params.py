@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -25,6 +25,8 @@ _LONGEST_NS, _HALVES = 1_000_000, 4
 
 class BulletParams(Params):
     """Organs, the probes that may touch them, and the numerics."""
+
+    open_to_pages: ClassVar[bool] = True
 
     organs: dict[Name, OrganParams] = Field(min_length=1)
     rigid: dict[Name, RigidParams] = Field(

@@ -33,6 +33,8 @@ __all__ = ["FmuEngine", "FmuParams"]
 class FmuParams(Params):
     """Parameters of an FMU."""
 
+    open_to_pages: ClassVar[bool] = True
+
     native_code = ("path",)
     path: Path = Field(description="the .fmu file; a relative path starts at the scenario")
     start: dict[str, Any] = Field(

@@ -6,7 +6,7 @@ Lengths in m, angles in rad, quaternions (x, y, z, w), poses in the world unless
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, model_validator, with_config
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
@@ -135,6 +135,8 @@ class SceneParams(Params):
 
 class MujocoParams(SceneParams):
     """A scene, and how it is stepped."""
+
+    open_to_pages: ClassVar[bool] = True
 
     timestep: Duration = Field(
         default=500_000, gt=0, description="sub-step of the physics; divides the participant's period"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -18,6 +18,8 @@ __all__ = ["SuturePadParams"]
 
 class SuturePadParams(Params):
     """Phantom and needle of the scene, what the tissue is like, and the numerics."""
+
+    open_to_pages: ClassVar[bool] = True
 
     fixtures: dict[Name, FixtureParams] = Field(description="as in the scene: one of them is the phantom")
     objects: dict[Name, dict[str, Any]] = Field(description="as in the scene: one of them is the needle")

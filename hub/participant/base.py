@@ -44,6 +44,12 @@ class Params(BaseModel):
     A recording that gives such a parameter is re-simulated only with `--trust`.
     """
 
+    open_to_pages: ClassVar[bool] = False
+    """Whether a page in the browser may change the numbers, switches and choices of this very model.
+
+    Set it where none of them reaches a file, a device or a network. A derived model has to set it again.
+    """
+
 
 class Participant(ABC):
     """What engines, controllers and devices have in common: a name, parameters and ports."""

@@ -10,12 +10,11 @@ from tests.webconsole.test_browser import Person
 from tests.webconsole.test_fork import until_states
 from tests.webconsole.test_gate import Visitor
 from tests.webconsole.test_page import answer, run
+from webconsole.changes import wrong_fields
 from webconsole.commands import Start
 from webconsole.live import Live
 from webconsole.recorded import Recorded
-from webconsole.start import start_arguments, start_form, wrong_fields
-
-WRONG = {"duration": "-1", "teleop.scale": "2", "stylus.max_age": "3 kg"}
+from webconsole.start import start_arguments, start_form
 
 
 def asked(**given):
@@ -36,24 +35,40 @@ def test_the_form_has_units_limits_choices_and_the_values_of_the_scenario():
     assert form["devices"] == [{"name": "stylus", "kind": "simulated-touch"}]
 
 
-def test_wrong_values_are_told_by_field_in_the_words_of_the_models(tmp_path):
-    changes = [f"{path}={value}" for path, value in WRONG.items()]
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"duration": (-1, "greater than 0"), "teleop.scale": (2, "less than or equal to 1")},
+        {
+            "stylus.max_age": ("3 kg", "expected a number in s"),
+            "teleop.law": ("/etc/passwd", "expected one of pose, velocity"),
+            "robot.looks": (1, "expected true or false"),
+            "robot.seed": (True, "expected a whole number"),
+        },
+    ],
+)
+def test_wrong_values_are_told_by_field_in_the_words_of_the_models(wrong, tmp_path):
+    changes = {path: value for path, (value, _) in wrong.items()}
     with pytest.raises(ScenarioError) as raised:
         start_arguments(asked(changes=changes), tmp_path)
-    wrong = wrong_fields(raised.value, changes)
-    assert wrong.keys() == WRONG.keys()
-    assert "greater than 0" in wrong["duration"]
-    assert "not a quantity in s" in wrong["stylus.max_age"]
+    told = wrong_fields(raised.value, changes)
+    assert told.keys() == wrong.keys()
+    for path, (_, message) in wrong.items():
+        assert message in told[path]
 
 
 def test_the_arguments_are_those_of_the_command_line(tmp_path):
     (tmp_path / "table").mkdir()
-    order = asked(changes=["teleop.scale=0.5"], lead=["stylus"], pace="realtime")
+    changes = {"teleop.scale": 5e-5, "teleop.law": "velocity", "robot.looks": True, "robot.seed": None}
+    order = asked(changes=changes, lead=["stylus"], pace="realtime")
     assert start_arguments(order, tmp_path) == [
         "run",
         "table",
         "--set=participants.stylus={kind: browser, host: remote}",
-        "--set=teleop.scale=0.5",
+        "--set=teleop.scale=5e-05",
+        '--set=teleop.law="velocity"',
+        "--set=robot.looks=true",
+        "--set=robot.seed=null",
         "--pace",
         "realtime",
         "--record",
@@ -66,7 +81,13 @@ def test_the_arguments_are_those_of_the_command_line(tmp_path):
     [
         {"scenario": "../evil.yaml"},
         {"scenario": "none"},
-        {"scenario": "table", "changes": ["participants.x={kind: 'os:system'}"]},
+        {"scenario": "table", "changes": {"participants.x": "{kind: 'os:system'}"}},
+        {"scenario": "table", "changes": {"robot.model": "/dev/zero"}},
+        {"scenario": "table", "changes": {"robot.host": "remote"}},
+        {"scenario": "table", "changes": {"stylus.kind": "ros2-dds"}},
+        {"scenario": "ros", "changes": {"ros.namespace": "elsewhere"}},
+        {"scenario": "ros-dds", "changes": {"ros.discovery": "subnet"}},
+        {"scenario": "ros-dds", "changes": {"ros.domain": 5}},
         {"scenario": "table", "lead": ["pad"]},
     ],
 )
@@ -92,7 +113,7 @@ def test_a_server_does_not_show_what_its_own_pages_have_started(recording, tmp_p
     live.start()
 
     async def body(socket):
-        order = {"do": "start", "scenario": "table", "changes": ["duration=600"], "pace": "realtime"}
+        order = {"do": "start", "scenario": "table", "changes": {"duration": 600}, "pace": "realtime"}
         await socket.send(json.dumps(order))
         assert (await answer(socket, to="start"))["number"] == 1
         (going,) = await until_states(socket, ["live"])

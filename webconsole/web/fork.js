@@ -52,7 +52,7 @@ export class Forks {
     this.link.send({
       do: "fork",
       time: Number($("fork-time").value),
-      changes: $("fork-changes").value.split("\n").map((line) => line.trim()).filter(Boolean),
+      changes: Object.fromEntries($("fork-changes").value.split("\n").filter((line) => line.trim()).map(change)),
       lead: [...$("fork-devices").querySelectorAll("input:checked:enabled")].map(({ value }) => value),
       duration: duration === "" ? null : Number(duration),
       pace: $("fork-pace").value || null,
@@ -81,6 +81,12 @@ export class Forks {
     const answer = await fetch("/forks")
     if (answer.ok) $("fork-tree").replaceChildren(drawn(await answer.json()))
   }
+}
+
+// `participant.parameter=value` as path and value of JSON; what is no number is a word.
+function change(line) {
+  const [path, ...rest] = line.split("="), text = rest.join("=").trim()
+  try { return [path.trim(), JSON.parse(text)] } catch { return [path.trim(), text] }
 }
 
 // A line for each recording over simulated time; a fork hangs on its parent where it leaves it.

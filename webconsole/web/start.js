@@ -43,14 +43,19 @@ export class Start {
   field({ path, label, about, kind, unit, value, choices, least, most }) {
     const input = kind === "choice"
       ? make("select", {}, ...(value == null ? [new Option("", "")] : []), ...choices.map((one) => new Option(one, one)))
-      : make("input", kind === "switch" ? { type: "checkbox" } : kind === "word" ? { type: "text" }
+      : make("input", kind === "switch" ? { type: "checkbox" } 
         : { type: "number", step: kind === "whole" ? 1 : "any", min: least ?? "", max: most ?? "" })
     if (kind === "switch") input.checked = value
     else input.value = value ?? ""
     input.id = `start-${path}`
     const wrong = make("span", { className: "wrong", id: `wrong-${path}`, hidden: true })
     const bounds = [least != null && `from ${least}`, most != null && `to ${most}`].filter(Boolean).join(" ")
-    const read = () => kind === "switch" ? String(input.checked) : input.validity.badInput ? "no number" : input.value.trim()
+    const read = () => {
+      if (kind === "switch") return input.checked
+      if (input.validity.badInput) return "no number"
+      if (input.value === "") return null
+      return kind === "choice" ? choices.find((one) => String(one) === input.value) : Number(input.value)
+    }
     this.fields.push({ path, input, wrong, read, before: read() })
     const name = make("label", { htmlFor: input.id, title: about }, unit ? `${label} (${unit})` : label)
     return make("div", { className: "field" }, name, input, make("span", { className: "bounds" }, bounds), wrong)
@@ -62,7 +67,8 @@ export class Start {
     this.link.send({
       do: "start",
       scenario: $("start-scenario").value,
-      changes: this.fields.filter(({ read, before }) => read() !== before).map(({ path, read }) => `${path}=${read()}`),
+      changes: Object.fromEntries(this.fields.map(({ path, read, before }) => [path, read(), before])
+        .filter(([, value, before]) => value !== before)),
       lead: [...$("start-devices").querySelectorAll("input:checked:enabled")].map(({ value }) => value),
       pace: $("start-pace").value || null,
       record: $("start-record").checked,

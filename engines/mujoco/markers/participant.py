@@ -35,6 +35,8 @@ _MOST_REASONS = 8
 class MarkersParams(SceneParams):
     """The scene in whose frames markers are, the same as the robot's."""
 
+    open_to_pages: ClassVar[bool] = True
+
     cameras: tuple[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], ...] = Field(
         default=("endoscope",),
         description="names of the cameras on the ECM, for frames `<camera>_left_optical`, as in the gateway",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -39,6 +39,8 @@ class ViewParams(Params):
 
 class EndoscopeParams(SceneParams):
     """The scene it looks at, the same as the robot's, and its cameras."""
+
+    open_to_pages: ClassVar[bool] = True
 
     width: int = Field(default=endoscope.WIDTH, ge=16, le=_MOST_PIXELS, description="pixels of each picture")
     height: int = Field(
