@@ -1,11 +1,12 @@
-"""Conformance checks for participants, and a way to run a session in one process, for tests of plug-ins.
+"""Conformance checks for participants, a driver of one, and sessions in one process: for tests of plug-ins.
 
 Authors of participants call `check_engine` or `check_device` in their own tests. A failure is an
 AssertionError that quotes the rule of `hub.participant` which is broken.
 """
 
 from hub.testing.devices import check_device
+from hub.testing.driver import Driver
 from hub.testing.engines import check_engine
 from hub.testing.sessions import run_in_process
 
-__all__ = ["check_device", "check_engine", "run_in_process"]
+__all__ = ["Driver", "check_device", "check_engine", "run_in_process"]

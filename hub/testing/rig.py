@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from hub.participant import BondPlan, Inputs, Outputs, Setup, Stepped, Value
 from hub.testing.contract import check_message, require
+from hub.testing.driver import start_value
 from hub.testing.rig_bonds import RigBonds
 from hub.transport.port_codec import PortCodec
 from schemas.errors import MessageError
@@ -138,9 +139,7 @@ class Rig:
         if port.name in inputs:
             value = inputs[port.name]
             return value if codec is None else codec.checked(np.atleast_1d(np.array(value, np.float64)))
-        if codec is None:
-            return None
-        return codec.neutral.copy() if port.start is None else np.array(port.start, np.float64)
+        return start_value(port)
 
     def _checked(self, outputs: Outputs, where: str) -> dict[str, Value]:
         """Return copies of all outputs that are due now, each checked."""

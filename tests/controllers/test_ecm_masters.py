@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from controllers.ecm_masters import EcmMasters, EcmMastersParams
-from hub.participant import Inputs
-from hub.testing import check_engine
+from hub.testing import Driver, check_engine
 from robots import rotation
 from schemas.crtk import OperatingState
 from schemas.errors import StateError
 from schemas.ros import Joy
-from schemas.vectors import VectorCodec
 
 H = 2_000_000
 LEFT, RIGHT = np.array([0.1, 0.0, 0.3]), np.array([-0.1, 0.0, 0.3])
@@ -21,29 +19,24 @@ HOME = np.array([0.1, -0.1, 0.1, 0.0])
 class Rig:
     def __init__(self, **params):
         self.participant = EcmMasters("camera", EcmMastersParams.model_validate(params))
-        ports = [
-            port
-            for port in self.participant.ports
-            if port.causality == "input" and port.variability == "signal"
-        ]
-        self.values = {
-            port.name: VectorCodec(port).neutral.copy() if port.start is None else np.array(port.start)
-            for port in ports
-        }
+        self.driver = Driver(self.participant, period_ns=H)
+        self.values = self.driver.values
         self.values["measured_js"][:4] = HOME
-        self.inputs, self.outputs = Inputs(self.values), {}
         self.put(LEFT, RIGHT)
+
+    outputs = property(lambda self: self.driver.outputs)
 
     def put(self, left, right):
         self.values["MTML/measured_cp"][:3], self.values["MTMR/measured_cp"][:3] = left, right
         return self
 
     def step(self, pressed=None, arm=None, silent=()):
-        self.inputs._events = {} if pressed is None else {"buttons": (Joy(buttons=[pressed]),)}
+        if pressed is not None:
+            self.driver.send("buttons", Joy(buttons=[pressed]))
         if arm is not None:
-            self.inputs._events["operating_state"] = (OperatingState(state=arm, is_homed=True),)
-        self.inputs._stale = {f"{master}/measured_cp" for master in silent}
-        self.outputs = self.participant.step(0, H, self.inputs)
+            self.driver.send("operating_state", OperatingState(state=arm, is_homed=True))
+        self.driver.stale(*(f"{master}/measured_cp" for master in silent))
+        self.driver.step()
         return self
 
     @property

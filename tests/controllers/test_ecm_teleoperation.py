@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,8 +6,7 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from controllers.ecm_teleoperation import EcmTeleoperation, EcmTeleoperationParams
-from hub.participant import Inputs, Setup
-from hub.testing import check_engine
+from hub.testing import Driver, check_engine
 from robots import rotation
 from robots.dvrk import ecm, endoscope
 from schemas.crtk import OperatingState
@@ -26,27 +23,23 @@ class Session:
 
     def __init__(self, q=ecm.HOME, **params):
         self.controller = EcmTeleoperation("camera", EcmTeleoperationParams.model_validate(params))
-        self.outputs = self.controller.configure(Setup(period_ns=H, directory=Path()))
-        self.head, self.twist = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), np.zeros(6)
-        self.measured, self.scale = np.array([*q, *np.zeros(8)]), np.array([self.controller.params.scale])
-        self.inputs = Inputs(
-            {"pose": self.head, "twist": self.twist, "measured_js": self.measured, "scale": self.scale}
+        self.driver = Driver(self.controller, period_ns=H)
+        self.driver.set("measured_js", [*q, *np.zeros(8)])
+        self.head, self.twist, self.measured, self.scale = (
+            self.driver.values[port] for port in ("pose", "twist", "measured_js", "scale")
         )
-        self.modes, self.warnings, self.t = [], [], 0
+        self.modes, self.warnings = [], []
+
+    outputs = property(lambda self: self.driver.outputs)
 
     def step(self, *modes, buttons=(), state=(), stale=(), count=1):
-        self.inputs._stale = set(stale)
-        for _ in range(count):
-            self.inputs._events = {
-                "mode": tuple(StringMessage(data=mode) for mode in modes),
-                "buttons": tuple(Joy(buttons=b) for b in buttons),
-                "operating_state": tuple(OperatingState(state=s, is_homed=homed) for s, homed in state),
-            }
-            modes, buttons, state = (), (), ()
-            self.outputs = self.controller.step(self.t, H, self.inputs)
-            self.modes += [m.data for m in self.outputs["active_mode"]]
-            self.warnings += [m.data for m in self.outputs["warning"]]
-            self.t += H
+        self.driver.stale(*stale)
+        self.driver.send("mode", *(StringMessage(data=mode) for mode in modes))
+        self.driver.send("buttons", *(Joy(buttons=b) for b in buttons))
+        self.driver.send("operating_state", *(OperatingState(state=s, is_homed=homed) for s, homed in state))
+        self.driver.step(count)
+        self.modes += [m.data for m in self.driver.sent.get("active_mode", ())]
+        self.warnings += [m.data for m in self.driver.sent.get("warning", ())]
         return self
 
     @property

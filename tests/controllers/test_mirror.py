@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from controllers.mirror import Mirror, MirrorParams
-from hub.participant import Inputs
-from hub.testing import check_engine
+from hub.testing import Driver, check_engine
 from schemas.crtk import OperatingState
 from schemas.errors import StateError
 from tests.controllers.motion.rig import Rig
@@ -34,20 +33,16 @@ class Pair:
             Mirror("mirror", MirrorParams.model_validate({"arms": ARMS})),
             Rig(publish_period="1 ms"),
         )
-        self.values = {
-            p.name: np.array(p.start)
-            for p in self.mirror.ports
-            if p.causality == "input" and p.variability == "signal"
-        }
-        self.inputs, self.outputs, self.said = Inputs(self.values), {}, []
+        self.driver, self.said = Driver(self.mirror, period_ns=H), []
+
+    outputs = property(lambda self: self.driver.outputs)
 
     def step(self, t_ms, silent=False):
         if not silent and t_ms % SAMPLE_MS == 0:
-            self.values["real/PSM1/measured_js"] = real_arm(t_ms * 1e-3)
-        self.inputs._stale = {"real/PSM1/measured_js"} if silent else set()
-        self.values["PSM1/measured_js"] = self.motion.outputs["PSM1/measured_js"].copy()
-        self.outputs = self.mirror.step(t_ms * H, H, self.inputs)
-        self.inputs._events = {}
+            self.driver.set("real/PSM1/measured_js", real_arm(t_ms * 1e-3))
+        self.driver.stale(*(["real/PSM1/measured_js"] if silent else []))
+        self.driver.set("PSM1/measured_js", self.motion.outputs["PSM1/measured_js"])
+        self.driver.step()
         self.said += [message.data for message in self.outputs["PSM1/warning"]]
         orders = {
             port.removeprefix("PSM1/").replace("/", "__"): self.outputs[port]
@@ -74,7 +69,7 @@ def test_an_arm_that_does_not_follow_has_neither_lag_nor_distance():
     pair = Pair()
     pair.step(0, silent=True)
     assert (pair.outputs["PSM1/lag"], pair.outputs["PSM1/distance"]) == ((), ())
-    pair.values["real/PSM1/measured_js"] = np.concatenate([CENTRE, np.zeros(12)])  # follows, but stands
+    pair.driver.set("real/PSM1/measured_js", [*CENTRE, *np.zeros(12)])  # follows, but stands
     pair.step(1)
     assert pair.outputs["PSM1/lag"] == ()
     assert len(pair.outputs["PSM1/distance"]) == 1
@@ -97,19 +92,18 @@ def test_a_silent_arm_holds_and_follows_again():
 
 def test_an_arm_that_is_not_ready_is_told_nothing():
     pair = Pair()
-    pair.inputs._events = {"PSM1/operating_state": (OperatingState(state="DISABLED"),)}
+    pair.driver.send("PSM1/operating_state", OperatingState(state="DISABLED"))
     pair.step(0)
     assert pair.outputs["PSM1/servo_jp"] == ()
-    pair.inputs._events = {"PSM1/operating_state": (OperatingState(state="ENABLED", is_homed=True),)}
+    pair.driver.send("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True))
     pair.step(1)
     assert len(pair.outputs["PSM1/servo_jp"]) == 1
 
 
 def test_positions_beyond_the_simulated_ranges_are_cut_there():
     pair = Pair()
-    pair.values["real/PSM1/measured_js"][:7] = [9.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]
-    outputs = pair.mirror.step(0, H, pair.inputs)
-    (command,) = outputs["PSM1/servo_jp"]
+    pair.driver.set("real/PSM1/measured_js", [9.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0, *np.zeros(11)])
+    (command,) = pair.driver.step()["PSM1/servo_jp"]
     assert command.position[0] == pytest.approx(np.radians(91.0), rel=0.2)
     assert command.velocity[0] == 0.0
 

@@ -3,8 +3,7 @@ import pytest
 from pydantic import ValidationError
 
 from controllers.routine import Routine, RoutineParams
-from hub.participant import Inputs, Setup
-from hub.testing import check_engine
+from hub.testing import Driver, check_engine
 from schemas.crtk import OperatingState
 from schemas.errors import SessionError, StateError
 from schemas.ros import StringMessage
@@ -28,14 +27,15 @@ class Run:
 
     def __init__(self, tmp_path, steps=STEPS, **params):
         self.routine = Routine("routine", RoutineParams.model_validate({"steps": steps, **params}))
-        self.outputs, self.t = self.routine.configure(Setup(H, tmp_path)), 0
+        self.driver = Driver(self.routine, period_ns=H, directory=tmp_path)
+
+    outputs = property(lambda self: self.driver.outputs)
 
     def step(self, **events):
-        inputs = Inputs({})
-        inputs._events = {name.replace("__", "/"): (message,) for name, message in events.items()}
-        self.outputs = dict(self.routine.step(self.t, H, inputs))
-        self.t += H
-        return {name: value for name, value in self.outputs.items() if isinstance(value, tuple) and value}
+        for name, message in events.items():
+            self.driver.send(name.replace("__", "/"), message)
+        self.driver.step()
+        return self.driver.sent
 
 
 def busy(value):
@@ -85,7 +85,7 @@ def test_a_restored_routine_goes_on_where_it_was(tmp_path):
     run.step()
     run.step(PSM1__operating_state=busy(True))
     other.routine.restore(run.routine.save())
-    other.t = run.t
+    other.driver.time_ns = run.driver.time_ns
     for one in (run, other):
         one.step(PSM1__operating_state=busy(False))
     assert other.outputs["step"][0] == 1.0

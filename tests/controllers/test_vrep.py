@@ -1,15 +1,12 @@
 """The authors' topics, stepped by hand: a robot that is exactly where it is told to be."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from controllers.vrep import VrepScene, VrepSceneParams
 from devices.ros.params import GatewayParams
 from devices.ros.topics.vrep_table import vrep_table
-from hub.participant import Inputs, Setup
-from hub.testing import check_engine
+from hub.testing import Driver, check_engine
 from robots.dvrk import setup_joints
 from schemas.errors import StateError
 from schemas.ros import BoolMessage, JointState, StringMessage
@@ -22,20 +19,17 @@ DRIVEN = ("PSM1", "PSM2", "ECM", "PSM1/jaw", "PSM2/jaw")
 class Rig:
     def __init__(self):
         self.paper = VrepScene("paper", VrepSceneParams.model_validate({"arms": ARMS}))
-        self.outputs = dict(self.paper.configure(Setup(H, Path())))
-        self.values = {
-            p.name: np.array(p.start)
-            for p in self.paper.ports
-            if p.causality == "input" and p.variability == "signal"
-        }
-        self.inputs = Inputs(self.values)
+        self.driver = Driver(self.paper, period_ns=H)
+
+    outputs = property(lambda self: self.driver.outputs)
 
     def step(self, events=()):
-        self.inputs._events = {port: (message,) for port, message in dict(events).items()}
+        for port, message in dict(events).items():
+            self.driver.send(port, message)
         for arm in DRIVEN:
             command = self.outputs[f"{arm}/servo_jp"]
-            self.values[f"{arm}/measured_js"][: command.size] = command
-        self.outputs = dict(self.paper.step(0, H, self.inputs))
+            self.driver.values[f"{arm}/measured_js"][: command.size] = command
+        self.driver.step()
         return self
 
     def state(self, topic):

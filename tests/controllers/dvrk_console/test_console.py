@@ -2,8 +2,6 @@
 a test puts in.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,7 @@ from controllers.dvrk_console.controller import DvrkConsole
 from controllers.dvrk_console.params import DvrkConsoleParams
 from devices.ros.params import GatewayParams
 from devices.ros.topics.dvrk_table import dvrk_table
-from hub.participant import Inputs, Setup
-from hub.testing import check_engine
+from hub.testing import Driver, check_engine
 from robots import rotation
 from schemas.crtk import OperatingState, StringStamped
 from schemas.errors import StateError
@@ -33,28 +30,17 @@ class Rig:
                 {"arms": ["PSM1", "PSM2", "PSM3", "ECM"], "teleoperations": PAIRS, **params}
             ),
         )
-        self.console.configure(Setup(H, Path()))
-        self.values = {
-            p.name: np.array(p.start)
-            for p in self.console.ports
-            if p.causality == "input" and p.variability == "signal"
-        }
-        self.inputs, self.t, self.heard = Inputs(self.values), 0, {}
-        self.outputs = {}
+        self.driver = Driver(self.console, period_ns=H)
+        self.values = self.driver.values
+
+    heard = property(lambda self: self.driver.sent)
+    outputs = property(lambda self: self.driver.outputs)
 
     def step(self, events=(), count=1):
         """Step with events by port; `heard` is what was said since."""
-        self.heard = {}
-        self.inputs._events = {
-            port: value if isinstance(value, tuple) else (value,) for port, value in dict(events).items()
-        }
-        for _ in range(count):
-            self.outputs = self.console.step(self.t, H, self.inputs)
-            self.t += H
-            self.inputs._events = {}
-            for port, value in self.outputs.items():
-                if isinstance(value, tuple) and value:
-                    self.heard[port] = (*self.heard.get(port, ()), *value)
+        for port, value in dict(events).items():
+            self.driver.send(port, *(value if isinstance(value, tuple) else (value,)))
+        self.driver.step(count)
         return self
 
     def said(self, port):

@@ -2,13 +2,11 @@
 test puts it.
 """
 
-from pathlib import Path
-
 import numpy as np
 
 from controllers.motion.controller import MotionController
 from controllers.motion.params import MotionParams
-from hub.participant import Inputs, Setup
+from hub.testing import Driver
 from schemas.crtk import CartesianImpedance, CartesianImpedanceHalfPlaneGains, CartesianState, StringStamped
 from schemas.ros import (
     BoolMessage,
@@ -40,15 +38,13 @@ class Rig:
                 {"mounting": "cart", "arms": arms, "initial_state": initial_state, **params}
             ),
         )
-        self.outputs = dict(self.motion.configure(Setup(H, Path())))
-        self.sensed = {}
-        for port in self.motion.ports:
-            if port.causality == "input" and port.variability == "signal":
-                self.sensed[port.name] = np.zeros(3 * len(port.names))
-        self.inputs = Inputs(self.sensed)
-        self.follows, self.t = True, 0
+        self.driver = Driver(self.motion, period_ns=H)
+        self.sensed = self.driver.values
+        self.follows = True
         self.heard = {}
         self.mirror()
+
+    outputs = property(lambda self: self.driver.outputs)
 
     def mirror(self):
         for port, value in self.sensed.items():
@@ -57,23 +53,17 @@ class Rig:
 
     def step(self, count=1, **orders):
         """Step; orders of the first step by port, `__` for `/`; PSM1's unless they name an arm."""
-        events = {}
         for name, order in orders.items():
             port = name.replace("__", "/")
-            events[port if port.startswith(("PSM", "ECM", "SUJ")) else f"PSM1/{port}"] = (
-                order if isinstance(order, tuple) else (order,)
-            )
+            port = port if port.startswith(("PSM", "ECM", "SUJ")) else f"PSM1/{port}"
+            self.driver.send(port, *(order if isinstance(order, tuple) else (order,)))
         self.heard = {}
         for _ in range(count):
-            self.inputs._events = events
-            self.outputs = dict(self.motion.step(self.t, H, self.inputs))
-            self.t += H
-            events = {}
+            self.driver.step()
             if self.follows:
                 self.mirror()
-            for port, value in self.outputs.items():
-                if isinstance(value, tuple) and value:
-                    self.heard[port] = (*self.heard.get(port, ()), *value)
+            for port, messages in self.driver.sent.items():
+                self.heard[port] = (*self.heard.get(port, ()), *messages)
         return self
 
     def command(self, text, count=1):

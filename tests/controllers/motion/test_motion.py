@@ -632,13 +632,13 @@ def test_home_that_is_not_reached_is_a_fault():
 
 def test_restore_returns_to_the_same_bits_in_the_middle_of_a_move():
     rig = Rig().step().step(150, move_jp=jp(*GOAL), jaw__servo_jp=jp(0.5))
-    saved, sensed, t = rig.motion.save(), {k: v.copy() for k, v in rig.sensed.items()}, rig.t
+    saved, sensed, t = rig.motion.save(), {k: v.copy() for k, v in rig.sensed.items()}, rig.driver.time_ns
     expected = [rig.step().motion.state_hash() for _ in range(400)]
     other = Rig()
     other.motion.restore(saved)
     for name, value in sensed.items():
         other.sensed[name][:] = value
-    other.t = t
+    other.driver.time_ns = t
     assert [other.step().motion.state_hash() for _ in range(400)] == expected
     with pytest.raises(StateError, match="8 bytes"):
         other.motion.restore(bytes(8))

@@ -401,7 +401,7 @@ def test_a_checkpoint_in_the_middle_of_a_command_to_the_tip_goes_on_to_the_same_
     other.motion.restore(rig.motion.save())
     for name, value in rig.sensed.items():
         other.sensed[name][:] = value
-    other.t = rig.t
+    other.driver.time_ns = rig.driver.time_ns
     assert [other.step().motion.state_hash() for _ in range(200)] == [
         rig.step().motion.state_hash() for _ in range(200)
     ]

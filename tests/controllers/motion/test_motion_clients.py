@@ -27,7 +27,7 @@ class Client:
 
     def wait(self, most=20_000, **order):
         """Give an order and return how many steps it took until the arm was busy and then idle."""
-        since, was_busy = self.rig.t, False
+        since, was_busy = self.rig.driver.time_ns, False
         for count in range(1, most):
             self.rig.step(1, **order)
             order = {}
@@ -63,7 +63,7 @@ def test_moves_after_one_another_all_arrive():
 def test_a_move_that_takes_another_over_before_it_is_waited_for_leaves_nobody_waiting():
     client = Client(Rig().step())
     client.rig.step(1, move_jp=jp(*GOAL))
-    client.newest = client.rig.t
+    client.newest = client.rig.driver.time_ns
     assert client.wait(move_jp=jp(*HOME)) > 1
 
 
@@ -80,7 +80,7 @@ def test_a_client_that_asks_whether_the_arm_is_busy_since_a_move_that_is_refused
     order, state
 ):
     rig = Rig(initial_state=state).step()
-    since = rig.t
+    since = rig.driver.time_ns
     rig.step(1, **order)
     (told,) = rig.heard["PSM1/operating_state"]
     assert told.header.stamp.ns > since
@@ -100,10 +100,10 @@ def test_homing_takes_time_even_where_the_arm_is_at_home(start, power_time):
 def test_two_hundred_times_disabled_and_homed():
     client = Client(Rig(initial_state="disabled", power_time="3 ms").step())
     for _ in range(200):
-        client.wait(state_command=command("home", client.rig.t + 1))
+        client.wait(state_command=command("home", client.rig.driver.time_ns + 1))
         for text in ("disable", "unhome"):
-            client.rig.step(1, state_command=command(text, client.rig.t + 1))
-            client.newest = client.rig.t
+            client.rig.step(1, state_command=command(text, client.rig.driver.time_ns + 1))
+            client.newest = client.rig.driver.time_ns
 
 
 class TestLatchedCommands:
@@ -141,7 +141,7 @@ class TestLatchedCommands:
         rig = Rig().step().step(1, state_command=command("pause", 10))
         other = Rig()
         other.motion.restore(rig.motion.save())
-        other.t = rig.t
+        other.driver.time_ns = rig.driver.time_ns
         other.step(1, state_command=command("resume", 20)).step(1, state_command=command("pause", 10))
         assert "executed before" in other.said("warning")[0]
 

@@ -1,20 +1,17 @@
 """The motion controller with the arms as MuJoCo moves them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from controllers.motion.controller import MotionController
 from controllers.motion.params import MotionParams
-from hub.participant import Inputs, Setup
+from hub.testing import Driver
 from robots import rotation
 from robots.dvrk import arms, cart
 from robots.dvrk.dynamics import STANDARD_GRAVITY
 from robots.dvrk.inertia import ENDOSCOPE_MASS
 from robots.dvrk.setup_joints import SIMULATED
 from schemas.crtk import StringStamped
-from schemas.ports import Port
 from schemas.ros import BoolMessage
 from tests.controllers.motion.rig import EMPTY, HOME, H, ci, cp, jf, jp
 
@@ -24,10 +21,6 @@ from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
 
 CHAIN = arms.chain("PSM1")
-
-
-def start_of(port: Port):
-    return np.array(port.start) if port.start is not None else np.zeros(3 * len(port.names))
 
 
 ONE = {"PSM1": {"instrument": "400006"}}
@@ -47,40 +40,33 @@ class Bench:
         self.motion = MotionController(
             "motion", MotionParams.model_validate({**scene, "initial_state": "homed"})
         )
-        self.values = {
-            p: {q.name: start_of(q) for q in p.ports if q.causality == "input" and q.variability == "signal"}
-            for p in (self.robot, self.motion)
-        }
-        self.sensed = dict(self.robot.configure(Setup(H, Path())))
-        self.told = dict(self.motion.configure(Setup(H, Path())))
-        self.t, self.complaints = 0, []
+        self.arms, self.controller = Driver(self.robot, period_ns=H), Driver(self.motion, period_ns=H)
+        self.complaints = []
+
+    sensed = property(lambda self: self.arms.outputs)
+    told = property(lambda self: self.controller.outputs)
 
     def step(self, count=1, **orders):
         """Step; orders of the first step by port, `__` for `/`; PSM1's unless they name an arm.
 
         Return PSM1's positions.
         """
-        events = {
-            name if name.startswith(("PSM", "ECM")) else f"PSM1/{name}": (order,)
-            for name, order in orders.items()
-        }
-        events = {name.replace("__", "/"): order for name, order in events.items()}
+        for name, order in orders.items():
+            port = name if name.startswith(("PSM", "ECM")) else f"PSM1/{name}"
+            self.controller.send(port.replace("__", "/"), order)
         for _ in range(count):
-            for name in self.values[self.motion]:
-                self.values[self.motion][name] = np.array(self.sensed[name.removeprefix("sense/")])
-            inputs = Inputs(self.values[self.motion])
-            inputs._events, events = events, {}
-            self.told = self.motion.step(self.t, H, inputs)
+            for name in self.controller.values:
+                self.controller.set(name, self.sensed[name.removeprefix("sense/")])
+            self.controller.step()
             self.complaints += [
                 said.data
-                for name, heard in self.told.items()
+                for name, heard in self.controller.sent.items()
                 if name.endswith(("/error", "/warning"))
                 for said in heard
             ]
-            for name in self.values[self.robot]:
-                self.values[self.robot][name] = np.array(self.told[f"drive/{name}"])
-            self.sensed = self.robot.step(self.t, H, Inputs(self.values[self.robot]))
-            self.t += H
+            for name in self.arms.values:
+                self.arms.set(name, self.told[f"drive/{name}"])
+            self.arms.step()
         return self.position("PSM1") if "PSM1/measured_js" in self.sensed else None
 
     def position(self, arm):

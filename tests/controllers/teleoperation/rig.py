@@ -1,12 +1,10 @@
 """A teleoperation stepped by hand: a master, a clutch and a clock."""
 
-from pathlib import Path
-
 import numpy as np
 
 from controllers.teleoperation.controller import Teleoperation
 from controllers.teleoperation.params import TeleoperationParams
-from hub.participant import Inputs, Setup
+from hub.testing import Driver
 from robots import rotation
 from schemas.crtk import OperatingState
 from schemas.ros import Joy
@@ -22,20 +20,12 @@ class Session:
     def __init__(self, **params):
         self.teleoperation = Teleoperation("teleop", TeleoperationParams.model_validate(params))
         self.params, self.chain = self.teleoperation.params, self.teleoperation.params.chain
-        self.outputs = self.teleoperation.configure(Setup(period_ns=H, directory=Path()))
-        values = {
-            port.name: np.array(port.start or ())
-            for port in self.teleoperation.ports
-            if port.causality == "input"
-        }
-        self.values = values | {
-            "master": np.array([0.3, -0.1, 0.2, 0.0, 0.0, 0.0, 1.0]),
-            "master_twist": np.zeros(6),
-        }
-        self.values["base_in_view"] = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-        self.inputs = Inputs(self.values)
-        self.states, self.warnings, self.t = [], [], 0
+        self.driver = Driver(self.teleoperation, period_ns=H)
+        self.values = self.driver.values
+        self.driver.set("master", [0.3, -0.1, 0.2, 0.0, 0.0, 0.0, 1.0])
+        self.states, self.warnings = [], []
 
+    outputs = property(lambda self: self.driver.outputs)
     hand = property(lambda self: self.values["master"])
     twist = property(lambda self: self.values["master_twist"])
     measured = property(lambda self: self.values["measured_js"])
@@ -45,16 +35,13 @@ class Session:
         """Step; `clutch`: lists of buttons, each an event of the first step; `arm`: an operating state and
         whether it is homed.
         """
-        self.inputs._stale = {"master"} if stale else set()
-        self.inputs._events = {"buttons": tuple(Joy(buttons=buttons) for buttons in clutch)}
+        self.driver.stale(*(["master"] if stale else []))
+        self.driver.send("buttons", *(Joy(buttons=buttons) for buttons in clutch))
         if arm is not None:
-            self.inputs._events["operating_state"] = (OperatingState(state=arm[0], is_homed=arm[1]),)
-        for _ in range(count):
-            self.outputs = self.teleoperation.step(self.t, H, self.inputs)
-            self.t += H
-            self.states += [message.data for message in self.outputs["state"]]
-            self.warnings += [message.data for message in self.outputs["warning"]]
-            self.inputs._events = {}
+            self.driver.send("operating_state", OperatingState(state=arm[0], is_homed=arm[1]))
+        self.driver.step(count)
+        self.states += [message.data for message in self.driver.sent.get("state", ())]
+        self.warnings += [message.data for message in self.driver.sent.get("warning", ())]
         return self.tip
 
     def turn_hand(self, vector):

@@ -107,8 +107,7 @@ def test_nothing_moves_while_the_clutch_is_pressed_or_the_twist_is_stale():
     assert (session.command == held).all()
     session.step([0])
     assert (session.command != held).any()
-    session.inputs._stale = {"master_twist"}
+    session.driver.stale("master_twist")
     held = session.command
-    session.inputs._events = {}
-    session.outputs = session.teleoperation.step(session.t, H, session.inputs)
+    session.driver.step()
     assert (session.command == held).all()
