@@ -208,10 +208,15 @@ class Scenario(_Part):
     answer_limit: Duration = Field(
         default=10**10,
         gt=0,
-        description="wall time after which a participant that does not answer ends the session",
+        description=(
+            "time after which a participant that does not answer ends the session; on Linux without time for"
+            " which its host waits for a processor"
+        ),
     )
     join_limit: Duration = Field(
-        default=60 * 10**9, gt=0, description="wall time to wait for all participants to join"
+        default=60 * 10**9,
+        gt=0,
+        description="time to wait for all participants to join, counted as `answer_limit`",
     )
     scene: dict[str, Any] = Field(
         default={},

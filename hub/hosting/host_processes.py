@@ -9,18 +9,19 @@ import subprocess
 import sys
 import threading
 from collections.abc import Mapping
-from time import monotonic
 
 from hub.hosting.end_with_parent import NEEDS_INPUT
 from hub.hosting.numerics import pin_numerics
+from hub.hosting.patience import Patience
 from hub.transport.host_link import HubLink
 
 __all__ = ["HostProcesses"]
 
 log = logging.getLogger(__name__)
 
-_END_S = 3.0
-"""How long a process may take to close its participants before it is killed."""
+_END_NS = 3_000_000_000
+"""How long processes may take to close their participants before they are killed."""
+_POLL_S = 0.1
 
 
 class HostProcesses:
@@ -83,6 +84,11 @@ class HostProcesses:
         process.wait()
         self._changed.set()  # `dead` may miss it this once, if the process ends while it is started
 
+    @property
+    def numbers(self) -> list[int]:
+        """The numbers of the processes that have not ended."""
+        return [process.pid for process in self._processes.values() if process.returncode is None]
+
     def dead(self) -> dict[str, str]:
         """Return, for each host whose process has ended, how it ended."""
         return {
@@ -102,9 +108,10 @@ class HostProcesses:
 
     def end(self) -> None:
         """Wait for the hosts, which end once the hub's token is gone; kill those that do not."""
-        deadline = monotonic() + _END_S
+        patience = Patience(_END_NS)
         for host, process in self._processes.items():
-            self._waiting[host].join(max(deadline - monotonic(), 0.0))
+            while self._waiting[host].is_alive() and not patience.is_over(self.numbers):
+                self._waiting[host].join(_POLL_S)
             if process.returncode is None:
                 log.warning("host '%s' (pid %d) does not end: killing it", host, process.pid)
                 process.kill()

@@ -24,7 +24,7 @@ from hub.hosting.sent_vectors import VectorsToSend
 from hub.participant import Device, Stepped
 from hub.planning.plan import PlannedParticipant
 from hub.planning.renewal import made
-from hub.transport.control_client import ask
+from hub.transport.control_client import ask, ask_as_child
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.host_link import HostLink
 from hub.transport.lane import may_spin
@@ -229,7 +229,8 @@ class HostRun:
         self._send_to_hub(self._request.model_copy(update={"failed": f"{name}: {cause}"}))
 
     def _send_to_hub(self, request: JoinRequest) -> None:
-        ask(self._session, self._keys.join(request.host), request, Empty)
+        send = ask_as_child if request.is_local else ask
+        send(self._session, self._keys.join(request.host), request, Empty)
 
     def close(self) -> None:
         """Close devices, participants and publishers."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from time import monotonic_ns, process_time_ns
 
 from hub.hosting.host_processes import HostProcesses
+from hub.hosting.patience import Patience
 from hub.planning.plan import Plan
 
 __all__ = ["Watchdog"]
@@ -31,7 +32,7 @@ class Watchdog:
     Args:
         plan: The plan of the session.
         processes: The processes to watch.
-        answer_limit_ns: How long a participant may take to answer.
+        answer_limit_ns: How long a participant may take to answer, as `Patience` counts it.
         awaited: Returns the participant for which this process waits, if it is known.
         failed: Is called with a participant's name and the cause: once, and for each observer that ends.
     """
@@ -44,10 +45,10 @@ class Watchdog:
         awaited: Callable[[], str | None],
         failed: Callable[[str, str], None],
     ) -> None:
-        self._plan, self._processes, self._limit_ns = plan, processes, answer_limit_ns
+        self._plan, self._processes = plan, processes
+        self._patience = Patience(answer_limit_ns)
         self._awaited, self._failed = awaited, failed
         self._waiting: Sequence[str] = ()
-        self._since_ns = 0
         self._ending = False
         self._lost: set[str] = set()
         """The hosts of observers that have ended."""
@@ -59,7 +60,7 @@ class Watchdog:
 
         The caller may remove a participant from the list when it has answered.
         """
-        self._since_ns = monotonic_ns()
+        self._patience.begin()
         self._waiting = participants
 
     def _run(self) -> None:
@@ -74,8 +75,9 @@ class Watchdog:
                     "the hub did not run for %.1f s: it was stopped, or the machine is too busy",
                     silent_ns / 1e9,
                 )
-                self._since_ns += silent_ns  # no answer could be received
-            failure = self._ended_process() or self._late_answer()
+            # while this process was stopped, no answer could be received
+            left_out_ns = silent_ns if silent_ns > _STOPPED_NS else 0
+            failure = self._ended_process() or self._late_answer(left_out_ns)
             if failure is not None and not self._ending:
                 # at once: the main thread may be in a call that nothing interrupts
                 log.error("participant '%s': %s", *failure)
@@ -98,13 +100,13 @@ class Watchdog:
             return missing[0], f"{how} (host '{host}' also ran {others})" if others else how
         return None
 
-    def _late_answer(self) -> tuple[str, str] | None:
+    def _late_answer(self, left_out_ns: int) -> tuple[str, str] | None:
         """Return a participant that has not answered in time, and the cause."""
-        since_ns, waiting = self._since_ns, self._unanswered()
-        if not waiting or monotonic_ns() - since_ns <= self._limit_ns:
+        waiting = self._unanswered()  # first: the wait may be over, and the next one begin, at any moment
+        if not waiting or not self._patience.is_over(self._processes.numbers, left_out_ns):
             return None
         first, *others = waiting
-        cause = f"it has not answered for {self._limit_ns / 1e9:g} s (answer_limit)"
+        cause = f"it has not answered for {self._patience.limit_ns / 1e9:g} s (answer_limit)"
         awaited = self._awaited()
         if awaited is None and others:
             cause += f"; nor have {', '.join(others)}, which may wait for it"

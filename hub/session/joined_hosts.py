@@ -105,19 +105,18 @@ class JoinedHosts:
         if request.ready or request.failed or request.ended:
             return Empty()
         params = {name: self._scenario.participants[name].params for name in names}
-        far = request.host.startswith("remote/")
         return JoinReply(
             session=self._scenario.name,
             run=self._run,
             admission=self._admissions,
-            plan=self._plan.seen_from(request.host) if far else self._plan,
+            plan=self._plan if request.is_local else self._plan.seen_from(request.host),
             params=params,
             directory=str(self._directory),
             watched=[output for output in self._watched if output[0] in names],
             sent_with_acks=[output for output in self._sent_with_acks if output[0] in names],
             ack_key=self._ack_keys[request.host].hex(),
-            programs_endpoint="" if far else self._programs_endpoint,
-            profile=self._profile and not far,
+            programs_endpoint=self._programs_endpoint if request.is_local else "",
+            profile=self._profile and request.is_local,
             renewals=[one.of(names) for one in self._renewals],
             live_from_ns=self._live_from_ns,
         )

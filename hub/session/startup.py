@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from time import monotonic, sleep
+from time import sleep
 
+from hub.hosting.patience import Patience
 from hub.planning.bonds import check_bonds
 from hub.planning.plan import Plan
 from hub.session.run import Run
@@ -34,10 +35,9 @@ def start(run: Run) -> None:
 
 
 def _wait_for_hosts(run: Run, hosts: list[str]) -> None:
-    limit_s = run.spec.scenario.join_limit / 1e9
+    patience = Patience(run.spec.scenario.join_limit)
     gate = run.spec.gate
     endpoints = ", ".join((run.spec.endpoint, *(gate.endpoints if gate is not None else ())))
-    deadline = monotonic() + limit_s
     logged: list[str] = []
     while missing := run.joined_hosts.missing(hosts):
         run.failure.check()
@@ -46,7 +46,8 @@ def _wait_for_hosts(run: Run, hosts: list[str]) -> None:
         if missing != logged:
             log.info("waiting for %s to join at %s", ", ".join(missing), endpoints)
         logged = missing
-        if monotonic() > deadline:
+        if patience.is_over(run.processes.numbers):
+            limit_s = patience.limit_ns / 1e9
             named = ", ".join(_with_participants(host, run.spec.plan) for host in missing)
             raise SessionError(f"{named} did not join within {limit_s:g} s (join_limit) at {endpoints}")
 

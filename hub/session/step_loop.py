@@ -9,6 +9,7 @@ from time import monotonic, monotonic_ns, sleep
 
 import zenoh
 
+from hub.hosting.patience import Patience
 from hub.observation.summary import Progress
 from hub.planning.plan import PlannedParticipant
 from hub.session.run import Run
@@ -25,7 +26,7 @@ _STATUS_S = 0.5
 """Everything so far goes to the recorder with a status."""
 _RECORDED_TOGETHER = 64
 """Or as soon as it is so much: a call of the recorder costs as much as some ten messages."""
-_VALUES_S = 5.0
+_VALUES_NS = 5_000_000_000
 """How long values of the last steps may take that come over Zenoh, when the acks have arrived."""
 
 OnAck = Callable[[PlannedParticipant, Ack], None]
@@ -100,11 +101,11 @@ class StepLoop:
 
     def _wait_for_values(self) -> None:
         """Wait until the recorder and the measures have the values of the last steps."""
-        deadline = monotonic() + _VALUES_S
+        patience = Patience(_VALUES_NS)
         while not self._run.monitor.received(self._run.clock.step):
             self._run.failure.check()
-            if monotonic() > deadline:
-                log.warning("values of the last steps have not arrived within %g s", _VALUES_S)
+            if patience.is_over(self._run.processes.numbers):
+                log.warning("values of the last steps have not arrived within %g s", _VALUES_NS / 1e9)
                 return
             sleep(0.001)
 

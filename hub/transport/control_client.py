@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from time import monotonic, sleep
 from typing import TypeVar
 
@@ -14,9 +15,12 @@ from schemas.errors import ConnectError, MessageError
 from schemas.keys import Keys
 from schemas.ros import StringMessage
 
-__all__ = ["ask", "join_session"]
+__all__ = ["ask", "ask_as_child", "join_session"]
 
-_PATIENCE_S = 5.0
+_STARTING_S = 5.0
+"""A hub that has only just started to listen answers within this time."""
+_ANSWER_S = 10.0
+_RETRY_S = 0.1
 
 
 R = TypeVar("R", bound=BaseModel)
@@ -46,16 +50,30 @@ def ask(
     raise ConnectError(f"no answer on {key}: is the hub running, and does its session have what this names?")
 
 
+def ask_as_child(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[R]) -> R:
+    """Send a control request from a process that ends with the hub, until the hub answers.
+
+    Raises MessageError if the request is refused.
+    """
+    while True:
+        with suppress(ConnectError):
+            return ask(session, key, request, reply_model, timeout_s=_ANSWER_S)
+        sleep(_RETRY_S)
+
+
 def join_session(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
     """Join a session with a host, and return the hub's reply.
 
-    A hub that has only just started to listen gets a few seconds. Raises what `ask` raises.
+    Raises what `ask` raises; a host that the hub has started waits as long as the hub lives.
     """
-    deadline = monotonic() + _PATIENCE_S
+    key = keys.join(request.host)
+    if request.is_local:
+        return ask_as_child(session, key, request, JoinReply)
+    deadline = monotonic() + _STARTING_S
     while True:
         try:
-            return ask(session, keys.join(request.host), request, JoinReply, timeout_s=10.0)
+            return ask(session, key, request, JoinReply, timeout_s=_ANSWER_S)
         except ConnectError:
             if monotonic() > deadline:
                 raise
-            sleep(0.1)
+            sleep(_RETRY_S)

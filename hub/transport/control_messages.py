@@ -67,6 +67,11 @@ class JoinRequest(_Json):
     ended: str = ""
     """Why a participant of the host ends the session: `participant: reason`."""
 
+    @property
+    def is_local(self) -> bool:
+        """Whether the hub itself has started the host."""
+        return not self.host.startswith("remote/")
+
 
 class ClockReply(_Json):
     """The time by the hub's monotonic clock: when the request arrived, and when the reply was sent."""
