@@ -1,1 +1,1 @@
-"""Scripted experts: programs that do the training tasks from the poses they are given, as a person would."""
+"""Scripted experts for the training tasks, led by measured poses."""

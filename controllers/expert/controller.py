@@ -1,4 +1,4 @@
-"""The expert as a participant: its hands, what they measure, and the commands that they send."""
+"""The expert as a participant: measurements in, commands of its hands out."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from controllers.expert.chores import Chore
-from controllers.expert.dishes import PickAndPlace
-from controllers.expert.hand import Hand, Phase, framed
+from controllers.expert.chore import Chore
+from controllers.expert.hand import HandPhase, RobotHand, framed
 from controllers.expert.params import ExpertParams
+from controllers.expert.peg_board import PegBoard
+from controllers.expert.pick_and_place import PickAndPlace
 from controllers.expert.ports import EVENTS, PROGRESS, expert_ports
-from controllers.expert.posts import PegBoard
-from controllers.expert.progress import Progress, Seen, Verdict
+from controllers.expert.progress import ObservedObjects, Progress, Verdict
 from controllers.expert.team import Team
 from controllers.expert.transfer import Transfer
 from controllers.motion.frames import base_in_world
@@ -35,7 +35,7 @@ _VERDICTS = {
 
 
 class Expert(Controller):
-    """Carries the things of a training scene where they belong."""
+    """Carries the objects of a training scene to their targets."""
 
     params_model: ClassVar[type[Params]] = ExpertParams
     params: ExpertParams
@@ -43,9 +43,9 @@ class Expert(Controller):
     def __init__(self, name: str, params: ExpertParams) -> None:
         super().__init__(name, params)
         chore = self._chore = _chore(params)
-        self._progress, self._seen = Progress(), Seen(n=len(chore.things))
+        self._progress, self._seen = Progress(), ObservedObjects(n=len(chore.objects))
         self._team = Team(chore, self._seen, self._progress, hand_over=params.hand_over)
-        self._hands = [Transfer(self._hand(arm), self._team, len(chore.things)) for arm in params.hands]
+        self._hands = [Transfer(self._hand(arm), self._team, len(chore.objects)) for arm in params.hands]
         for each in self._hands:
             self._team.add(each)
         self.keep(
@@ -56,25 +56,29 @@ class Expert(Controller):
         self._outputs: dict[str, Any] = {field: self._progress.part(field) for field in PROGRESS}
         self._outputs |= {f"{each.hand.arm}/phase": each.state.part("phase") for each in self._hands}
 
-    def _hand(self, arm: ArmName) -> Hand:
+    def _hand(self, arm: ArmName) -> RobotHand:
         params = self.params
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
         held = cast("PsmParams", params.arms.driven[arm])
         if held.tool.jaw is None:
             raise SessionError(f"expert '{self.name}': {arm} holds {held.tool.name}, which has no jaw")
-        return Hand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
+        return RobotHand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Measured tips and jaws and the things' poses and holders in; commands and progress out."""
-        return expert_ports([each.hand.arm for each in self._hands], self._chore.things)
+        """Measured tips and jaws and the objects' poses and holders in; commands and progress out."""
+        return expert_ports([each.hand.arm for each in self._hands], self._chore.objects)
 
     @property
     def ended(self) -> str:
-        """Ends the session once all is where it belongs, or nothing more can be done."""
+        """Reason to end the session: the task is done, or nothing more can be done."""
         if not self.params.end or not self._progress.over:
             return ""
-        return "the task is done" if self._progress.done else f"nothing more can be done: {self._left()}"
+        return (
+            "the task is done"
+            if self._progress.done
+            else f"nothing more can be done: {self._describe_left()}"
+        )
 
     def configure(self, setup: Setup) -> Outputs:
         """Start with idle hands."""
@@ -85,9 +89,9 @@ class Expert(Controller):
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
-        """Read what is measured, let every hand do what comes next, and send the commands.
+        """Read measurements, advance every hand, and send the commands.
 
-        Raises SessionError if a command to a hand that carries something is refused.
+        Raises SessionError if a command to a hand with an object is refused.
         """
         self._sense(inputs)
         for each in self._hands:
@@ -98,23 +102,23 @@ class Expert(Controller):
             arm = each.hand.arm
             self._outputs[f"{arm}/servo_cp"] = (each.hand.advance(settle=each.settles),)
             self._outputs[f"{arm}/jaw/move_jp"] = each.hand.jaw_commands()
-        self._judge()
+        self._update_progress()
         return self._outputs
 
-    def _judge(self) -> None:
-        """See how far the task is, begin the next leg where one is over, and say what is left."""
+    def _update_progress(self) -> None:
+        """Update progress and verdicts, and begin the next leg if a leg is over."""
         team, progress, seen = self._team, self._progress, self._seen
         team.judge()
         verdicts = seen.verdicts.tolist()
         progress.not_reachable = verdicts.count(Verdict.NOT_REACHABLE)
         progress.lost, progress.blocked = verdicts.count(Verdict.LOST), verdicts.count(Verdict.BLOCKED)
         if not progress.over:
-            done = [team.is_done(thing) for thing in range(len(verdicts))]
+            done = [team.is_done(index) for index in range(len(verdicts))]
             progress.placed = sum(done)
             settled = all(is_done or verdict for is_done, verdict in zip(done, verdicts, strict=True))
-            if settled and all(each.state.phase is Phase.IDLE for each in self._hands):
+            if settled and all(each.state.phase is HandPhase.IDLE for each in self._hands):
                 self._end_leg()
-        self._outputs["status"] = tuple(self._news())
+        self._outputs["status"] = tuple(self._new_verdicts())
 
     def _end_leg(self) -> None:
         progress, seen = self._progress, self._seen
@@ -126,22 +130,22 @@ class Expert(Controller):
         else:
             progress.over, progress.done = True, is_whole
 
-    def _news(self) -> Iterator[StringMessage]:
-        """Yield a sentence on each thing of which the verdict is new."""
+    def _new_verdicts(self) -> Iterator[StringMessage]:
+        """Yield a sentence for each new verdict."""
         seen = self._seen
-        for thing in np.flatnonzero(seen.verdicts != seen.said).tolist():
-            if seen.verdicts[thing]:
-                yield StringMessage(data=self._sentence(thing))
+        for index in np.flatnonzero(seen.verdicts != seen.said).tolist():
+            if seen.verdicts[index]:
+                yield StringMessage(data=self._sentence(index))
         seen.said[:] = seen.verdicts
 
-    def _left(self) -> str:
-        return "; ".join(self._sentence(thing) for thing in np.flatnonzero(self._seen.verdicts).tolist())
+    def _describe_left(self) -> str:
+        return "; ".join(self._sentence(index) for index in np.flatnonzero(self._seen.verdicts).tolist())
 
-    def _sentence(self, thing: int) -> str:
+    def _sentence(self, index: int) -> str:
         seen = self._seen
-        why = _VERDICTS[Verdict(int(seen.verdicts[thing]))]
-        x, y, z = (1e3 * seen.poses[thing, :3, 3]).tolist()
-        return f"{self._chore.things[thing]} {why}, at ({x:.0f}, {y:.0f}, {z:.0f}) mm"
+        why = _VERDICTS[Verdict(int(seen.verdicts[index]))]
+        x, y, z = (1e3 * seen.poses[index, :3, 3]).tolist()
+        return f"{self._chore.objects[index]} {why}, at ({x:.0f}, {y:.0f}, {z:.0f}) mm"
 
     def _sense(self, inputs: Inputs) -> None:
         for each in self._hands:
@@ -152,9 +156,9 @@ class Expert(Controller):
                     if not each.refuse():
                         raise SessionError(f"expert '{self.name}', {arm} in phase '{phase}': {text}")
             each.hand.sense(inputs[f"{arm}/local/measured_cp"], float(inputs[f"{arm}/jaw/measured_js"][0]))
-        for i, thing in enumerate(self._chore.things):
-            holder = float(inputs[f"objects/{thing}/held_by"][0])
-            self._seen.take(i, framed(inputs[f"objects/{thing}/pose"]), holder, self._hands[0].hand.period)
+        for i, name in enumerate(self._chore.objects):
+            holder = float(inputs[f"objects/{name}/held_by"][0])
+            self._seen.observe(i, framed(inputs[f"objects/{name}/pose"]), holder, self._hands[0].hand.period)
 
 
 def _chore(params: ExpertParams) -> Chore:

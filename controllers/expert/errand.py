@@ -1,4 +1,4 @@
-"""What a hand is about: where it and its thing are, whether it holds, and what it may do at any time.
+"""The task of one hand with one object: poses, grip, and the moves common to all phases.
 
 SI units, poses in the world.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from controllers.expert.fallen_rings import BESIDE
-from controllers.expert.hand import Hand, Phase
+from controllers.expert.hand import HandPhase, RobotHand
 from controllers.expert.team import Refusals, Team
 from robots import rotation
 from schemas.vectors import Vector
@@ -16,105 +16,103 @@ from schemas.vectors import Vector
 __all__ = ["GENTLE", "PATIENCE", "TURNING", "Errand"]
 
 PATIENCE = 0.6
-"""s for which a hand tries to bring its tip or its thing where it is sent; then it goes on with what it has
-reached.
-"""
+"""Longest wait for a tip or an object to reach its target, s; then the next phase begins all the same."""
 GENTLE = 0.4
-"""Share of the speed with which a hand comes down on things."""
+"""Fraction of the speed for the descent to an object."""
 TURNING = 0.015
-"""m: so much higher than it travels a thing is put upright, as it swings about the tip."""
+"""Extra height for putting an object upright, m: the object swings about the tip."""
 _HOVER = 0.020
-"""Of a tip over its grasp before it goes down and after it has let go, m."""
+"""Height of the tip over the grasp before the descent and after the release, m."""
 _HELD_OPEN = 0.03
-"""rad: a jaw commanded to shut that stays this far open has something between its fingers."""
+"""A jaw commanded to shut and open by more than this angle holds an object, rad."""
 _UNHELD = 0.25
-"""s without a holder after which a thing is lost."""
+"""Time without a holder until an object counts as lost, s."""
 _AS_WIDE = 0.9
-"""Share of its opening at which a jaw that still touches what it let go of does not come free by itself."""
+"""Above this fraction of full opening, a jaw still in contact is considered stuck."""
 
 
 class Errand:
-    """Of one hand, with one thing after the other."""
+    """One hand's current transfer task."""
 
-    def __init__(self, hand: Hand, team: Team, things: int) -> None:
-        """Take the hand, its team, and how many things there are."""
+    def __init__(self, hand: RobotHand, team: Team, objects: int) -> None:
+        """`objects`: number of objects of the scene."""
         self.hand, self.team, self.state = hand, team, hand.state
         self._chore, self._seen, self._progress = team.chore, team.seen, team.progress
-        self.refusals = Refusals(n=things)
+        self.refusals = Refusals(n=objects)
 
-    def _enter(self, phase: Phase, goal: Vector | None = None, share: float = 1.0) -> None:
-        """Begin `phase`, with a line to `goal` or, without one, where the tip stands."""
+    def _enter(self, phase: HandPhase, goal: Vector | None = None, share: float = 1.0) -> None:
+        """Begin `phase` with a line to `goal`, by default to the commanded pose."""
         self.state.phase, self.state.waited = phase, 0.0
         self.hand.go(self.hand.line() if goal is None else goal, share)
 
-    def _raised(self, height: float) -> Vector:
+    def _line_raised_to(self, height: float) -> Vector:
         """Return the pose of the tip's line, not below `height`."""
         goal = self.hand.line()
         goal[2] = max(goal[2], height)
         return goal
 
-    def _moved(self, by: Vector) -> Vector:
+    def _line_moved_by(self, by: Vector) -> Vector:
         goal = self.hand.line()
         goal[:3] += by
         return goal
 
-    def _lifted(self) -> Vector:
-        """Return the pose of the tip at which the thing's middle is as high as it travels."""
+    def _travel_pose(self) -> Vector:
+        """Return the pose of the tip with the object's middle at travel height."""
         height = self._chore.travel + (TURNING if self.state.leans else 0.0)
-        return self._moved(np.array([0.0, 0.0, height - self._middle[2]]))
+        return self._line_moved_by(np.array([0.0, 0.0, height - self._middle[2]]))
 
     @property
     def _middle(self) -> Vector:
-        """Where the middle of the thing is, m."""
-        return self._seen.poses[self.state.thing, :3, 3]
+        """Middle of the object, m."""
+        return self._seen.poses[self.state.object_index, :3, 3]
 
     @property
     def _up(self) -> Vector:
-        """The axis of the thing that is to be up, in the world."""
-        return self._seen.poses[self.state.thing, :3, :3] @ self.state.up
+        """Axis of the object to be upright, in the world."""
+        return self._seen.poses[self.state.object_index, :3, :3] @ self.state.up
 
     @property
     def _before(self) -> Vector:
-        """The pose of the tip from which its fingers go straight to the grasp."""
+        """Pose of the tip before the straight approach to the grasp."""
         goal = self.state.grasp.copy()
         goal[:3] -= (BESIDE if self.state.leans else _HOVER) * rotation.matrix(goal[3:])[:, 2]
         return goal
 
     @property
     def _back(self) -> Vector:
-        """The way on which a hand leaves what it has let go of, m."""
+        """Displacement of the tip away from a released object, m."""
         return -(BESIDE if self.state.leans else _HOVER) * rotation.matrix(self.hand.line()[3:])[:, 2]
 
     @property
     def _holds(self) -> bool:
-        """Whether the thing is held, and something is between the fingers.
+        """Whether the object is held, and the fingers are not shut.
 
-        The engine names one holder, of two the first, and none where a finger leaves it for a moment.
+        The engine names one holder, the first of two, and none while a finger is off for a moment.
         """
         return self.state.unheld < _UNHELD and self.hand.angle > _HELD_OPEN
 
     @property
     def _clings(self) -> bool:
-        """Whether open fingers both touch what was let go of; a ring's corner is wider than its wall."""
+        """Whether both open fingers touch the released object; a ring's corner is wider than its wall."""
         is_open = self.hand.angle > _AS_WIDE * self.state.opening
-        return is_open and self._seen.holders[self.state.thing] == self.hand.number
+        return is_open and self._seen.holders[self.state.object_index] == self.hand.number
 
     @property
     def _is_there(self) -> bool:
-        """Whether the tip rests where it was sent, or has tried for long enough."""
+        """Whether the tip has settled at its goal, or the wait is over."""
         return self.hand.has_settled or self.state.waited > PATIENCE
 
     @property
     def _level(self) -> float:
-        """Height of the tip at which an empty hand passes over everything, m."""
+        """Height of the tip of an empty hand above all obstacles, m."""
         return max(self._chore.clear + self.hand.jaw.length, self._before[2])
 
     def _let_go(self) -> None:
         self.hand.move_jaw(self.state.opening)
-        self._enter(Phase.OPEN)
+        self._enter(HandPhase.OPEN)
 
-    def _lost(self) -> bool:
-        """Say whether the thing is not held any more; the hand then gives up."""
+    def _has_lost(self) -> bool:
+        """Return whether the object is not held any more; then let go."""
         if self._holds:
             return False
         self._progress.dropped += 1
@@ -122,5 +120,5 @@ class Errand:
         return True
 
     def _give_up(self) -> None:
-        self.state.thing = -1
-        self._enter(Phase.IDLE)
+        self.state.object_index = -1
+        self._enter(HandPhase.IDLE)

@@ -1,7 +1,7 @@
-"""How a jaw may take hold of a ring that lies on its side or leans on something: by a wall, from an open end.
+"""Grasps of a ring on its side or leaning on an obstacle: by a wall, from an open end.
 
-One finger comes into the hole, one stays outside; both point along the wall, at an angle to the ring's axis,
-as far down as the wrist allows. Metres and radians, poses in the world.
+One finger is in the hole, one outside; both point along the wall, at an angle to the ring's axis, as far down
+as the wrist allows. Metres and radians, poses in the world.
 """
 
 from __future__ import annotations
@@ -12,48 +12,48 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.expert.grasps import AJAR, FINGER, FREE, ROOMY, Grasps
+from controllers.expert.grasps import AMPLE_ROOM, FINGER_SIZE, LEAST_ROOM, RING_OPENING, Grasps
 from robots.dvrk.instruments import WRIST_RADIUS
 from robots.training.boards import Ring
 from schemas.vectors import Vector
 
-__all__ = ["BESIDE", "Around", "of_fallen_ring"]
+__all__ = ["BESIDE", "Around", "grasps_of_fallen_ring"]
 
 BESIDE = 10.0e-3
-"""Way that the fingers go straight along themselves to a thing that leans, and back, m."""
+"""Length of the straight approach along the fingers to a fallen object, and of the retreat, m."""
 
 _DEPTH = 4.0e-3
-"""How deep the fingers reach into the ring, along its axis, m."""
+"""Depth of the fingers in the ring, along the ring's axis, m."""
 _TILTS = tuple(np.radians([0.0, 15.0, 30.0, 45.0]))
-"""Of the fingers against the ring's axis, in the plane of the wall, rad."""
+"""Angles between the fingers and the ring's axis, in the plane of the wall, rad."""
 _ASIDE = (-2.5e-3, 0.0, 2.5e-3)
-"""How far from the middle of the wall the fingers end, m."""
+"""Offsets of the fingers' ends from the middle of the wall, m."""
 _DOWN = 0.25
-"""Least share of the fingers' length by which they point down."""
+"""Least downward component of the fingers' direction."""
 _OVER = 0.5e-3
-"""Between the fingers' ends and what the ring lies on, m."""
+"""Gap between the fingers' ends and the ground under the ring, m."""
 _SAMPLES = 5
-"""Points of each finger, and of its way, that are held against posts and walls."""
+"""Number of points of each finger and of its approach checked against posts and walls."""
 
 
 class Around(NamedTuple):
-    """What stands around a ring, m, in the world."""
+    """Obstacles around a ring, m, in the world."""
 
     floor: float
-    """Height of what it lies on."""
+    """Height of the ground under the ring."""
     posts: Vector
-    """Where upright posts stand, shape (n, 2)."""
+    """Positions of upright posts, shape (n, 2)."""
     post_radius: float
     post_top: float
-    """Height of their ends."""
+    """Height of the posts' upper ends."""
     boxes: tuple[tuple[Vector, Vector], ...] = ()
     """Walls: least and greatest coordinates of each, shape (3,)."""
 
 
-def of_fallen_ring(ring: Ring, pose: Vector, reach: float, around: Around) -> Grasps:
-    """Return the grasps of a ring with any `pose`, shape (4, 4), that keep clear of what is `around` it.
+def grasps_of_fallen_ring(ring: Ring, pose: Vector, reach: float, around: Around) -> Grasps:
+    """Return the grasps of a ring with any `pose`, shape (4, 4), clear of obstacles.
 
-    `reach` is the length of the fingers. The axis that is to be up is that of the end they come through.
+    `reach` is the length of the fingers. The end of the ring with the fingers is to be the upper end.
     """
     axis, middle = pose[:3, 2], pose[:3, 3]
     poses, outwards, ups = list[Vector](), list[Vector](), list[Vector]()
@@ -81,33 +81,33 @@ def of_fallen_ring(ring: Ring, pose: Vector, reach: float, around: Around) -> Gr
                 ups.append(out)
     return Grasps(
         np.array(poses).reshape(-1, 4, 4),
-        np.full(len(poses), AJAR),
+        np.full(len(poses), RING_OPENING),
         np.array(outwards).reshape(-1, 2),
         np.array(ups).reshape(-1, 3),
-        np.full(len(poses), ROOMY),
+        np.full(len(poses), AMPLE_ROOM),
     )
 
 
 def _fits(ring: Ring, tilt: float, aside: float, reach: float) -> bool:
-    """Say whether the open finger in the hole, whose end is `aside` (m), keeps clear of the other two walls.
+    """Return whether the inner finger, with its end `aside` (m), is clear of the other two walls.
 
-    At a distance q (m) from the axis towards its wall the triangle of the hole is (2 r + q) / sqrt(3) wide to
-    either side, r being its inradius.
+    At a distance q (m) from the axis towards a wall the triangular hole of inradius r has a half width of
+    (2 r + q) / sqrt(3).
     """
-    inner = ring.inradius - reach * sin(AJAR / 2.0) - FINGER[0]
-    room = (2.0 * ring.inradius + inner) / sqrt(3.0) - FINGER[1] / cos(tilt)
+    inner = ring.inradius - reach * sin(RING_OPENING / 2.0) - FINGER_SIZE[0]
+    room = (2.0 * ring.inradius + inner) / sqrt(3.0) - FINGER_SIZE[1] / cos(tilt)
     return max(abs(aside), abs(aside - _DEPTH * tan(tilt))) <= room
 
 
 def _is_clear(ends: Vector, fingers: Vector, normal: Vector, reach: float, around: Around) -> bool:
-    """Say whether open fingers, as long as `reach`, whose ends meet at `ends`, and the wrist are clear.
+    """Return whether open fingers of length `reach`, closing at `ends`, and the wrist are clear of obstacles.
 
-    That is there, on the way of `BESIDE` to it, and on the way down to where that begins.
+    Checked are the grasp, the straight approach (`BESIDE`) and the descent to the approach.
     """
-    wrist, thick = ends - reach * fingers, FINGER[0] / 2.0
-    if wrist[2] - WRIST_RADIUS < around.floor + FREE:
+    wrist, thick = ends - reach * fingers, FINGER_SIZE[0] / 2.0
+    if wrist[2] - WRIST_RADIUS < around.floor + LEAST_ROOM:
         return False
-    sides = [ends + side * (reach * sin(AJAR / 2.0) + thick) * normal for side in (1.0, -1.0)]
+    sides = [ends + side * (reach * sin(RING_OPENING / 2.0) + thick) * normal for side in (1.0, -1.0)]
     if min(side[2] for side in sides) - thick < around.floor + _OVER:
         return False
     shares = np.linspace(0.0, 1.0, _SAMPLES)

@@ -1,8 +1,7 @@
-"""How a jaw may take hold of a thing that stands upright, or of a block in any attitude.
+"""Grasps of an upright ring, and of a block in any attitude.
 
-A grasp is a pose of the tip, shape (4, 4), whose z points along the closed fingers and whose y is the way the
-left finger opens; the tip's origin is in the wrist yaw axis (robots.dvrk.instruments). Metres and radians,
-poses in the world.
+A grasp is a pose of the tip, shape (4, 4): z along the closed fingers, y in the opening direction of the left
+finger, origin on the wrist yaw axis (robots.dvrk.instruments). Metres and radians, poses in the world.
 """
 
 from __future__ import annotations
@@ -19,54 +18,64 @@ from robots.training.boards import Ring
 from robots.training.dishes import PIECE
 from schemas.vectors import Vector
 
-__all__ = ["AJAR", "FINGER", "FREE", "ROOMY", "UPRIGHT", "Grasps", "of_piece", "of_ring", "shut_fingers"]
+__all__ = [
+    "AMPLE_ROOM",
+    "FINGER_SIZE",
+    "LEAST_ROOM",
+    "RING_OPENING",
+    "UPRIGHT_COSINE",
+    "Grasps",
+    "grasps_of_piece",
+    "grasps_of_ring",
+    "shut_fingers",
+]
 
 _BITE = 1.0e-3
-"""How far from the ends of the fingers the edges of a block touch them, m."""
+"""Distance from the ends of the fingers to the edges of a block between the fingers, m."""
 _ROOM = 2.0e-3
-"""Between an open finger and the block on either side, m."""
+"""Gap between an open finger and the block on either side, m."""
 _WIDEST = 1.39
 """Largest opening of the jaw, rad (robots.dvrk.instruments)."""
 _DEPTH = 5.0e-3
-"""How deep the fingers reach into a ring, m."""
+"""Depth of the fingers in a ring, m."""
 _ASIDE = (-3.0e-3, -1.5e-3, 0.0, 1.5e-3, 3.0e-3)
-"""How far from the middle of a ring's wall they may end, m."""
-AJAR = 0.20
-"""Opening with which a jaw comes down on the wall of a ring, rad."""
-FINGER = (1.4e-3, 2.1e-3)
-"""Thickness and half the width of a finger of a needle driver near its end, m (engines.mujoco.looks)."""
-FREE = 0.3e-3
-"""Least room between the fingers at a ring and the post, its other walls and other rings, m."""
-ROOMY = 1.0e-3
-"""Such room beyond which more is no better, m. A tip that comes down passes up to 0.5 mm beside its line."""
+"""Offsets of the fingers from the middle of a ring's wall, along the wall, m."""
+RING_OPENING = 0.20
+"""Jaw opening for the descent on the wall of a ring, rad."""
+FINGER_SIZE = (1.4e-3, 2.1e-3)
+"""Thickness and half width of a finger of a needle driver near its end, m (engines.mujoco.looks)."""
+LEAST_ROOM = 0.3e-3
+"""Least clearance of the fingers at a ring from the post, the ring's other walls and other rings, m."""
+AMPLE_ROOM = 1.0e-3
+"""Clearance without further benefit, m. A tip in descent is up to 0.5 mm off its line."""
 _SAMPLES = 5
-"""Points of the finger in a ring that are held against the post."""
-UPRIGHT = cos(0.35)
-"""Height of the axis of a thing that need not be put upright, over its length."""
+"""Number of points of the finger in a ring checked against the post."""
+UPRIGHT_COSINE = cos(0.35)
+"""Cosine of the largest tilt of an object considered upright."""
 _STEEP = 0.5
-"""The same of the face of a block through which fingers reach for it."""
+"""Cosine of the largest tilt of a block's face open to a grasp."""
 
 
 class Grasps(NamedTuple):
-    """Ways to take hold of one thing."""
+    """Grasps of one object."""
 
     poses: Vector
-    """Of the tip, shape (n, 4, 4); none where the thing cannot be taken."""
+    """Poses of the tip, shape (n, 4, 4); empty: no grasp."""
     opening: Vector
-    """Of the jaw before it closes, rad, shape (n,)."""
+    """Jaw opening before the grasp, rad, shape (n,)."""
     outwards: Vector
-    """Horizontal way from the thing's middle to the grasp, m, shape (n, 2)."""
+    """Horizontal displacement from the object's middle to the grasp, m, shape (n, 2)."""
     ups: Vector
-    """Axis of the thing that is upright, or is to be before it is put down, shape (n, 3), in the world."""
+    """Axis of the object to be upright at its target, shape (n, 3), in the world."""
     room: Vector
-    """Between the fingers and what they are not to touch, at most `ROOMY`, m, shape (n,)."""
+    """Clearance of the fingers from obstacles, at most `AMPLE_ROOM`, m, shape (n,)."""
 
 
-def of_piece(pose: Vector, reach: float) -> Grasps:
-    """Return the grasps of a block with `pose`, shape (4, 4), through each of its faces that looks upwards.
+def grasps_of_piece(pose: Vector, reach: float) -> Grasps:
+    """Return the grasps of a block with `pose`, shape (4, 4), through each of the block's upward faces.
 
-    The edges of that face come between the fingers, which are a wedge as long as the jaw is open: `reach` is
-    their length. Either side that is narrow enough will do, and either finger on either side.
+    The edges of the face lie between the open fingers, a wedge of length `reach`. Both sides of the face and
+    both assignments of fingers are considered.
     """
     axes, half = pose[:3, :3], np.array(PIECE.size) / 2.0
     poses, openings, ups = list[Vector](), list[float](), list[Vector]()
@@ -88,7 +97,7 @@ def of_piece(pose: Vector, reach: float) -> Grasps:
     return _grasps(poses, openings, [(0.0, 0.0)] * len(poses), ups)
 
 
-def of_ring(
+def grasps_of_ring(
     ring: Ring,
     pose: Vector,
     reach: float,
@@ -96,22 +105,21 @@ def of_ring(
     lean: float = 0.0,
     others: Sequence[Vector] = (),
 ) -> Grasps:
-    """Return the grasps of an upright ring with `pose`, shape (4, 4): one finger in the hole, one outside.
+    """Return the grasps of an upright ring with `pose`, shape (4, 4): a finger in the hole, a finger outside.
 
-    None of a ring that leans by more than `UPRIGHT`: see controllers.expert.fallen_rings.
+    For rings tilted by more than `UPRIGHT_COSINE` see controllers.expert.fallen_rings; the result is empty.
 
     Args:
-        ring: its measures.
-        pose: its pose, m.
+        ring: measures of the ring.
+        pose: pose of the ring, m.
         reach: length of the fingers, m.
-        post: the one it is around, if any: where it stands (x, y), m, and its radius, m.
-        lean: of the fingers from the vertical, along the wall and to either side, rad: so a wrist comes
+        post: position (x, y) and radius of a post in the ring, m.
+        lean: tilt of the fingers from the vertical, along the wall and to either side, rad. The wrist comes
             nearer to its arm by `reach` times the sine.
-        others: outlines of rings beside it and of another hand's fingers in it, corners (n, 2), m, which the
-            fingers are not to touch.
+        others: outlines of obstacles (other rings, the fingers of the other hand), corners (n, 2), m.
     """
     poses, outwards, rooms = list[Vector](), list[tuple[float, float]](), list[float]()
-    if abs(float(pose[2, 2])) < UPRIGHT:
+    if abs(float(pose[2, 2])) < UPRIGHT_COSINE:
         return _grasps([], [], [], [])
     up = pose[:3, 2] * (1.0 if pose[2, 2] > 0.0 else -1.0)
     centre = pose[:3, 3] + ring.height / 2.0 * (up - [0.0, 0.0, 1.0])  # below the middle of its upper rim
@@ -121,12 +129,12 @@ def of_ring(
         turn = spin + (2.0 * k + 1.0) * pi / 3.0  # opposite to a corner: the outward normal of a wall
         axes = np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
         finger = _Fingers(middle, aside, leant, reach)
-        room = min(ROOMY, finger.to_walls(ring))
+        room = min(AMPLE_ROOM, finger.to_walls(ring))
         if post is not None:
             room = min(room, finger.to_post(axes @ (post[0] - centre[:2]), post[1]))
         both = [outline @ axes + centre[:2] for outline in finger.outlines()]
         room = min([room, *(gap(one, other) for one, other in product(both, others))])
-        if room < FREE:
+        if room < LEAST_ROOM:
             continue
         away = np.array([middle, aside]) @ axes
         wrist = np.array([middle, aside - reach * sin(leant)]) @ axes
@@ -134,58 +142,60 @@ def of_ring(
             poses.append(_downwards(centre + np.append(wrist, 0.0), over, turn + way, leant * cos(way)))
             outwards.append(tuple(away))
             rooms.append(room)
-    return _grasps(poses, [AJAR] * len(poses), outwards, [up] * len(poses), rooms)
+    return _grasps(poses, [RING_OPENING] * len(poses), outwards, [up] * len(poses), rooms)
 
 
 class _Fingers(NamedTuple):
-    """A jaw that comes down on the wall of a ring, open by `AJAR`: points are (along normal, along wall), m.
+    """A jaw on the wall of a ring, open by `RING_OPENING`.
 
-    They are counted from the ring's axis.
+    Points are (along the wall's normal, along the wall) from the ring's axis, m.
     """
 
     middle: float
-    """Where the closed fingers end, along the wall's normal, m."""
+    """End of the closed fingers along the wall's normal, m."""
     aside: float
-    """The same along the wall, m."""
+    """End of the closed fingers along the wall, m."""
     lean: float
-    """From the vertical, rad."""
+    """Tilt of the fingers from the vertical, rad."""
     reach: float
-    """Their length, m."""
+    """Length of the fingers, m."""
 
     def _inner(self, along: float) -> Vector:
         """Return the middle of the finger in the ring, `along` (m) from its end."""
-        off = (self.reach - along) * sin(AJAR / 2.0) + FINGER[0] / 2.0
+        off = (self.reach - along) * sin(RING_OPENING / 2.0) + FINGER_SIZE[0] / 2.0
         return np.array([self.middle - off, self.aside - along * sin(self.lean)])
 
     def to_post(self, post: Vector, radius: float) -> float:
-        """Return the room of the finger in the ring, all along, to a post that is higher than the ring."""
-        half = [FINGER[0] / 2.0, FINGER[1] / cos(self.lean)]
+        """Return the clearance between the whole inner finger and a post higher than the ring, m."""
+        half = [FINGER_SIZE[0] / 2.0, FINGER_SIZE[1] / cos(self.lean)]
         off = [np.abs(post - self._inner(along)) - half for along in np.linspace(0.0, self.reach, _SAMPLES)]
         return float(np.linalg.norm(np.maximum(off, 0.0), axis=1).min()) - radius
 
     def to_walls(self, ring: Ring) -> float:
-        """Return its room to the other two walls.
+        """Return the clearance between the inner finger and the other two walls, m.
 
-        At a distance q (m) from the axis towards its wall the triangle of the hole is (2 r + q) / sqrt(3)
-        wide to either side, r being its inradius.
+        At a distance q (m) from the axis towards a wall the triangular hole of inradius r has a half width of
+        (2 r + q) / sqrt(3).
         """
         ends = [self._inner(along) for along in (0.0, _DEPTH / cos(self.lean))]
-        wide = [(2.0 * ring.inradius + end[0] - FINGER[0] / 2.0) / sqrt(3.0) - abs(end[1]) for end in ends]
-        return (min(wide) - FINGER[1] / cos(self.lean)) * sqrt(0.75)
+        wide = [
+            (2.0 * ring.inradius + end[0] - FINGER_SIZE[0] / 2.0) / sqrt(3.0) - abs(end[1]) for end in ends
+        ]
+        return (min(wide) - FINGER_SIZE[1] / cos(self.lean)) * sqrt(0.75)
 
     def outlines(self) -> tuple[Vector, Vector]:
-        """Return the outlines, shape (4, 2), of the ends of the finger in the ring and of the one outside."""
-        half, thick = FINGER[1] / cos(self.lean), FINGER[0] / 2.0
-        off = self.reach * sin(AJAR / 2.0) + thick
+        """Return the outlines, shape (4, 2), of the ends of the inner and the outer finger."""
+        half, thick = FINGER_SIZE[1] / cos(self.lean), FINGER_SIZE[0] / 2.0
+        off = self.reach * sin(RING_OPENING / 2.0) + thick
         corners = np.array([[-thick, -half], [thick, -half], [thick, half], [-thick, half]])
         inner, outer = (corners + np.array([self.middle + side, self.aside]) for side in (-off, off))
         return inner, outer
 
 
 def shut_fingers(tip: Vector, reach: float, thickness: float) -> Vector:
-    """Return the outline (4, 2), m, of fingers as long as `reach` at a tip (4, 4) around what is so thick."""
+    """Return the outline (4, 2), m, of fingers of length `reach` at a tip (4, 4), shut on a thickness (m)."""
     ends = tip[:3, 3] + reach * tip[:3, 2]
-    across, along = (FINGER[0] + thickness / 2.0) * tip[:3, 1], FINGER[1] * tip[:3, 0]
+    across, along = (FINGER_SIZE[0] + thickness / 2.0) * tip[:3, 1], FINGER_SIZE[1] * tip[:3, 0]
     return np.array([(ends + i * across + j * along)[:2] for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 
 
@@ -201,12 +211,12 @@ def _grasps(
         np.array(openings),
         np.array(outwards, np.float64).reshape(-1, 2),
         np.array(ups).reshape(-1, 3),
-        np.full(len(poses), ROOMY) if rooms is None else np.array(rooms),
+        np.full(len(poses), AMPLE_ROOM) if rooms is None else np.array(rooms),
     )
 
 
 def _reaching(origin: Vector, fingers: Vector, opening: Vector) -> Vector:
-    """Return the tip's pose at `origin` (m), whose fingers point along and open across these unit vectors."""
+    """Return the tip's pose (4, 4) at `origin` (m) with unit vectors along the fingers and their opening."""
     pose = np.eye(4)
     pose[:3, :3] = np.column_stack([np.cross(opening, fingers), opening, fingers])
     pose[:3, 3] = origin
@@ -216,7 +226,7 @@ def _reaching(origin: Vector, fingers: Vector, opening: Vector) -> Vector:
 def _downwards(point: Vector, over: float, turn: float, lean: float) -> Vector:
     """Return the tip's pose `over` (m) a point, with the fingers down, opening at `turn` (rad) from x.
 
-    They lean by `lean` (rad) about the way they open: their ends to the left of it.
+    The fingers are tilted by `lean` (rad) about the opening direction, with their ends to the left.
     """
     pose = np.eye(4)
     c, s, up, along = cos(turn), sin(turn), cos(lean), sin(lean)

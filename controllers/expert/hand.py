@@ -1,8 +1,8 @@
-"""One hand of the expert: it leads a tip along straight lines, and a jaw.
+"""A robot hand: leads the tip of an arm along straight lines, and its jaw.
 
-On a line the tip moves with least jerk: with s = t/T the share 10 s^3 - 15 s^4 + 6 s^5 of the way is done
-(Flash and Hogan, 1985), and of the rotation. What is still missing at the end, by the measured pose, is added
-to the command step by step. SI units, poses (x, y, z, qx, qy, qz, qw) in the world.
+On a line the tip moves with least jerk: at s = t/T the fraction 10 s^3 - 15 s^4 + 6 s^5 of the translation
+and the rotation is done (Flash and Hogan, 1985). At the end of a line the measured error is integrated into
+the command. SI units, poses (x, y, z, qx, qy, qz, qw) in the world.
 """
 
 from __future__ import annotations
@@ -21,26 +21,25 @@ from robots.serial_chain import SerialChain
 from schemas.ros import Header, JointState, Point, Pose, PoseStamped, Quaternion
 from schemas.vectors import Vector
 
-__all__ = ["Hand", "HandState", "Phase", "Role", "framed", "pose_of"]
+__all__ = ["HandPhase", "HandRole", "HandState", "RobotHand", "framed", "pose_of"]
 
 _ACCELERATION, _TURN = 1.0, 12.0
-"""Of a line: largest acceleration, m/s^2 and rad/s^2."""
+"""Largest acceleration on a line, m/s^2 and rad/s^2."""
 _SPEED, _SPIN = 0.12, 2.5
 """Largest speed, m/s and rad/s; the joints may do 0.2 m/s and 1.6 rad/s (robots.dvrk.psm)."""
 _PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.774
-"""Of a way of 1 in a time of 1."""
+"""Largest speed and acceleration of a least-jerk motion over a length of 1 in a time of 1."""
 _LEAST = 0.05
-"""Shortest line, s."""
+"""Shortest duration of a line, s."""
 _SETTLING, _MOST = 0.06, 4.0e-3
-"""Time constant (s) with which what is missing is added, and the most of it, m."""
+"""Time constant (s) of the correction at the end of a line, and its limit, m."""
 _ACCURATE, _SETTLED = 0.2e-3, 0.05
-"""m and s: a tip has settled that has been so near to the end of its line for so long. A tip that only passes
-there goes on by 1 mm.
+"""A tip has settled after 0.05 s within 0.2 mm of the end of its line. A tip in passing overshoots by 1 mm.
 """
 
 
-class Phase(IntEnum):
-    """What a hand does."""
+class HandPhase(IntEnum):
+    """Phase of a hand."""
 
     IDLE = 0
     RISE = 1
@@ -59,72 +58,72 @@ class Phase(IntEnum):
     TURN = 14
 
 
-class Role(IntEnum):
-    """What a hand does with a thing."""
+class HandRole(IntEnum):
+    """Role of a hand in the transfer of an object."""
 
     ALONE = 0
-    """It takes the thing and puts it down."""
+    """Takes the object and puts the object down."""
     GIVER = 1
-    """It takes the thing and gives it to the other hand."""
+    """Takes the object and gives the object to the second hand."""
     TAKER = 2
-    """It takes the thing from the other hand and puts it down."""
+    """Takes the object from the first hand and puts the object down."""
 
 
 class HandState(Record):
-    """All of one hand that changes."""
+    """State of a hand."""
 
-    phase = choice(Phase.IDLE)
-    role = choice(Role.ALONE)
-    thing = integer(-1)
-    """Index of the object that it is after or carries; -1: none."""
+    phase = choice(HandPhase.IDLE)
+    role = choice(HandRole.ALONE)
+    object_index = integer(-1)
+    """Index of the targeted or carried object; -1: none."""
     place = array(3)
-    """Where the middle of that object is to be put, m."""
+    """Target of the object's middle, m."""
     start = array(7)
     goal = array(7)
     grasp = array(7)
-    """Pose of the tip where it takes hold."""
+    """Pose of the tip at the grasp."""
     opening = number()
-    """Of the jaw before it closes, rad."""
+    """Jaw opening before the grasp, rad."""
     leans = flag()
-    """Whether the thing has to be put upright, and the fingers do not point down."""
+    """Whether the object must be put upright, with fingers that do not point down."""
     up = array(3)
-    """Its axis that is to be up then, in its own frame."""
+    """Axis of the object to be upright, in the frame of the object."""
     upright = array(4)
-    """Orientation of the tip that is planned for that."""
+    """Planned orientation of the tip with the object upright."""
     turns = integer()
-    """How often the hand has turned to bring it there."""
+    """Number of turns made to put the object upright."""
     duration = number()
-    """Of the line from `start` to `goal`, s."""
+    """Duration of the line from `start` to `goal`, s."""
     elapsed = number()
-    """s since the line began."""
+    """Time since the line began, s."""
     waited = number()
-    """s since then that the line is done."""
+    """Time since the line ended, s."""
     settled = number()
-    """s for which the tip has been where it was sent."""
+    """Time of the tip at the end of its line, s."""
     unheld = number()
-    """s for which nothing has held the thing."""
+    """Time of the object without a holder, s."""
     correction = array(3)
-    """Added to the commanded position, m."""
+    """Offset added to the commanded position, m."""
 
 
-class Hand:
-    """One arm: its line, its jaw and what is measured of them."""
+class RobotHand:
+    """An arm's line and jaw, with their measurements."""
 
     def __init__(self, arm: str, base: Vector, chain: SerialChain, jaw: Jaw) -> None:
-        """Take the arm's name, its base in the world, shape (4, 4), its kinematics and its jaw."""
+        """`base`: transform from the arm's base to the world, shape (4, 4)."""
         self.arm, self.base, self.chain, self.jaw = arm, base, chain, jaw
         self.number = float(arm[-1])
-        """As `held_by` has it."""
+        """Number of the arm, as in `held_by`."""
         self.period = 0.0
-        """s."""
+        """Period of steps, s."""
         self.state = HandState()
         self._into_base = inverse_pose(base)
         self.measured = np.zeros(7)
-        """Pose of the tip in the world."""
+        """Measured pose of the tip in the world."""
         self.angle = 0.0
-        """Of the jaw, rad."""
+        """Measured jaw opening, rad."""
         self.roll = 0.0
-        """Of the shaft, measured, rad."""
+        """Measured roll of the shaft, rad."""
         self._angles: list[float] = []
 
     @property
@@ -150,21 +149,21 @@ class Hand:
         return sqrt(float(off @ off))
 
     def stand(self, base: Vector) -> None:
-        """Take that the arm's base is at `base`, shape (4, 4), in the world."""
+        """Set the transform from the arm's base to the world, shape (4, 4)."""
         self.base, self._into_base = base, inverse_pose(base)
 
     def sense(self, tip: Vector, angle: float) -> None:
-        """Take what is measured: the tip in its base frame, shape (7,), and the jaw's angle, rad."""
+        """Store measurements: the tip's pose in the arm's base, shape (7,), and the jaw opening, rad."""
         self.measured[:] = pose_of(self.base @ framed(tip))
         self.angle = angle
 
     def stay(self) -> None:
-        """Let the line end where the tip is."""
+        """End the line at the measured pose of the tip."""
         self.state.start[:] = self.state.goal[:] = self.measured
         self.state.duration = self.state.elapsed = 0.0
 
     def go(self, goal: Vector, share: float = 1.0) -> None:
-        """Begin a line from where the tip was last sent to `goal`, shape (7,), at a share of the speed."""
+        """Begin a line from the last commanded pose to `goal`, shape (7,), at a fraction of the speed."""
         state = self.state
         state.start[:] = self.line()
         state.goal[:] = goal
@@ -180,7 +179,7 @@ class Hand:
         state.elapsed = state.settled = 0.0
 
     def move_jaw(self, angle: float) -> None:
-        """Tell the jaw to go to an angle, rad."""
+        """Command an angle of the jaw, rad."""
         self._angles.append(angle)
 
     def line(self) -> Vector:
@@ -198,9 +197,9 @@ class Hand:
         return rotation.product(self.state.goal[3:], rotation.conjugate(self.state.start[3:]))
 
     def advance(self, *, settle: bool) -> PoseStamped:
-        """Go on by a period and return the command to the tip, in its base frame.
+        """Advance by a period and return the command to the tip, in the arm's base frame.
 
-        `settle`: whether what is missing at the end of a line is added.
+        `settle`: integrate the measured error at the end of a line into the command.
         """
         state, h = self.state, self.period
         if self.has_arrived:
@@ -217,7 +216,7 @@ class Hand:
         return PoseStamped(header=Header(frame_id=base_frame(self.arm)), pose=pose)
 
     def jaw_commands(self) -> tuple[JointState, ...]:
-        """Return the commands to the jaw in this step, and forget them."""
+        """Return the commands to the jaw in this step, and clear the list."""
         commands = tuple(JointState(position=np.array([angle])) for angle in self._angles)
         self._angles.clear()
         return commands

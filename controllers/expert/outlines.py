@@ -1,4 +1,4 @@
-"""Outlines of things from above, and the room between them. Metres, in the plane of the world's x and y."""
+"""Outlines of objects from above, and the room between them. Metres, in the plane of the world's x and y."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from robots.training.boards import Ring
 from schemas.vectors import Vector
 
-__all__ = ["box_of_ring", "gap", "of_ring"]
+__all__ = ["box_of_ring", "gap", "outline_of_ring"]
 
 
-def of_ring(ring: Ring, pose: Vector) -> Vector:
+def outline_of_ring(ring: Ring, pose: Vector) -> Vector:
     """Return the corners of a ring with `pose`, shape (4, 4), more or less upright, shape (3, 2)."""
     return (_corners(ring) @ pose[:3, :3].T + pose[:3, 3])[:, :2]
 

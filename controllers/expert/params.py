@@ -1,4 +1,4 @@
-"""Parameters of the expert: the scene it works in, and what belongs where. SI units."""
+"""Parameters of the expert: scene, hands and targets. SI units."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["ExpertParams"]
 
 
 class _Object(Params):
-    """Of an object of the scene: what it is; everything else is the engine's."""
+    """Kind of an object of the scene; other parameters belong to the engine."""
 
     model_config = Params.model_config | {"extra": "ignore"}
 
@@ -26,7 +26,7 @@ class _Object(Params):
 
 
 class ExpertParams(Params):
-    """The scene, the hands that work in it, and where things belong."""
+    """The scene, the working hands, and the targets of objects."""
 
     open_to_pages: ClassVar[bool] = True
 
@@ -67,9 +67,9 @@ class ExpertParams(Params):
         if self.hand_over and len(self.hands) < 2:
             raise ValueError("hand_over needs two hands, such as [PSM1, PSM2]")
         dishes = [name for name, fixture in self.fixtures.items() if isinstance(fixture, DishParams)]
-        for thing, dish in self.goals.items():
-            if thing not in self.objects:
-                raise ValueError(f"goals: no object '{thing}'.{did_you_mean(thing, self.objects)}")
+        for name, dish in self.goals.items():
+            if name not in self.objects:
+                raise ValueError(f"goals: no object '{name}'.{did_you_mean(name, self.objects)}")
             if dish not in dishes:
                 raise ValueError(f"goals: no dish '{dish}'.{did_you_mean(dish, dishes)}")
         if not self.goals and self.board is None:
@@ -80,10 +80,10 @@ class ExpertParams(Params):
 
     @property
     def board(self) -> BoardParams | None:
-        """The board of the scene, if it has one."""
+        """Board of the scene; None: no board."""
         return next((each for each in self.fixtures.values() if isinstance(each, BoardParams)), None)
 
     @property
     def rings(self) -> tuple[str, ...]:
         """Names of the triangular rings of the scene."""
-        return tuple(name for name, thing in self.objects.items() if thing.kind == "triangle")
+        return tuple(name for name, each in self.objects.items() if each.kind == "triangle")

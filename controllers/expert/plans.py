@@ -1,4 +1,4 @@
-"""Which of all ways to take hold of a thing is best for a hand. SI units, poses in the world."""
+"""Choice of the best grasp for a hand. SI units, poses in the world."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.expert.grasps import ROOMY, Grasps
-from controllers.expert.hand import Hand, pose_of
+from controllers.expert.grasps import AMPLE_ROOM, Grasps
+from controllers.expert.hand import RobotHand, pose_of
 from controllers.expert.reach import links, margins, ways
 from robots import rotation
 from schemas.vectors import Vector
@@ -17,48 +17,47 @@ from schemas.vectors import Vector
 __all__ = ["Plan", "plan", "plan_leaning", "upright"]
 
 _COMFORT, _PER_TURN, _PER_OPENING, _PER_SIDE, _PER_ROOM = 0.25, 0.02, 0.2, 60.0, 100.0
-"""Of a grasp: the joints' margin beyond which more is no better; what a radian of turning and a radian of the
-jaw's opening cost, and what a metre away from the other hand and a metre of room about the instrument are
-worth, in margins.
+"""Score of a grasp, in joint margins: margin without further benefit; cost of a radian of turning and of a
+radian of jaw opening; worth of a metre away from the other hand and of a metre of clearance.
 """
 _LEAST, _LEAST_LEANING = 0.01, 0.04
-"""The least margin of a way that is gone: 1.2 mm of insertion; 5 mm on a way to a thing that leans, where a
-hand may be pushed aside and corrects by up to 4 mm.
+"""Least margins of a feasible grasp: 1.2 mm of insertion; 5 mm for a fallen object, where contact may push
+the hand aside and a correction takes up to 4 mm.
 """
 _FEW = 24
-"""Ways to take hold of a fallen thing that are looked at in detail: those that are reached best."""
+"""Number of grasps of a fallen object examined in detail, the best reachable first."""
 _HEADINGS = tuple(2.0 * pi * k / 12.0 for k in range(12))
-"""Rotations about the vertical with which a fallen thing may be put down, rad."""
+"""Rotations about the vertical of a fallen object at its target, rad."""
 
 
 class Plan(NamedTuple):
-    """How a thing is taken."""
+    """A planned grasp."""
 
     grasp: Vector
     """Pose of the tip, shape (7,)."""
     opening: float
-    """Of the jaw before it closes, rad."""
+    """Jaw opening before the grasp, rad."""
     up: Vector
-    """Axis of the thing that is upright, or is to be before it is put down, shape (3,)."""
+    """Axis of the object to be upright at its target, shape (3,)."""
     leans: bool
-    """Whether it has to be put upright first."""
+    """Whether the object must be put upright first."""
     upright: Vector
-    """Orientation of the tip then: a quaternion."""
+    """Orientation of the tip with the object upright, quaternion (x, y, z, w)."""
 
 
 def plan(
-    hand: Hand, found: Grasps, lift: float, way: Vector, away: Vector, room: Callable[[Vector], Vector]
+    hand: RobotHand, found: Grasps, lift: float, way: Vector, away: Vector, room: Callable[[Vector], Vector]
 ) -> Plan | None:
-    """Return the best of the grasps of an upright thing; None if the arm reaches none.
+    """Return the best grasp of an upright object; None: no grasp is within reach.
 
     Args:
-        hand: that takes it.
-        found: the grasps.
-        lift: by how much it is lifted, m.
-        way: from where it is to where it is put, m, shape (3,).
-        away: direction from the other hand, of length 1, shape (2,); 0 if that does not matter.
-        room: of points in an instrument, shape (n, points, 3), as `links` gives them: how far they all are
-            from what stands around, m, shape (n,).
+        hand: the acting hand.
+        found: the grasps to choose from.
+        lift: height of the lift, m.
+        way: displacement from the object's place to the target, m, shape (3,).
+        away: unit vector away from the other hand, shape (2,); 0: no preference.
+        room: function from points of an instrument (see `links`), shape (n, points, 3), to their least
+            clearance from obstacles, m, shape (n,).
     """
     if not len(found.poses):
         return None
@@ -72,7 +71,7 @@ def plan(
         free[can] = np.minimum(free[can], room(links(hand.chain, hand.base, held[can])))
     score = np.where(reached > _LEAST, np.minimum(reached, _COMFORT), -np.inf)
     score -= _PER_TURN * _turns(hand, found.poses) + _PER_OPENING * found.opening
-    score += _PER_SIDE * found.outwards @ away + _PER_ROOM * (free - ROOMY)
+    score += _PER_SIDE * found.outwards @ away + _PER_ROOM * (free - AMPLE_ROOM)
     best = int(score.argmax())
     if score[best] == -np.inf:
         return None
@@ -80,15 +79,15 @@ def plan(
     return Plan(pose, float(found.opening[best]), found.ups[best], leans=False, upright=pose[3:])
 
 
-def plan_leaning(hand: Hand, found: Grasps, middle: Vector, lift: float, rest: Vector) -> Plan | None:
-    """Return the best way to take a fallen thing and put it upright; None if the arm reaches none.
+def plan_leaning(hand: RobotHand, found: Grasps, middle: Vector, lift: float, rest: Vector) -> Plan | None:
+    """Return the best grasp for putting a fallen object upright; None: no grasp is within reach.
 
     Args:
-        hand: that takes it.
-        found: the grasps.
-        middle: where the thing's middle is, m.
-        lift: by how much it is lifted before the hand turns, m.
-        rest: where its middle is when it is let go, m.
+        hand: the acting hand.
+        found: the grasps to choose from.
+        middle: middle of the object, m.
+        lift: height of the lift before the hand turns, m.
+        rest: middle of the object at its release, m.
     """
     if not len(found.poses):
         return None
@@ -99,7 +98,9 @@ def plan_leaning(hand: Hand, found: Grasps, middle: Vector, lift: float, rest: V
     tips[:, :, :2] = raised[few, None]
     for i, k in enumerate(few.tolist()):
         for j, heading in enumerate(_HEADINGS):
-            tips[i, j, 3] = _carried(found.poses[k], middle, _heading(heading) @ upright(found.ups[k]), rest)
+            tips[i, j, 3] = _pose_after_carrying(
+                found.poses[k], middle, _heading(heading) @ upright(found.ups[k]), rest
+            )
     tips[:, :, 2] = tips[:, :, 3]
     tips[:, :, 2, 2, 3] += lift
     reached = margins(hand.chain, hand.base, tips.reshape(-1, 4, 4, 4)).reshape(len(few), -1)
@@ -112,7 +113,7 @@ def plan_leaning(hand: Hand, found: Grasps, middle: Vector, lift: float, rest: V
 
 
 def upright(axis: Vector) -> Vector:
-    """Return the least rotation, shape (3, 3), that brings a unit vector to the vertical."""
+    """Return the least rotation, shape (3, 3), from a unit vector to the vertical."""
     x, y, z = axis
     if z < -1.0 + 1e-9:
         return np.diag([1.0, -1.0, -1.0])
@@ -125,16 +126,16 @@ def _heading(angle: float) -> Vector:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _carried(tip: Vector, middle: Vector, turn: Vector, to: Vector) -> Vector:
-    """Return a tip's pose after it has carried a thing from `middle` to `to` (m) and has turned it."""
+def _pose_after_carrying(tip: Vector, middle: Vector, turn: Vector, to: Vector) -> Vector:
+    """Return a tip's pose after moving an object from `middle` to `to` (m) with the rotation `turn`."""
     pose = tip.copy()
     pose[:3, :3] = turn @ tip[:3, :3]
     pose[:3, 3] = to + turn @ (tip[:3, 3] - middle)
     return pose
 
 
-def _turns(hand: Hand, tips: Vector) -> Vector:
-    """Return by how much the hand has to turn from where it is sent to each pose, rad."""
+def _turns(hand: RobotHand, tips: Vector) -> Vector:
+    """Return the rotation angle from the commanded pose to each tip pose, rad."""
     now = rotation.conjugate(hand.line()[3:])
     turns = [rotation.log(rotation.product(pose_of(tip)[3:], now)) for tip in tips]
     return np.linalg.norm(turns, axis=1)

@@ -1,10 +1,10 @@
-"""The ports of the expert: those of CRTK's clients for each hand, and of the engine for each thing."""
+"""Ports of the expert: CRTK for each hand, poses and holders for each object."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from controllers.expert.hand import Phase
+from controllers.expert.hand import HandPhase
 from robots.dvrk import crtk
 from schemas.ports import Port
 from schemas.ros import Float64Message, JointState, PoseStamped, StringMessage
@@ -12,7 +12,7 @@ from schemas.ros import Float64Message, JointState, PoseStamped, StringMessage
 __all__ = ["EVENTS", "PROGRESS", "expert_ports", "hand_ports"]
 
 EVENTS = ("error", "warning")
-"""Of a motion controller that refuses a command."""
+"""Refusals of the motion controller."""
 PROGRESS = {
     "done": "1 when everything is where it belongs, in all legs",
     "over": "1 when all is done, or nothing more can be",
@@ -24,7 +24,7 @@ PROGRESS = {
     "lost": "how many things have fallen off the table",
     "blocked": "how many things are left because jaws have closed on them too often",
 }
-_PHASES = ", ".join(f"{phase:d} {phase.name.lower()}" for phase in Phase)
+_PHASES = ", ".join(f"{phase:d} {phase.name.lower()}" for phase in HandPhase)
 
 
 def expert_ports(arms: Iterable[str], things: Iterable[str]) -> tuple[Port, ...]:

@@ -1,4 +1,4 @@
-"""What all hands share: the things as measured, what was tried with them, and how far the task is."""
+"""State shared by all hands: measured objects, attempts, and progress of the task."""
 
 from __future__ import annotations
 
@@ -9,69 +9,69 @@ import numpy as np
 from hub.participant import Record, array, flag, integer
 from schemas.vectors import Vector
 
-__all__ = ["Progress", "Seen", "Verdict"]
+__all__ = ["ObservedObjects", "Progress", "Verdict"]
 
 _SPEED = 5.0e-3
-"""Of a thing that lies still, m/s."""
+"""Largest speed of an object at rest, m/s."""
 _STILL = 0.15
-"""s for which a thing has been still before it is taken."""
+"""Time at rest before a grasp, s."""
 
 
 class Verdict(IntEnum):
-    """Why a thing is left where it is."""
+    """Reason to leave an object."""
 
     NONE = 0
-    """It is not."""
+    """No reason: the object is still to be carried."""
     NOT_REACHABLE = 1
-    """No hand that may take it has a way to."""
+    """No eligible hand has a feasible grasp."""
     LOST = 2
-    """It has fallen off the table."""
+    """The object has fallen off the table."""
     BLOCKED = 3
-    """Jaws have closed on it too often without bringing it to its place."""
+    """Too many grasps have failed."""
 
 
 class Progress(Record):
-    """Of the task."""
+    """Progress of the task."""
 
     done = flag()
     over = flag()
     """Whether nothing more can be done."""
     leg = integer()
-    """From 0; even: to the targets, odd: back."""
+    """Number of the leg, from 0; even: to the targets, odd: back."""
     placed = integer()
-    """How many things are where they belong."""
+    """Number of objects at their targets."""
     attempts = integer()
-    """How often a jaw has closed on a thing."""
+    """Number of grasps."""
     dropped = integer()
-    """How often a thing was not held any more on its way."""
+    """Number of objects lost on their way."""
     not_reachable = integer()
     lost = integer()
     blocked = integer()
-    """How many things have this verdict now."""
+    """Number of objects with this verdict now."""
 
 
-class Seen(Record):
-    """The things as they are measured, by index, and what was tried with each."""
+class ObservedObjects(Record):
+    """Measured objects by index, and the attempts on each."""
 
     poses = array("n", 4, 4)
     holders = array("n")
-    """Number of the arm that holds each, 0: none."""
+    """Number of the arm holding each object, 0: none."""
     still = array("n")
-    """s for which each has lain still."""
+    """Time of each object at rest, s."""
     tries = array("n")
-    """How often a jaw has closed on each in this leg, or has struck something on its way down to it."""
+    """Number of grasps and collisions in this leg, by object."""
     verdicts = array("n")
     said = array("n")
-    """The verdicts that have been published."""
+    """Published verdicts."""
 
-    def take(self, thing: int, pose: Vector, holder: float, period: float) -> None:
-        """Take what is measured of a thing: its pose, shape (4, 4), and the number of its holder."""
-        moved = float(np.linalg.norm(pose[:3, 3] - self.poses[thing, :3, 3]))
-        self.still[thing] = 0.0 if moved > _SPEED * period else self.still[thing] + period
-        self.poses[thing], self.holders[thing] = pose, holder
-        if not self.still[thing] and self.verdicts[thing] == Verdict.NOT_REACHABLE:
-            self.verdicts[thing] = Verdict.NONE
+    def observe(self, index: int, pose: Vector, holder: float, period: float) -> None:
+        """Store an object's measured pose, shape (4, 4), and the number of the holding arm."""
+        moved = float(np.linalg.norm(pose[:3, 3] - self.poses[index, :3, 3]))
+        self.still[index] = 0.0 if moved > _SPEED * period else self.still[index] + period
+        self.poses[index], self.holders[index] = pose, holder
+        if not self.still[index] and self.verdicts[index] == Verdict.NOT_REACHABLE:
+            self.verdicts[index] = Verdict.NONE
 
-    def is_free(self, thing: int) -> bool:
-        """Say whether a thing lies still and may be taken."""
-        return self.still[thing] > _STILL and not self.holders[thing] and self.verdicts[thing] == Verdict.NONE
+    def is_free(self, index: int) -> bool:
+        """Return whether an object is at rest and open to a grasp."""
+        return self.still[index] > _STILL and not self.holders[index] and self.verdicts[index] == Verdict.NONE

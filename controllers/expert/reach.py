@@ -1,4 +1,4 @@
-"""How comfortably an arm reaches a pose, and where its instrument is then. SI units, poses in the world."""
+"""Joint margins of an arm at a pose, and points of its instrument. SI units, poses in the world."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ __all__ = ["LINK_RADII", "links", "margins", "ways"]
 _WRIST, _SHAFT = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 0.08, 17)
 """Points along the link from the wrist's yaw axis to its pitch axis, and from there up the shaft, m."""
 LINK_RADII = np.concatenate([np.full(len(_WRIST), WRIST_RADIUS), np.full(len(_SHAFT), SHAFT_RADIUS)])
-"""Of the instrument about the points of `links`, m."""
+"""Radii of the instrument about the points of `links`, m."""
 
 
 def ways(chain: SerialChain, base: Vector, tips: Vector) -> tuple[Vector, Vector]:
-    """Return for each of n ways the least margin of any joint at any pose of it, shape (n,), and its joints.
+    """Return the least joint margin, (n,), and the joints, (n, poses, 6), of each of n paths.
 
-    1 is the middle of a joint's range and 0 its end; a way keeps to one branch of the inverse kinematics,
-    that with the largest margin, and so do the joints, shape (n, poses, 6).
+    1 is the middle of a joint's range and 0 its end. A path keeps to the branch of the inverse kinematics
+    with the largest margin.
 
     Args:
         chain: a PSM with a wrist of three joints.
-        base: of its base in the world, shape (4, 4), m.
+        base: transform from the arm's base to the world, shape (4, 4), m.
         tips: in the world, shape (n, poses, 4, 4), m.
     """
     q = branches(chain, inverse_pose(base) @ tips)  # (4, n, poses, 6)

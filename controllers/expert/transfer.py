@@ -1,7 +1,7 @@
-"""One hand's way with one thing after the other: what comes next, from what is measured.
+"""State machine of a hand: the next phase from measurements.
 
-A thing is grasped where it is seen, held if the engine says so, put upright if it has fallen, brought in
-line by its own pose over its place, and taken up again if it has been dropped or is not where it belongs. SI
+An object is grasped at its measured pose, counts as held if the engine reports a holder, is put upright after
+a fall, aligned over its target by the object's own pose, and picked up again after a drop or a miss. SI
 units, poses in the world.
 """
 
@@ -10,72 +10,72 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from controllers.expert.carrying import Carrying
-from controllers.expert.hand import Hand, Phase
+from controllers.expert.hand import HandPhase, RobotHand
 from controllers.expert.taking import Taking
 from controllers.expert.team import Team
 
 __all__ = ["Transfer"]
 
 _STRUCK = 2.0e-3
-"""m: a tip that comes down so far from its line has struck something, with about 10 N; else it is 0.5 mm."""
-_APPROACHING = {Phase.RISE, Phase.ACROSS, Phase.DESCEND, Phase.REACH}
-_GIVING_UP = {Phase.OPEN, Phase.RETREAT, Phase.IDLE}
+"""Error of a tip in descent after a collision, m (about 10 N); without contact the error is 0.5 mm."""
+_APPROACHING = {HandPhase.RISE, HandPhase.ACROSS, HandPhase.DESCEND, HandPhase.REACH}
+_GIVING_UP = {HandPhase.OPEN, HandPhase.RETREAT, HandPhase.IDLE}
 
 
 class Transfer(Taking, Carrying):
-    """What one hand does."""
+    """Picks and places one object after the other."""
 
-    def __init__(self, hand: Hand, team: Team, things: int) -> None:
-        """Take the hand, its team, and how many things there are."""
-        super().__init__(hand, team, things)
-        self._next: dict[Phase, Callable[[], None]] = {
-            Phase.IDLE: self._idle,
-            Phase.RISE: self._rise,
-            Phase.ACROSS: self._across,
-            Phase.DESCEND: self._descend,
-            Phase.REACH: self._reach,
-            Phase.CLOSE: self._close,
-            Phase.LIFT: self._lift,
-            Phase.TURN: self._turn,
-            Phase.CARRY: self._carry,
-            Phase.ALIGN: self._align,
-            Phase.LOWER: self._lower,
-            Phase.OPEN: self._open,
-            Phase.RETREAT: self._retreat,
-            Phase.OFFER: self._offer,
-            Phase.TAKE: self._take,
+    def __init__(self, hand: RobotHand, team: Team, objects: int) -> None:
+        """`objects`: number of objects of the scene."""
+        super().__init__(hand, team, objects)
+        self._next: dict[HandPhase, Callable[[], None]] = {
+            HandPhase.IDLE: self._idle,
+            HandPhase.RISE: self._rise,
+            HandPhase.ACROSS: self._across,
+            HandPhase.DESCEND: self._descend,
+            HandPhase.REACH: self._reach,
+            HandPhase.CLOSE: self._close,
+            HandPhase.LIFT: self._lift,
+            HandPhase.TURN: self._turn,
+            HandPhase.CARRY: self._carry,
+            HandPhase.ALIGN: self._align,
+            HandPhase.LOWER: self._lower,
+            HandPhase.OPEN: self._open,
+            HandPhase.RETREAT: self._retreat,
+            HandPhase.OFFER: self._offer,
+            HandPhase.TAKE: self._take,
         }
 
     def step(self) -> None:
-        """Begin the next phase where the present one is over."""
-        seen = self.state.thing >= 0 and self._seen.holders[self.state.thing] != 0.0
+        """Begin the next phase if the present phase is over."""
+        seen = self.state.object_index >= 0 and self._seen.holders[self.state.object_index] != 0.0
         self.state.unheld = 0.0 if seen else self.state.unheld + self.hand.period
-        self.refusals.things[self._seen.still == 0.0] = 0.0
-        if self.state.phase is Phase.DESCEND and not self.state.leans and self.hand.lag > _STRUCK:
+        self.refusals.objects[self._seen.still == 0.0] = 0.0
+        if self.state.phase is HandPhase.DESCEND and not self.state.leans and self.hand.lag > _STRUCK:
             self._back_off()
         elif self.hand.has_arrived:
             self._next[self.state.phase]()
 
     def _back_off(self) -> None:
-        """Leave a thing beside which, or on which, the fingers have come down."""
-        self._seen.tries[self.state.thing] += 1.0
+        """Leave an object after the fingers have struck the object or its surroundings."""
+        self._seen.tries[self.state.object_index] += 1.0
         self.hand.stay()
         self._let_go()
 
     def refuse(self) -> bool:
-        """Leave the thing after a command on the way to it was refused; return whether that is possible.
+        """Leave the object after the refusal of a command; return whether the hand can go on.
 
-        On the way back from a thing that is let go, the hand stays where it is. Commands that were under way
-        may be refused afterwards.
+        A hand on its way to an object gives the object up. A hand in retreat stops. Later refusals of
+        commands still on their way are ignored.
         """
-        if self.state.phase is Phase.RETREAT and not self._clings:
+        if self.state.phase is HandPhase.RETREAT and not self._clings:
             self.hand.stay()
             self._give_up()
             return True
         if self.state.phase not in _APPROACHING:
-            left = self.state.thing < 0 or bool(self.refusals.things.any())
+            left = self.state.object_index < 0 or bool(self.refusals.objects.any())
             return self.state.phase in _GIVING_UP and left
-        self.refusals.things[self.state.thing] = 1.0
+        self.refusals.objects[self.state.object_index] = 1.0
         self.hand.stay()
         self.state.correction[:] = 0.0
         self._let_go()
@@ -83,5 +83,5 @@ class Transfer(Taking, Carrying):
 
     @property
     def settles(self) -> bool:
-        """Whether the tip is to be brought exactly where it was sent."""
-        return self.state.phase in (Phase.ACROSS, Phase.DESCEND, Phase.REACH)
+        """Whether the measured error of the tip is corrected at the end of the line."""
+        return self.state.phase in (HandPhase.ACROSS, HandPhase.DESCEND, HandPhase.REACH)

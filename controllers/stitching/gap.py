@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from robots.dvrk.instruments import SHAFT_RADIUS
 from schemas.vectors import Vector
 
@@ -16,7 +16,7 @@ ROOM = 2.0 * SHAFT_RADIUS + 1.6e-3
 """m: between the middles of two instruments, at least."""
 
 
-def gap(one: Hand, tips: Vector, other: Hand, others: Vector) -> Vector:
+def gap(one: RobotHand, tips: Vector, other: RobotHand, others: Vector) -> Vector:
     """Return the least distance of two instruments, shape (n,), their tips at poses of shape (n, 4, 4).
 
     An instrument is two lines: from its remote centre to the wrist, and on to the ends of its fingers.
@@ -25,7 +25,7 @@ def gap(one: Hand, tips: Vector, other: Hand, others: Vector) -> Vector:
     return np.min([_distance(*a, *b) for a, b in pairs], axis=0)
 
 
-def _lines(hand: Hand, tips: Vector) -> list[tuple[Vector, Vector]]:
+def _lines(hand: RobotHand, tips: Vector) -> list[tuple[Vector, Vector]]:
     wrist = tips[:, :3, 3]
     centre = np.broadcast_to(hand.base[:3, 3], wrist.shape)
     return [(centre, wrist), (wrist, wrist + hand.jaw.length * tips[:, :3, 2])]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from controllers.stitching.ports import stitching_ports
 from controllers.stitching.stage import COMMANDS, Stage
 from robots.dvrk.crtk import base_frame
@@ -18,7 +18,7 @@ SOURCES = ("", "operator/")
 """Prefixes of what a person says: by a program that is connected, and by hand, with `trocar stitch`."""
 
 
-def guided_ports(hands: tuple[Hand, Hand], needle: str) -> Iterator[Port]:
+def guided_ports(hands: tuple[RobotHand, RobotHand], needle: str) -> Iterator[Port]:
     """Yield the ports for these hands and this needle."""
     yield from stitching_ports(hands, needle)
     for arm in (hand.arm for hand in hands):

@@ -13,7 +13,7 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from controllers.expert.hand import Hand, framed
+from controllers.expert.hand import RobotHand, framed
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.handing import Handing, Hold
 from controllers.stitching.params import StitchParams
@@ -58,7 +58,7 @@ class GuidedState(Record):
 class GuidedSurgeon(Procedure):
     """Two hands, a needle and a person."""
 
-    def __init__(self, params: StitchParams, driver: Hand, puller: Hand) -> None:
+    def __init__(self, params: StitchParams, driver: RobotHand, puller: RobotHand) -> None:
         super().__init__(params, driver, puller)
         self.guided = GuidedState()
         self._setpoints = np.zeros((2, 7))

@@ -16,7 +16,7 @@ from math import pi, radians
 
 import numpy as np
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from controllers.stitching.feasibility import reach, room
 from controllers.stitching.gap import ROOM, gap
 from controllers.stitching.geometry import Stitch
@@ -51,7 +51,7 @@ _DOWN = 0.7
 class Hold:
     """One way to hold the needle."""
 
-    hand: Hand
+    hand: RobotHand
     grip: Vector
     """Pose of the tip in the needle's frame, shape (4, 4)."""
     behind: float
@@ -63,7 +63,7 @@ class _Goal:
     """How the needle is driven, and taken."""
 
     driver: Hold
-    puller: Hand
+    puller: RobotHand
     pullers: tuple[Vector, ...]
     """How the puller can hold it."""
     margin: float
@@ -86,7 +86,7 @@ class Handing:
     def __init__(
         self,
         params: StitchParams,
-        hands: tuple[Hand, Hand],
+        hands: tuple[RobotHand, RobotHand],
         stitch: Stitch,
         needle: Vector,
         held: Hold | None,
@@ -124,7 +124,7 @@ class Handing:
                     found.append(_Goal(hold, puller, taken, margin, bool(exchanged), alone))
         return sorted(found, key=lambda goal: -goal.margin)
 
-    def _drivers(self, driver: Hand) -> list[Hold]:
+    def _drivers(self, driver: RobotHand) -> list[Hold]:
         """Return how a hand may hold the needle to drive it: as it does now, or as the parameters say."""
         params, stitch, held = self._params, self._stitch, self._held
         holds = [Hold(driver, grip, params.grip) for grip in _grips(driver, params.grip, stitch)]
@@ -248,12 +248,12 @@ class Handing:
                 return self._way_on(goal, first, grip, needles, holds[1:], margin)
         return None
 
-    def _can_take_out(self, driver: Hold, puller: Hand, grip: Vector) -> bool:
+    def _can_take_out(self, driver: Hold, puller: RobotHand, grip: Vector) -> bool:
         """Say whether the puller can take the needle where it has come out, beside the driver."""
         end = self._drive[-1:]
         return bool(gap(driver.hand, end @ driver.grip, puller, end @ grip)[0] >= ROOM)
 
-    def _is_clear(self, going: dict[Hand, Itinerary]) -> bool:
+    def _is_clear(self, going: dict[RobotHand, Itinerary]) -> bool:
         """Say whether each hand with the needle keeps away from where the other one rests."""
         least = self._stitch.needle.radius + _JAW
         places = zip(self._hands[::-1], self._rests, strict=True)
@@ -289,12 +289,12 @@ class Handing:
         )
 
 
-def _grips(hand: Hand, behind: float, stitch: Stitch) -> list[Vector]:
+def _grips(hand: RobotHand, behind: float, stitch: Stitch) -> list[Vector]:
     """Return all four ways to hold the needle `behind` its tip (rad)."""
     return [grip for side in (False, True) for grip in grips_of(hand, behind, stitch.needle, backwards=side)]
 
 
-def _margin(hand: Hand, grip: Vector, needles: Vector) -> float:
+def _margin(hand: RobotHand, grip: Vector, needles: Vector) -> float:
     return reach(hand.chain, hand.base, needles @ grip).margin
 
 

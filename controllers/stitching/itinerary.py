@@ -10,7 +10,7 @@ from math import ceil
 
 import numpy as np
 
-from controllers.expert.hand import Hand, framed
+from controllers.expert.hand import RobotHand, framed
 from controllers.stitching.feasibility import reach
 from controllers.stitching.geometry import before
 from controllers.stitching.rejoin import BACK
@@ -25,9 +25,9 @@ _SLICE, _TURN = 5.0e-3, 0.2
 
 
 class Itinerary:
-    """Straight lines of the tip from where it is now, as a `Hand` goes, and ways of the needle in its jaw."""
+    """Straight lines of a `RobotHand` from its present pose, and paths of the needle in its jaw."""
 
-    def __init__(self, hand: Hand) -> None:
+    def __init__(self, hand: RobotHand) -> None:
         self.hand = hand
         self._tips = [framed(hand.measured)[None]]
         self._carrying = list[tuple[Vector, Vector]]()

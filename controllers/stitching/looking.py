@@ -10,7 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from controllers.stitching.sight import Sight
 from hub.participant import Record, array, choice, integer, number
 from schemas.errors import MotionError
@@ -47,7 +47,7 @@ class LookingState(Record):
 class Looking:
     """The hands that are to be seen."""
 
-    def __init__(self, hands: Sequence[Hand], sights: Sequence[Sight], pad: Vector) -> None:
+    def __init__(self, hands: Sequence[RobotHand], sights: Sequence[Sight], pad: Vector) -> None:
         """Take the hands with their sights, and the pad's pose in the world, shape (4, 4)."""
         self._hands, self._sights = hands, sights
         self._over = pad[:3, 3] + _ABOVE * pad[:3, 2]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from controllers.stitching.phase import Phase
 from controllers.stitching.way_on import WayOn
 from hub.participant import Record, array, choice, flag, integer, number
@@ -55,7 +55,7 @@ class HandingState(Record):
     pending = flag()
     """Whether the needle, once picked up, is handed over before it is driven."""
     left = integer()
-    """Hand-overs that follow the next one: after an even number the driver has it."""
+    """RobotHand-overs that follow the next one: after an even number the driver has it."""
     needles = array(2, 4, 4)
     """Where the needle is handed over, the last place first."""
     between = array(4, 4)
@@ -67,17 +67,17 @@ class HandingState(Record):
 class Parts:
     """Two hands, and the part of each in every phase of a stitch."""
 
-    def __init__(self, hands: tuple[Hand, Hand]) -> None:
+    def __init__(self, hands: tuple[RobotHand, RobotHand]) -> None:
         self.hands = hands
         self.state, self.handing = ProcedureState(), HandingState()
 
     @property
-    def driver(self) -> Hand:
+    def driver(self) -> RobotHand:
         """The hand that drives the needle in."""
         return self.hands[self.handing.exchanged]
 
     @property
-    def puller(self) -> Hand:
+    def puller(self) -> RobotHand:
         """The hand that pulls it out."""
         return self.driver if self.handing.alone else self._other(self.driver)
 
@@ -96,7 +96,7 @@ class Parts:
         return self.hands[0] is at_work, self.hands[1] is at_work
 
     @property
-    def _holding(self) -> Hand | None:
+    def _holding(self) -> RobotHand | None:
         phase = self.state.phase
         if self.state.free:
             return None
@@ -111,22 +111,22 @@ class Parts:
         return self.puller if Phase.LEAVE <= phase <= Phase.RAISE else None
 
     @property
-    def _taker(self) -> Hand:
+    def _taker(self) -> RobotHand:
         """The hand that takes the needle over next."""
         if self.handing.pending or Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK:
             return self._other(self.driver) if self.handing.left % 2 else self.driver
         return self.puller
 
     @property
-    def _giver(self) -> Hand:
+    def _giver(self) -> RobotHand:
         """The hand that gives it."""
         return self._other(self._taker)
 
-    def _other(self, hand: Hand) -> Hand:
+    def _other(self, hand: RobotHand) -> RobotHand:
         return self.hands[hand is self.hands[0]]
 
     @property
-    def _picker(self) -> Hand:
+    def _picker(self) -> RobotHand:
         """The hand that picks it up."""
         return self._giver if self.handing.pending else self.driver
 

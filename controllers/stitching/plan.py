@@ -8,7 +8,7 @@ from math import ceil, radians
 
 import numpy as np
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from controllers.stitching.feasibility import Reach, reach
 from controllers.stitching.geometry import Grip, Stitch, grip_pose, stitch_between
 from robots.training.needles import NeedleShape
@@ -82,8 +82,8 @@ def stitch_through(
 
 
 def make_plan(
-    driver: Hand,
-    puller: Hand,
+    driver: RobotHand,
+    puller: RobotHand,
     stitches: Sequence[Stitch],
     start: Vector,
     *,
@@ -122,14 +122,14 @@ def require_room(held: float, stitch: Stitch, emerge: float) -> None:
         )
 
 
-def grips_of(hand: Hand, behind: float, needle: NeedleShape, *, backwards: bool = False) -> list[Vector]:
+def grips_of(hand: RobotHand, behind: float, needle: NeedleShape, *, backwards: bool = False) -> list[Vector]:
     """Return both ways to hold the needle `behind` its tip (rad), as in a `Plan`, from one of its sides."""
     length = hand.jaw.length - DEEP
     return [grip_pose(Grip(behind, side, backwards), needle, length) for side in (False, True)]
 
 
 def best_grip(
-    hand: Hand, grips: Sequence[Vector], ways: Sequence[Sequence[Vector]]
+    hand: RobotHand, grips: Sequence[Vector], ways: Sequence[Sequence[Vector]]
 ) -> tuple[Vector, Reach, int]:
     """Return the grip with the most room on its worst way, the reach on that way, and its number."""
     found = [[reach(hand.chain, hand.base, np.array(way) @ grip) for way in ways] for grip in grips]
@@ -159,7 +159,7 @@ def _angles(start: float, end: float) -> list[float]:
     return angles
 
 
-def _require(hand: Hand, found: Reach, way: int) -> None:
+def _require(hand: RobotHand, found: Reach, way: int) -> None:
     if problem := found.problem:
         what = "the needle cannot be picked up" if way < 0 else f"stitch {way + 1} of these is not feasible"
         raise MotionError(f"{what}: of {hand.arm}, {problem}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from controllers.expert.ports import hand_ports
 from controllers.stitching.phase import Phase
 from robots.dvrk import crtk
@@ -30,7 +30,7 @@ _NUMBERS = (
 )
 
 
-def stitching_ports(hands: tuple[Hand, Hand], needle: str) -> tuple[Port, ...]:
+def stitching_ports(hands: tuple[RobotHand, RobotHand], needle: str) -> tuple[Port, ...]:
     """Return the ports for these hands and this needle."""
     return (
         *(port for hand in hands for port in (*hand_ports(hand.arm), *_sight_ports(hand))),
@@ -59,7 +59,7 @@ def _needle_ports(needle: str) -> Iterator[Port]:
     )
 
 
-def _sight_ports(hand: Hand) -> Iterator[Port]:
+def _sight_ports(hand: RobotHand) -> Iterator[Port]:
     yield Port(
         name=f"{hand.arm}/measured_js",
         causality="input",

@@ -13,7 +13,7 @@ from math import radians
 
 import numpy as np
 
-from controllers.expert.hand import Hand, framed, pose_of
+from controllers.expert.hand import RobotHand, framed, pose_of
 from controllers.stitching.geometry import Stitch, before
 from controllers.stitching.params import StitchParams
 from controllers.stitching.parts import Parts
@@ -52,7 +52,7 @@ ATTEMPTS = 3
 class Procedure(Parts, ABC):
     """Two hands and a needle; which stitch it is, and what comes before and after, others say."""
 
-    def __init__(self, params: StitchParams, driver: Hand, puller: Hand) -> None:
+    def __init__(self, params: StitchParams, driver: RobotHand, puller: RobotHand) -> None:
         super().__init__((driver, puller))
         self.params = params
         self.rejoin = Rejoin(driver, puller)
@@ -177,18 +177,18 @@ class Procedure(Parts, ABC):
             hand.stay()
         self._enter(Phase.FAILED)
 
-    def _arrived(self, hand: Hand, within: float | None = None) -> bool:
+    def _arrived(self, hand: RobotHand, within: float | None = None) -> bool:
         """Say whether a hand is where it was sent, as near as it gets."""
         if not hand.has_arrived:
             return False
         self.state.waited += hand.period
         return within is None or hand.error <= within or self.state.waited > _PATIENCE
 
-    def _lead(self, hand: Hand, needle: Vector, share: float = 1.0) -> None:
+    def _lead(self, hand: RobotHand, needle: Vector, share: float = 1.0) -> None:
         """Send a hand, on a line, where the needle that it holds comes to a pose, shape (4, 4)."""
         hand.go(pose_of(needle @ self.state.grip), share)
 
-    def _track(self, hand: Hand, angle: float) -> None:
+    def _track(self, hand: RobotHand, angle: float) -> None:
         """Bring the needle to an angle of its way, at once."""
         state, wanted = self.state, self.stitch.pose(angle)
         goal = pose_of(wanted @ state.grip)
@@ -238,7 +238,7 @@ class Procedure(Parts, ABC):
             hand.go(self._pick(HOVER))
             self._enter(Phase.HOVER)
 
-    def _grasped(self, hand: Hand) -> None:
+    def _grasped(self, hand: RobotHand) -> None:
         """Take how the needle lies in the jaw of a hand for how it holds it."""
         self.state.grip[:] = inverse_pose(self.state.needle) @ framed(hand.measured)
         self.state.free = False
@@ -252,7 +252,7 @@ class Procedure(Parts, ABC):
         else:
             self._to_approach()
 
-    def _to_present(self, hand: Hand) -> None:
+    def _to_present(self, hand: RobotHand) -> None:
         """Let the hand that holds the needle bring it where it is handed over next."""
         self._lead(hand, self.handing.needles[self.handing.left])
         self._enter(Phase.PRESENT)
@@ -306,7 +306,7 @@ class Procedure(Parts, ABC):
         self.puller.go(self._taking(self.puller, BACK))
         self._enter(Phase.COME)
 
-    def _taking(self, hand: Hand, away: float) -> Vector:
+    def _taking(self, hand: RobotHand, away: float) -> Vector:
         """Return the pose, shape (7,), where a hand takes over the needle, or so far before it."""
         handed = Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK
         if not handed:
@@ -393,6 +393,6 @@ class Procedure(Parts, ABC):
             else:
                 self._to_approach()
 
-    def _park(self, hand: Hand) -> None:
+    def _park(self, hand: RobotHand) -> None:
         """Send a hand where it stands when it has nothing to do."""
         hand.go(self.state.park[self.hands.index(hand)])

@@ -9,7 +9,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from controllers.expert.hand import Hand, framed, pose_of
+from controllers.expert.hand import RobotHand, framed, pose_of
 from controllers.stitching.geometry import before
 from controllers.stitching.phase import Phase
 from controllers.stitching.way_on import WayOn
@@ -53,7 +53,7 @@ class RejoinState(Record):
 class Rejoin:
     """The way of driver and puller to where a stitch goes on."""
 
-    def __init__(self, driver: Hand, puller: Hand) -> None:
+    def __init__(self, driver: RobotHand, puller: RobotHand) -> None:
         self._hands, self.state = (driver, puller), RejoinState()
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.looking import Looking
 from controllers.stitching.params import StitchingParams
@@ -19,7 +19,7 @@ __all__ = ["Surgeon"]
 class Surgeon(Procedure):
     """Two hands, a needle, and pairs of holes."""
 
-    def __init__(self, params: StitchingParams, driver: Hand, puller: Hand) -> None:
+    def __init__(self, params: StitchingParams, driver: RobotHand, puller: RobotHand) -> None:
         super().__init__(params, driver, puller)
         self._row = params
         self.state.stitch = params.first

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from controllers.expert.ports import EVENTS
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import MotionParams, PsmParams
@@ -47,12 +47,12 @@ class TwoHands(Controller):
         kept = (*self._hands, *self._sights, surgeon.rejoin)
         self.keep(state, surgeon.handing, self._shown, *(each.state for each in kept), *more)
 
-    def _hand(self, params: StitchParams, arm: ArmName) -> Hand:
+    def _hand(self, params: StitchParams, arm: ArmName) -> RobotHand:
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
         held = cast("PsmParams", params.arms.driven[arm])
         if held.tool.jaw is None:
             raise SessionError(f"stitching '{self.name}': {arm} holds {held.tool.name}, which has no jaw")
-        return Hand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
+        return RobotHand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
 
     def configure(self, setup: Setup) -> Outputs:
         """Start with idle hands."""

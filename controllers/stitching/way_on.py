@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.expert.hand import Hand, framed
+from controllers.expert.hand import RobotHand, framed
 from controllers.stitching.feasibility import Reach
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.params import StitchParams
@@ -51,7 +51,7 @@ class WayOn:
     """The first phase, and what it begins with."""
 
     phase: Phase
-    holder: Hand | None
+    holder: RobotHand | None
     needle: Vector
     """Where the needle is brought first, shape (4, 4)."""
     angle: float
@@ -93,7 +93,7 @@ def raised(params: StitchParams, needle: Vector) -> Vector:
 
 
 def way_on(
-    params: StitchParams, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector, holder: float
+    params: StitchParams, driver: RobotHand, puller: RobotHand, stitch: Stitch, needle: Vector, holder: float
 ) -> WayOn:
     """Plan `stitch` from where the needle is, shape (4, 4), in the jaw of arm number `holder` (0: none).
 
@@ -139,7 +139,12 @@ def way_on(
 
 
 def _pulls(
-    params: StitchParams, holding: Hand, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector
+    params: StitchParams,
+    holding: RobotHand,
+    driver: RobotHand,
+    puller: RobotHand,
+    stitch: Stitch,
+    needle: Vector,
 ) -> bool:
     """Say whether a hand holds a needle in the tissue as one that pulls it."""
     if driver is puller:
@@ -149,7 +154,7 @@ def _pulls(
 
 
 def _taken_again(
-    params: StitchParams, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector, angle: float
+    params: StitchParams, driver: RobotHand, puller: RobotHand, stitch: Stitch, needle: Vector, angle: float
 ) -> WayOn:
     """Plan how a needle that the tissue alone holds, its tip at `angle` (rad), is taken hold of."""
     emerge, lift = params.emerge, params.lift
@@ -176,13 +181,15 @@ def _on_its_way(stitch: Stitch, needle: Vector, angle: float) -> float:
     return angle + 2.0 * pi if angle < stitch.entry - BEFORE else angle
 
 
-def behind_tip(grip: Vector, hand: Hand, stitch: Stitch) -> float:
+def behind_tip(grip: Vector, hand: RobotHand, stitch: Stitch) -> float:
     """Return how far behind the tip (rad) a jaw holds the needle, by the pose of its tip in the needle's."""
     x, y, _ = (grip[:3, 3] + (hand.jaw.length - DEEP) * grip[:3, 2]).tolist()
     return stitch.needle.arc / 2.0 - atan2(y, x)
 
 
-def _from_a_side(hand: Hand, behind: float, stitch: Stitch, ways: list[list[Vector]]) -> tuple[Vector, float]:
+def _from_a_side(
+    hand: RobotHand, behind: float, stitch: Stitch, ways: list[list[Vector]]
+) -> tuple[Vector, float]:
     """Return how a hand takes the needle `behind` its tip (rad): from the other side if it has to."""
     side, other = (
         best_grip(hand, grips_of(hand, behind, stitch.needle, backwards=each), ways) for each in (False, True)
@@ -190,16 +197,16 @@ def _from_a_side(hand: Hand, behind: float, stitch: Stitch, ways: list[list[Vect
     return _feasible(hand, other if side[1].problem and not other[1].problem else side)
 
 
-def _kept(hand: Hand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
+def _kept(hand: RobotHand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
     """Return how the hand holds the needle now, and the margin with which it goes like that."""
     return _chosen(hand, [inverse_pose(needle) @ framed(hand.measured)], ways)
 
 
-def _chosen(hand: Hand, grips: list[Vector], ways: list[list[Vector]]) -> tuple[Vector, float]:
+def _chosen(hand: RobotHand, grips: list[Vector], ways: list[list[Vector]]) -> tuple[Vector, float]:
     return _feasible(hand, best_grip(hand, grips, ways))
 
 
-def _feasible(hand: Hand, found: tuple[Vector, Reach, int]) -> tuple[Vector, float]:
+def _feasible(hand: RobotHand, found: tuple[Vector, Reach, int]) -> tuple[Vector, float]:
     grip, worst, _ = found
     if problem := worst.problem:
         raise MotionError(f"the stitch is not feasible: of {hand.arm}, {problem}")

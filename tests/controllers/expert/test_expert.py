@@ -8,9 +8,9 @@ from pydantic import ValidationError
 
 from controllers.expert import outlines
 from controllers.expert.controller import Expert
-from controllers.expert.hand import Hand, Phase, framed, pose_of
+from controllers.expert.hand import HandPhase, RobotHand, framed, pose_of
 from controllers.expert.params import ExpertParams
-from controllers.expert.posts import PegBoard
+from controllers.expert.peg_board import PegBoard
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
 from robots.dvrk.instruments import instrument
@@ -22,7 +22,7 @@ PERIOD = 10_000_000
 
 
 class World:
-    """Two hands and the things of an installed scenario."""
+    """Two hands and the objects of an installed scenario."""
 
     clings = 0.0
     """A jaw lets go when it is opened further than this, rad."""
@@ -31,7 +31,7 @@ class World:
         given = load(name, []).params["lead"]
         self.expert = Expert("lead", ExpertParams.model_validate(given.model_dump() | params))
         self.outputs = self.expert.configure(Setup(PERIOD, ".")) or {}
-        self.things = {thing: framed(np.array(pose)) for thing, pose in starts(name).items()} | (poses or {})
+        self.objects = {index: framed(np.array(pose)) for index, pose in starts(name).items()} | (poses or {})
         self.held, self.jaws, self.tips, self.grips, self.t = {}, {}, {}, {}, 0
         for each in self.expert._team.hands:
             hand = each.hand
@@ -45,10 +45,10 @@ class World:
             values[f"{arm}/local/measured_cp"] = pose_of(np.linalg.inv(each.hand.base) @ self.tips[arm])
             wide = 0.1 if arm in self.grips and self.jaws[arm] < 0 else self.jaws[arm]
             values[f"{arm}/jaw/measured_js"] = np.array([wide, 0, 0])
-        for thing, pose in self.things.items():
-            holders = [float(arm[-1]) for arm, (name, _) in self.grips.items() if name == thing]
-            values[f"objects/{thing}/pose"] = pose_of(pose)
-            values[f"objects/{thing}/held_by"] = np.array([min(holders, default=0.0)])
+        for index, pose in self.objects.items():
+            holders = [float(arm[-1]) for arm, (name, _) in self.grips.items() if name == index]
+            values[f"objects/{index}/pose"] = pose_of(pose)
+            values[f"objects/{index}/held_by"] = np.array([min(holders, default=0.0)])
         out = self.expert.step(self.t, PERIOD, Inputs(values, events=events))
         self.t += PERIOD
         for each in self.expert._team.hands:
@@ -63,21 +63,21 @@ class World:
                 self.grips.pop(arm, None)
             if self.jaws[arm] < 0:
                 near = [
-                    thing
-                    for thing, pose in self.things.items()
+                    index
+                    for index, pose in self.objects.items()
                     if np.linalg.norm(pose[:3, 3] - self.tips[arm][:3, 3]) < 0.03
                 ]
                 if near:
                     near.sort(
-                        key=lambda thing: np.linalg.norm(self.things[thing][:3, 3] - self.tips[arm][:3, 3])
+                        key=lambda index: np.linalg.norm(self.objects[index][:3, 3] - self.tips[arm][:3, 3])
                     )
-                    self.grips[arm] = near[0], np.linalg.inv(self.tips[arm]) @ self.things[near[0]]
+                    self.grips[arm] = near[0], np.linalg.inv(self.tips[arm]) @ self.objects[near[0]]
         for message in out[f"{arm}/servo_cp"]:
             p, q = message.pose.position, message.pose.orientation
             self.tips[arm] = hand.base @ framed(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
         if arm in self.grips:
-            thing, grip = self.grips[arm]
-            self.things[thing] = self.tips[arm] @ grip
+            index, grip = self.grips[arm]
+            self.objects[index] = self.tips[arm] @ grip
 
     def run(self, seconds, until=lambda world: world.expert.ended):
         for _ in range(round(seconds * 1e9 / PERIOD)):
@@ -89,28 +89,28 @@ class World:
 
 def starts(name):
     params = load(name, []).params["robot"]
-    return {thing: (*what.position, *what.orientation) for thing, what in params.objects.items()}
+    return {index: (*what.position, *what.orientation) for index, what in params.objects.items()}
 
 
 @pytest.mark.parametrize("name", ["pick-and-place", "peg-board", "peg-board-surrol", "peg-board-fls"])
 def test_everything_is_carried_where_it_belongs_at_the_first_attempt(name):
     world = World(name).run(120)
     assert world.expert.ended
-    things = len(world.things)
-    assert world.outputs["placed"][0] == things
-    assert world.outputs["attempts"][0] == things * (2 if world.expert.params.hand_over else 1)
+    objects = len(world.objects)
+    assert world.outputs["placed"][0] == objects
+    assert world.outputs["attempts"][0] == objects * (2 if world.expert.params.hand_over else 1)
     assert world.outputs["dropped"][0] == 0
 
 
 def test_what_is_lost_on_its_way_is_taken_up_again():
     world = World("peg-board-surrol")
     carrying = world.expert._team.hands[0]
-    world.run(20, until=lambda _: carrying.state.phase is Phase.CARRY)
-    thing, _ = world.grips.pop("PSM1")
-    world.things[thing] = framed(np.array(starts("peg-board-surrol")[thing]))
+    world.run(20, until=lambda _: carrying.state.phase is HandPhase.CARRY)
+    index, _ = world.grips.pop("PSM1")
+    world.objects[index] = framed(np.array(starts("peg-board-surrol")[index]))
     world.run(120)
     assert world.outputs["dropped"][0] == 1
-    assert world.outputs["placed"][0] == len(world.things)
+    assert world.outputs["placed"][0] == len(world.objects)
 
 
 def test_a_jaw_opens_further_until_nothing_clings_to_it():
@@ -124,13 +124,13 @@ def test_a_jaw_opens_further_until_nothing_clings_to_it():
 def test_a_ring_that_comes_along_when_the_hand_leaves_is_put_down_again_and_the_jaw_opens_further():
     world = one_ring("peg-board-surrol")
     hand = world.expert._team.hands[0]
-    world.run(20, until=lambda _: hand.state.phase is Phase.RETREAT)
-    world.grips["PSM1"] = "ring1", np.linalg.inv(world.tips["PSM1"]) @ world.things["ring1"]
-    put_down = world.things["ring1"].copy()
+    world.run(20, until=lambda _: hand.state.phase is HandPhase.RETREAT)
+    world.grips["PSM1"] = "ring1", np.linalg.inv(world.tips["PSM1"]) @ world.objects["ring1"]
+    put_down = world.objects["ring1"].copy()
     world.clings = 0.35
     world.run(20, until=lambda _: "PSM1" not in world.grips)
     assert world.jaws["PSM1"] == pytest.approx(0.4)
-    assert world.things["ring1"] == pytest.approx(put_down, abs=1e-4)
+    assert world.objects["ring1"] == pytest.approx(put_down, abs=1e-4)
 
 
 def test_a_hand_that_comes_down_on_something_backs_off_and_leaves_the_thing_after_some_times():
@@ -139,7 +139,7 @@ def test_a_hand_that_comes_down_on_something_backs_off_and_leaves_the_thing_afte
     struck = 0.0
     while not world.expert.ended:
         world.step()
-        if hand.state.phase is Phase.DESCEND and tip["PSM1"][2, 3] < 0.830:
+        if hand.state.phase is HandPhase.DESCEND and tip["PSM1"][2, 3] < 0.830:
             struck = max(struck, 0.830 - tip["PSM1"][2, 3])
             tip["PSM1"][2, 3] = 0.830
     assert "ring1 is blocked" in world.expert.ended
@@ -158,14 +158,17 @@ def test_a_ring_is_put_down_clear_of_those_beside_it():
         place = board.place(0, np.stack([carried, beside]), 1)
         carried[:3, 3] = place
         ring = params.board.measures.ring
-        assert outlines.gap(outlines.of_ring(ring, carried), outlines.of_ring(ring, beside)) >= 1e-3
+        assert (
+            outlines.gap(outlines.outline_of_ring(ring, carried), outlines.outline_of_ring(ring, beside))
+            >= 1e-3
+        )
 
 
 def one_ring(name, pose=None, **params):
     """A world with the first ring only, at `pose`, or where it starts."""
     objects = {"ring1": load(name, []).params["lead"].objects["ring1"].model_dump()}
     world = World(name, objects=objects, **params)
-    world.things = {"ring1": world.things["ring1"] if pose is None else pose}
+    world.objects = {"ring1": world.objects["ring1"] if pose is None else pose}
     return world
 
 
@@ -190,13 +193,13 @@ def test_a_ring_that_lies_on_its_side_is_put_upright_first(name, pose, attempts)
     world = one_ring(name, pose).run(90)
     assert world.expert.ended == "the task is done"
     assert world.outputs["attempts"][0] == attempts
-    assert abs(world.things["ring1"][2, 2]) == pytest.approx(1.0, abs=0.01)
+    assert abs(world.objects["ring1"][2, 2]) == pytest.approx(1.0, abs=0.01)
 
 
 def test_rings_go_there_and_back():
     world = one_ring("peg-board", legs=2).run(90)
     assert world.expert.ended == "the task is done"
-    assert world.things["ring1"][0, 3] > 0.078  # on the surgeon's left again
+    assert world.objects["ring1"][0, 3] > 0.078  # on the surgeon's left again
     assert world.outputs["attempts"][0] == 4
 
 
@@ -255,7 +258,7 @@ def test_a_saved_expert_goes_on_with_the_same_bits():
     world, other = World("peg-board"), World("peg-board")
     world.run(9)
     other.expert.restore(world.expert.save())
-    for each in ("held", "jaws", "tips", "grips", "things"):
+    for each in ("held", "jaws", "tips", "grips", "objects"):
         setattr(other, each, dict(getattr(world, each)))
     other.t = world.t
     world.run(3), other.run(3)
@@ -273,20 +276,20 @@ def test_a_hand_leaves_a_thing_after_a_command_on_the_way_to_it_was_refused():
 def test_a_hand_whose_way_back_is_refused_stays_and_goes_on_with_the_next_thing():
     world = World("peg-board-surrol")
     hand = world.expert._team.hands[0]
-    world.run(20, until=lambda _: hand.state.phase is Phase.RETREAT)
+    world.run(20, until=lambda _: hand.state.phase is HandPhase.RETREAT)
     world.run(0.05)
     before = world.tips["PSM1"].copy()
     world.step(**{"PSM1/error": (StringMessage(data="too far"),)})
-    assert hand.state.phase is not Phase.RETREAT
+    assert hand.state.phase is not HandPhase.RETREAT
     assert np.linalg.norm(world.tips["PSM1"][:3, 3] - before[:3, 3]) < 1e-3
     world.run(120)
-    assert world.outputs["placed"][0] == len(world.things)
+    assert world.outputs["placed"][0] == len(world.objects)
 
 
 def test_a_refused_command_to_a_hand_that_carries_ends_the_session():
     world = one_ring("peg-board-surrol")
     carrying = world.expert._team.hands[0]
-    world.run(20, until=lambda _: carrying.state.phase is Phase.CARRY)
+    world.run(20, until=lambda _: carrying.state.phase is HandPhase.CARRY)
     with pytest.raises(SessionError, match="PSM1 in phase 'carry': too far"):
         world.step(**{"PSM1/error": (StringMessage(data="too far"),)})
 
@@ -316,7 +319,7 @@ def test_a_line_starts_and_ends_at_rest_and_keeps_to_its_speed(way, turn, share)
     from robots import rotation
 
     tool = instrument("400006")
-    hand = Hand("PSM1", np.eye(4), chain(tool), tool.jaw)
+    hand = RobotHand("PSM1", np.eye(4), chain(tool), tool.jaw)
     hand.period = 0.01
     start = np.array([0.0, 0.0, -0.1, 0.0, 0.0, 0.0, 1.0])
     hand.state.goal[:] = hand.state.start[:] = hand.measured[:] = start

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.expert.fallen_rings import Around, of_fallen_ring
+from controllers.expert.fallen_rings import Around, grasps_of_fallen_ring
 from controllers.expert.plans import upright
 from robots.dvrk.instruments import WRIST_RADIUS
 from robots.training.boards import BOARDS
@@ -28,7 +28,7 @@ def around(pose, posts=()):
 @given(st.floats(-np.pi, np.pi))
 def test_a_ring_on_its_side_is_taken_by_a_wall_through_an_open_end(turn):
     pose = lying(turn)
-    found = of_fallen_ring(RING, pose, DRIVER, around(pose))
+    found = grasps_of_fallen_ring(RING, pose, DRIVER, around(pose))
     assert len(found.poses)
     for tip, up in zip(found.poses, found.ups, strict=True):
         fingers, opening = tip[:3, 2], tip[:3, 1]
@@ -43,15 +43,15 @@ def test_a_ring_on_its_side_is_taken_by_a_wall_through_an_open_end(turn):
 
 @given(st.floats(-np.pi, np.pi), st.floats(0.4, 1.5))
 def test_put_upright_its_taken_end_is_up(turn, tip):
-    for up in of_fallen_ring(RING, lying(turn, tip), DRIVER, around(lying(turn, tip))).ups:
+    for up in grasps_of_fallen_ring(RING, lying(turn, tip), DRIVER, around(lying(turn, tip))).ups:
         assert upright(up) @ up == pytest.approx([0, 0, 1], abs=1e-9)
 
 
 def test_fingers_and_wrist_keep_clear_of_a_post_before_an_end():
     pose = lying(0.0)
-    free = of_fallen_ring(RING, pose, DRIVER, around(pose))
+    free = grasps_of_fallen_ring(RING, pose, DRIVER, around(pose))
     post = pose[:2, 3] + 14e-3 * pose[:2, 2]
-    beside = of_fallen_ring(RING, pose, DRIVER, around(pose, [post]))
+    beside = grasps_of_fallen_ring(RING, pose, DRIVER, around(pose, [post]))
     assert 0 < len(beside.poses) < len(free.poses)
     for tip in beside.poses:
         assert np.linalg.norm(tip[:2, 3] - post) > 1.8e-3 + WRIST_RADIUS
@@ -62,4 +62,4 @@ def test_a_ring_between_walls_at_both_ends_cannot_be_taken():
     off = [(RING.height / 2 + 1e-3) * side * pose[:3, 2] + pose[:3, 3] for side in (1, -1)]
     half = np.array([0.05, 1e-3, 0.05])
     walls = tuple((middle - half, middle + half) for middle in off)
-    assert not len(of_fallen_ring(RING, pose, DRIVER, around(pose)._replace(boxes=walls)).poses)
+    assert not len(grasps_of_fallen_ring(RING, pose, DRIVER, around(pose)._replace(boxes=walls)).poses)

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.expert import outlines, reach
-from controllers.expert.grasps import ROOMY, of_piece, of_ring, shut_fingers
-from controllers.expert.posts import PegBoard
+from controllers.expert.grasps import AMPLE_ROOM, grasps_of_piece, grasps_of_ring, shut_fingers
+from controllers.expert.peg_board import PegBoard
 from hub.planning.scenario_file import load
 from robots.dvrk.instruments import instrument
 from robots.dvrk.psm import chain
@@ -28,7 +28,7 @@ def turned(angle, axis=2, position=(0.1, 0.2, 0.3)):
 @given(ANGLES)
 def test_a_standing_piece_is_taken_across_either_side_with_room_to_come_down(angle):
     pose = turned(angle)
-    found = of_piece(pose, CADIERE)
+    found = grasps_of_piece(pose, CADIERE)
     assert len(found.poses) == 4
     for tip, opening in zip(found.poses, found.opening, strict=True):
         assert tip[:3, 2] == pytest.approx([0, 0, -1])
@@ -42,7 +42,7 @@ def test_a_standing_piece_is_taken_across_either_side_with_room_to_come_down(ang
 
 
 def test_a_short_jaw_takes_a_piece_across_its_narrow_side_alone():
-    found = of_piece(turned(0.0), DRIVER)
+    found = grasps_of_piece(turned(0.0), DRIVER)
     assert np.abs(found.poses[:, 0, 1]) == pytest.approx(1.0)
 
 
@@ -51,7 +51,7 @@ def test_a_ring_around_its_post_can_be_taken_and_no_finger_comes_down_on_the_pos
     board = BOARDS[name]
     pose = turned(angle)
     post = pose[:2, 3] + off * np.array([np.cos(where), np.sin(where)])
-    found = of_ring(board.ring, pose, DRIVER, (post, board.post_radius))
+    found = grasps_of_ring(board.ring, pose, DRIVER, (post, board.post_radius))
     assert len(found.poses)
     for tip, opening in zip(found.poses, found.opening, strict=True):
         inwards = pose[:2, 3] - tip[:2, 3]
@@ -65,7 +65,7 @@ def test_a_ring_around_its_post_can_be_taken_and_no_finger_comes_down_on_the_pos
 @given(ANGLES, st.floats(0, 0.55))
 def test_the_wall_of_a_ring_lies_in_the_plane_between_the_fingers(angle, lean):
     ring, pose = BOARDS["icra2026"].ring, turned(angle)
-    found = of_ring(ring, pose, DRIVER, None, lean).poses
+    found = grasps_of_ring(ring, pose, DRIVER, None, lean).poses
     assert len(found) >= 12
     for tip in found:
         assert tip[:3, :3].T @ tip[:3, :3] == pytest.approx(np.eye(3), abs=1e-12)
@@ -79,7 +79,7 @@ def test_the_wall_of_a_ring_lies_in_the_plane_between_the_fingers(angle, lean):
 @given(ANGLES, st.floats(0, 0.55))
 def test_the_finger_in_a_ring_keeps_clear_of_its_other_walls(angle, lean):
     ring, pose = BOARDS["surrol"].ring, turned(angle)
-    found = of_ring(ring, pose, DRIVER, None, lean)
+    found = grasps_of_ring(ring, pose, DRIVER, None, lean)
     assert len(found.poses)
     corners = np.array([[np.cos(a), np.sin(a)] for a in np.pi / 2 + 2 * np.pi / 3 * np.arange(3)])
     normals = -corners @ pose[:2, :2].T  # of the walls: opposite to the corners
@@ -97,8 +97,8 @@ def test_the_finger_in_a_ring_keeps_clear_of_its_other_walls(angle, lean):
 
 def test_the_finger_outside_keeps_clear_of_a_ring_beside():
     ring, pose = BOARDS["surrol"].ring, turned(0.3)
-    beside = outlines.of_ring(ring, turned(0.3 + np.pi, position=(0.1 + 0.0125, 0.2, 0.3)))
-    free, clear = (of_ring(ring, pose, DRIVER, None, others=others) for others in ([], [beside]))
+    beside = outlines.outline_of_ring(ring, turned(0.3 + np.pi, position=(0.1 + 0.0125, 0.2, 0.3)))
+    free, clear = (grasps_of_ring(ring, pose, DRIVER, None, others=others) for others in ([], [beside]))
     assert 0 < len(clear.poses) < len(free.poses)
     for tip in clear.poses:
         outwards = np.sign(tip[:2, 1] @ (tip[:2, 3] - pose[:2, 3])) * tip[:2, 1]
@@ -110,9 +110,9 @@ def test_the_finger_outside_keeps_clear_of_a_ring_beside():
 @given(ANGLES, st.sampled_from(sorted(BOARDS)), st.integers(0, 29))
 def test_a_second_hand_finds_room_beside_the_fingers_of_the_first(angle, name, which):
     ring, pose = BOARDS[name].ring, turned(angle)
-    ways = of_ring(ring, pose, DRIVER, None).poses
+    ways = grasps_of_ring(ring, pose, DRIVER, None).poses
     first = shut_fingers(ways[which % len(ways)], DRIVER, ring.thickness)
-    found = of_ring(ring, pose, DRIVER, None, others=[first])
+    found = grasps_of_ring(ring, pose, DRIVER, None, others=[first])
     assert len(found.poses)
     for tip in found.poses:
         both = [tip[:2, 3] + side * (DRIVER * np.sin(0.1) + 0.7e-3) * tip[:2, 1] for side in (-1, 1)]
@@ -130,7 +130,7 @@ def test_the_room_between_outlines():
 def test_the_finger_of_a_leaning_hand_passes_a_post_that_is_higher_than_the_ring(angle, name, lean):
     board = BOARDS[name]
     pose = turned(angle)
-    for tip in of_ring(board.ring, pose, DRIVER, (pose[:2, 3], board.post_radius), lean).poses:
+    for tip in grasps_of_ring(board.ring, pose, DRIVER, (pose[:2, 3], board.post_radius), lean).poses:
         inwards = np.sign(tip[:2, 1] @ (pose[:2, 3] - tip[:2, 3])) * tip[:2, 1]
         for along in np.linspace(0.0, DRIVER, 5):  # from the end of the finger, its inner face and edges
             middle = tip[:3, 3] + (DRIVER - along) * (np.append(inwards, 0) * np.sin(0.1) + tip[:3, 2])
@@ -141,13 +141,13 @@ def test_the_finger_of_a_leaning_hand_passes_a_post_that_is_higher_than_the_ring
 
 
 def test_a_ring_on_its_side_is_not_taken_from_above():
-    assert not len(of_ring(BOARDS["icra2026"].ring, turned(np.pi / 2, axis=0), DRIVER, None).poses)
+    assert not len(grasps_of_ring(BOARDS["icra2026"].ring, turned(np.pi / 2, axis=0), DRIVER, None).poses)
 
 
 @given(ANGLES, st.floats(0.4, 1.1))
 def test_a_leaning_piece_is_taken_along_its_own_axes(angle, lean):
     pose = turned(angle) @ turned(lean, axis=0, position=(0, 0, 0))
-    found = of_piece(pose, CADIERE)
+    found = grasps_of_piece(pose, CADIERE)
     assert len(found.poses)
     for tip, up in zip(found.poses, found.ups, strict=True):
         assert tip[:3, 2] == pytest.approx(-up)
@@ -175,4 +175,4 @@ def test_a_wrist_has_no_room_where_a_post_stands():
     top = board._posts[0] + np.array([0, 0, 0.005])
     points = np.tile(top + np.array([[[0.02, 0, 0]], [[0.004, 0, 0]], [[0, 0, 0]]]), (1, 22, 1))
     free, near, inside = board.room(points)
-    assert inside < near < free <= ROOMY
+    assert inside < near < free <= AMPLE_ROOM

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.expert.hand import Hand
+from controllers.expert.hand import RobotHand
 from controllers.stitching.feasibility import reach
 from controllers.stitching.geometry import Grip, grip_pose, stitch_between
 from controllers.stitching.plan import make_plan, make_stitch, stitch_through
@@ -73,7 +73,7 @@ def hands(shift=0.0):
     for arm, x in (("PSM1", 0.07), ("PSM2", -0.07)):
         there = base.copy()
         there[:3, 3] = x, -0.115 + shift, 0.106
-        found.append(Hand(arm, there, chain(tool), tool.jaw))
+        found.append(RobotHand(arm, there, chain(tool), tool.jaw))
     return found
 
 

@@ -1,4 +1,4 @@
-"""Pieces, each of which belongs in a dish. SI units, poses in the world."""
+"""Pick and place: pieces into dishes. SI units, poses in the world."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from controllers.expert.chores import DROP, SLACK
-from controllers.expert.grasps import ROOMY, Grasps, of_piece
+from controllers.expert.chore import DROP, SLACK
+from controllers.expert.grasps import AMPLE_ROOM, Grasps, grasps_of_piece
 from robots.training.dishes import DISH, PIECE
 from robots.training.fixtures import DishParams
 from schemas.vectors import Vector
@@ -16,17 +16,17 @@ from schemas.vectors import Vector
 __all__ = ["PickAndPlace"]
 
 _SLOT = 11.5e-3
-"""Of the places in a dish from its middle, m."""
+"""Distance of the slots of a dish from the dish's middle, m."""
 _GONE = 0.05
-"""Below the dishes, m: what is so low has fallen off the table."""
+"""Depth below the dishes of a fallen piece, m."""
 
 
 class PickAndPlace:
-    """Pieces, each of which belongs in a dish; they go one way, to side 1."""
+    """Pieces with a dish each, carried one way, to side 1."""
 
     def __init__(self, goals: Mapping[str, str], dishes: Mapping[str, DishParams]) -> None:
-        """Take which dish each piece belongs in, and where the dishes are."""
-        self.things = tuple(goals)
+        """`goals`: dish by piece; `dishes`: positions of the dishes."""
+        self.objects = tuple(goals)
         self._centres = [np.array(dishes[dish].position) for dish in goals.values()]
         mates = list(goals.values())
         self._slots = [
@@ -39,29 +39,29 @@ class PickAndPlace:
         self.meeting = np.mean(self._centres, axis=0)
         self.meeting[2] = self.travel
 
-    def side(self, thing: int, poses: Vector) -> int:
-        """Return 1 inside its dish, else 0."""
-        return int(self.is_done(thing, poses, 1))
+    def side(self, index: int, poses: Vector) -> int:
+        """Return 1 inside the piece's dish, else 0."""
+        return int(self.is_done(index, poses, 1))
 
     def middle_of(self, side: int) -> Vector:  # noqa: ARG002
         """Return the middle of all dishes."""
         return self.meeting
 
-    def is_done(self, thing: int, poses: Vector, side: int) -> bool:  # noqa: ARG002
-        """Say whether it is inside the rim of its dish."""
-        off = poses[thing, :3, 3] - self._centres[thing]
+    def is_done(self, index: int, poses: Vector, side: int) -> bool:  # noqa: ARG002
+        """Return whether a piece is inside the rim of its dish."""
+        off = poses[index, :3, 3] - self._centres[index]
         return bool(off[:2] @ off[:2] < DISH.inner_radius**2 and off[2] < DISH.height)
 
-    def place(self, thing: int, poses: Vector, side: int) -> Vector:  # noqa: ARG002
-        """Return its slot in the dish, at the height of the side that is up now."""
-        turn = self._slots[thing]
-        half = float(np.abs(poses[thing, 2, :3]) @ np.array(PIECE.size)) / 2.0
+    def place(self, index: int, poses: Vector, side: int) -> Vector:  # noqa: ARG002
+        """Return the piece's slot in the dish, at the height for the piece's present attitude."""
+        turn = self._slots[index]
+        half = float(np.abs(poses[index, 2, :3]) @ np.array(PIECE.size)) / 2.0
         offset = np.array([_SLOT * sin(turn), _SLOT * cos(turn), half + DROP])
-        return self._centres[thing] + offset
+        return self._centres[index] + offset
 
-    def rest(self, thing: int, poses: Vector, side: int) -> Vector:
-        """Return its slot: a hand that has put a piece upright points down."""
-        return self.place(thing, poses, side)
+    def rest(self, index: int, poses: Vector, side: int) -> Vector:
+        """Return the piece's slot: after putting a piece upright the fingers point down."""
+        return self.place(index, poses, side)
 
     def above(self, place: Vector) -> float:  # noqa: ARG002
         """Return the height over the rim."""
@@ -69,14 +69,14 @@ class PickAndPlace:
 
     def grasps(
         self,
-        thing: int,
+        index: int,
         poses: Vector,
         reach: float,
         other: Vector | None,  # noqa: ARG002
     ) -> Iterator[Grasps]:
-        """Yield its grasps."""
-        yield of_piece(poses[thing], reach)
+        """Yield the grasps of a piece."""
+        yield grasps_of_piece(poses[index], reach)
 
     def room(self, points: Vector) -> Vector:
-        """Return enough: a tip stays over the rim of a dish."""
-        return np.full(len(points), ROOMY)
+        """Return `AMPLE_ROOM`: a tip stays over the rim of a dish."""
+        return np.full(len(points), AMPLE_ROOM)

@@ -1,4 +1,4 @@
-"""Rings, which are carried between the posts of a board. SI units, poses in the world."""
+"""Peg transfer: rings between the posts of a board. SI units, poses in the world."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from itertools import product
 
 import numpy as np
 
-from controllers.expert.chores import DROP, SLACK
-from controllers.expert.fallen_rings import Around, of_fallen_ring
-from controllers.expert.grasps import ROOMY, UPRIGHT, Grasps, of_ring, shut_fingers
-from controllers.expert.outlines import box_of_ring, gap
-from controllers.expert.outlines import of_ring as of_ring_above
+from controllers.expert.chore import DROP, SLACK
+from controllers.expert.fallen_rings import Around, grasps_of_fallen_ring
+from controllers.expert.grasps import AMPLE_ROOM, UPRIGHT_COSINE, Grasps, grasps_of_ring, shut_fingers
+from controllers.expert.outlines import box_of_ring, gap, outline_of_ring
 from controllers.expert.reach import LINK_RADII
 from robots.training.fixtures import BoardParams
 from schemas.vectors import Vector
@@ -19,29 +18,29 @@ from schemas.vectors import Vector
 __all__ = ["PegBoard"]
 
 _GONE = 0.05
-"""Below the board, m: what is so low has fallen off the table."""
+"""Depth below the board of a fallen ring, m."""
 _LEANS = tuple(np.radians([0.0, 15.0, 30.0]).tolist())
-"""Of the fingers from the vertical, rad: with the last one an arm reaches 5 mm further."""
+"""Tilts of the fingers from the vertical, rad; the last tilt extends the reach of an arm by 5 mm."""
 _GRID = 4.0e-3
-"""Between the points of the board among which one is chosen to put a ring upright, m."""
+"""Grid of candidate points on the board for putting a ring upright, m."""
 _ENOUGH = 8.0e-3
-"""Room about a ring there beyond which more is no better, m."""
+"""Clearance about a ring without further benefit, m."""
 _PER_WAY = 0.05
-"""What a metre of way to that point costs, in metres of room."""
+"""Cost of a metre of travel to a candidate point, in metres of clearance."""
 _APART = 1.0e-3
-"""Between a ring that is put down and the others, beyond which more is no better, m."""
+"""Gap to other rings at the target without further benefit, m."""
 _SHIFTS = np.array([[0, 0], *([i, j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)], np.float64)
-"""Of a ring from the middle of its post, in halves of what the post leaves."""
+"""Offsets of a ring from the middle of its post, in halves of the play around the post."""
 _PER_SHIFT = 10.0
-"""What a metre of that costs, in metres of way."""
+"""Cost of a metre of offset, in metres of travel."""
 
 
 class PegBoard:
-    """Rings, which belong on the posts of one side of a board, one each: side 1 has the target posts."""
+    """Rings on the posts of a board, one ring a post; side 1 has the target posts."""
 
-    def __init__(self, things: tuple[str, ...], params: BoardParams) -> None:
-        """Take the names of the rings, and the board."""
-        self.things, self._board = things, params.measures
+    def __init__(self, objects: tuple[str, ...], params: BoardParams) -> None:
+        """`objects`: names of the rings."""
+        self.objects, self._board = objects, params.measures
         self._pose = params.pose
         self._posts = self._on_board(self._board.posts)
         targets = list(self._board.targets)
@@ -59,7 +58,7 @@ class PegBoard:
         self._boxes = self._walls()
 
     def _on_board(self, points: Vector) -> Vector:
-        """Return the middles of rings that stand upright at points (n, 2) of the board, m, shape (n, 3)."""
+        """Return the middles of upright rings at points (n, 2) of the board, m, shape (n, 3)."""
         flat = np.column_stack([points, np.full(len(points), self._board.ring.height / 2.0)])
         return flat @ self._pose[:3, :3].T + self._pose[:3, 3]
 
@@ -71,32 +70,32 @@ class PegBoard:
         corners = ([*wall.centre, half[2]] + signs * half) @ self._pose[:3, :3].T + self._pose[:3, 3]
         return ((corners.min(axis=0), corners.max(axis=0)),)
 
-    def side(self, thing: int, poses: Vector) -> int:
-        """Return the side whose middle is nearer."""
-        off = [float(np.linalg.norm((poses[thing, :3, 3] - middle)[:2])) for middle in self._middles]
+    def side(self, index: int, poses: Vector) -> int:
+        """Return the side nearest to a ring."""
+        off = [float(np.linalg.norm((poses[index, :3, 3] - middle)[:2])) for middle in self._middles]
         return int(off[1] < off[0])
 
     def middle_of(self, side: int) -> Vector:
         """Return the middle of a side's posts."""
         return self._middles[side]
 
-    def is_done(self, thing: int, poses: Vector, side: int) -> bool:
-        """Say whether it is upright around any of the side's posts, and down."""
-        pose, ring = poses[thing], self._board.ring
+    def is_done(self, index: int, poses: Vector, side: int) -> bool:
+        """Return whether a ring is upright and down around a post of the side."""
+        pose, ring = poses[index], self._board.ring
         off = np.abs(pose[:3, 3] - self._sides[side])
         there = (np.hypot(off[:, 0], off[:, 1]) < ring.inradius) & (off[:, 2] < ring.height / 2.0)
-        return bool(there.any()) and abs(float(pose[2, 2])) > UPRIGHT
+        return bool(there.any()) and abs(float(pose[2, 2])) > UPRIGHT_COSINE
 
-    def place(self, thing: int, poses: Vector, side: int) -> Vector:
-        """Return the place around the side's nearest free post, clear of the other rings as it is turned now.
+    def place(self, index: int, poses: Vector, side: int) -> Vector:
+        """Return the place around the side's nearest free post, clear of other rings at the present yaw.
 
-        Where it would touch one the ring goes a little beside the middle of a post, or to another post.
+        To avoid contact a ring is put off the middle of a post, or on another post.
         """
-        posts, others = self._sides[side], np.delete(poses, thing, axis=0)
+        posts, others = self._sides[side], np.delete(poses, index, axis=0)
         free = np.array([post for post in posts if self._is_free(post, others[:, :3, 3])])
-        ring, middle = self._board.ring, poses[thing, :2, 3]
-        outline = of_ring_above(ring, poses[thing]) - middle
-        outlines = [of_ring_above(ring, other) for other in others]
+        ring, middle = self._board.ring, poses[index, :2, 3]
+        outline = outline_of_ring(ring, poses[index]) - middle
+        outlines = [outline_of_ring(ring, other) for other in others]
         aside = (ring.inradius - self._board.post_radius) / 2.0
         ways = [
             (
@@ -120,17 +119,17 @@ class PegBoard:
         off = others[:, :2] - post[:2]
         return not bool(((off**2).sum(axis=1) < self._board.ring.side**2 / 4.0).any())
 
-    def rest(self, thing: int, poses: Vector, side: int) -> Vector:
-        """Return the point of the side, near the thing, with most room between posts, wall and rings."""
+    def rest(self, index: int, poses: Vector, side: int) -> Vector:
+        """Return the point of the side, near the object, with most room between posts, wall and rings."""
         x, y = (np.arange(_GRID - size / 2.0, size / 2.0, _GRID) for size in self._board.size[:2])
         points = self._on_board(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
         here, there = (np.linalg.norm((points - self._middles[k])[:, :2], axis=1) for k in (side, 1 - side))
         points = points[here < there]
         around = self._board.ring.side / np.sqrt(3.0)  # of the circle through its corners
-        others = np.delete(poses[:, :3, 3], thing, axis=0)
+        others = np.delete(poses[:, :3, 3], index, axis=0)
         room = np.full(len(points), np.inf)
-        for things, radius in (self._posts, self._board.post_radius), (others, around):
-            for each in things:
+        for objects, radius in (self._posts, self._board.post_radius), (others, around):
+            for each in objects:
                 off = np.linalg.norm((points - each)[:, :2], axis=1)
                 room = np.minimum(room, off - around - radius)
         for least, greatest in self._boxes:
@@ -140,7 +139,7 @@ class PegBoard:
             (points - self._pose[:3, 3]) @ self._pose[:3, :2]
         )
         room = np.minimum(room, edge.min(axis=1) - around)
-        way = np.linalg.norm((points - poses[thing, :3, 3])[:, :2], axis=1)
+        way = np.linalg.norm((points - poses[index, :3, 3])[:, :2], axis=1)
         place = points[int((np.minimum(room, _ENOUGH) - _PER_WAY * way).argmax())].copy()
         place[2] += DROP
         return place
@@ -149,31 +148,30 @@ class PegBoard:
         """Return the height just over the posts."""
         return self.clear + self._board.ring.height / 2.0 - SLACK / 2.0
 
-    def grasps(self, thing: int, poses: Vector, reach: float, other: Vector | None) -> Iterator[Grasps]:
-        """Yield its grasps, clear of the post that it is around, or of all that is about a fallen one.
+    def grasps(self, index: int, poses: Vector, reach: float, other: Vector | None) -> Iterator[Grasps]:
+        """Yield the grasps of a ring, clear of the post in the ring or, after a fall, of all obstacles.
 
-        From straight above, then from a hand that leans; where nothing else is left, without regard to other
-        rings.
+        First from straight above, then with tilted fingers, at last without regard to other rings.
         """
-        pose, ring = poses[thing], self._board.ring
-        near = [each for each in np.delete(poses, thing, axis=0) if self._is_near(each, pose)]
-        if abs(float(pose[2, 2])) < UPRIGHT:
+        pose, ring = poses[index], self._board.ring
+        near = [each for each in np.delete(poses, index, axis=0) if self._is_near(each, pose)]
+        if abs(float(pose[2, 2])) < UPRIGHT_COSINE:
             for others in (near, []) if near else ([],):
-                yield of_fallen_ring(ring, pose, reach, self._surroundings(pose[:3, 3], others))
+                yield grasps_of_fallen_ring(ring, pose, reach, self._surroundings(pose[:3, 3], others))
             return
         off = self._posts - pose[:3, 3]
         nearest = int((off[:, :2] ** 2).sum(axis=1).argmin())
         within = -off[nearest, 2] < self._board.post_height
         post = (self._posts[nearest, :2], self._board.post_radius) if within else None
-        outlines = [of_ring_above(ring, each) for each in near]
+        outlines = [outline_of_ring(ring, each) for each in near]
         if other is not None:
             outlines.append(shut_fingers(other, reach, ring.thickness))
         for beside in (outlines, []) if outlines else ([],):
             for lean in _LEANS:
-                yield of_ring(ring, pose, reach, post, lean, beside)
+                yield grasps_of_ring(ring, pose, reach, post, lean, beside)
 
     def _is_near(self, other: Vector, pose: Vector) -> bool:
-        """Say whether fingers that take a ring with `pose` come near another one."""
+        """Return whether the fingers at a ring with `pose` come near another ring."""
         off = other[:3, 3] - pose[:3, 3]
         return bool(np.linalg.norm(off) < 2.0 * self._board.ring.side)
 
@@ -186,8 +184,8 @@ class PegBoard:
         return Around(floor, self._posts[:, :2], self._board.post_radius, top, boxes)
 
     def room(self, points: Vector) -> Vector:
-        """Return the room of wrist and shaft to posts and walls."""
-        room = np.full(points.shape[:2], ROOMY)
+        """Return the clearance of wrist and shaft from posts and walls, m."""
+        room = np.full(points.shape[:2], AMPLE_ROOM)
         over = np.maximum(points[..., 2] - self._top - self._board.post_height, 0.0)
         for x, y, _ in self._posts:
             off = np.hypot(points[..., 0] - x, points[..., 1] - y)
