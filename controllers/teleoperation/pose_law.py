@@ -23,6 +23,7 @@ from hub.participant import Record, array, number
 from robots import rotation
 from robots.inverse_kinematics import LastFrames, pursue
 from robots.serial_chain import SerialChain
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
 __all__ = ["PoseLaw"]
@@ -97,7 +98,7 @@ class PoseLaw:
             turned = rotation.product(rotation.product(to_base, hand[3:]), self._offset)
             goal[3:] = turned / sqrt(turned.dot(turned))
             # of an angle below 83 degrees, whose half has a cosine above 0.75, nothing more is to be known
-            if not abs(sum(map(mul, goal[3:].tolist(), tip[3:].tolist()))) > _LITTLE_LAG:
+            if not abs(plain_sum(map(mul, goal[3:].tolist(), tip[3:].tolist()))) > _LITTLE_LAG:
                 self._limit_lag(hand, tip, to_base, scale)
         return pursue(self._chain, command, goal[:3], goal[3:], largest_move, self._frames)
 

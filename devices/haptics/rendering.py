@@ -13,6 +13,7 @@ from math import sqrt
 
 from devices.haptics.contact import ZERO, Plane
 from devices.vendor_axes import Vector3
+from schemas.plain_sum import plain_sum
 
 __all__ = ["DEAD_RECKONING", "Renderer"]
 
@@ -130,8 +131,10 @@ def _share(planes: list[Plane], index: int, most: float) -> float:
     """
     if len(planes) == 1:
         return 1.0
-    every = sum(min(p[index], most) for p in planes if p[7] > 0.0)
+    every = plain_sum(min(p[index], most) for p in planes if p[7] > 0.0)
     smooth = [(p, sqrt(min(p[index], most))) for p in planes if p[7] <= 0.0]
-    rows = (sum(r * s * abs(p[0] * q[0] + p[1] * q[1] + p[2] * q[2]) for q, s in smooth) for p, r in smooth)
+    rows = (
+        plain_sum(r * s * abs(p[0] * q[0] + p[1] * q[1] + p[2] * q[2]) for q, s in smooth) for p, r in smooth
+    )
     total = every + max(rows, default=0.0)
     return most / total if total > most else 1.0

@@ -10,6 +10,7 @@ from math import sqrt
 
 import numpy as np
 
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
 __all__ = ["ThreePoints", "cross"]
@@ -49,12 +50,13 @@ class ThreePoints:
         Of all such forces they have the least sum of squares.
         """
         rows, (fx, fy, fz), (mx, my, mz) = points.tolist(), force.tolist(), moment.tolist()
-        cx, cy, cz = (sum(axis) / 3.0 for axis in zip(*rows, strict=True))
+        cx, cy, cz = (plain_sum(axis) / 3.0 for axis in zip(*rows, strict=True))
         # the moment about the middle, and the inertia of three unit masses there
         mx, my, mz = mx - (cy * fz - cz * fy), my - (cz * fx - cx * fz), mz - (cx * fy - cy * fx)
         arms = [(x - cx, y - cy, z - cz) for x, y, z in rows]
         xx, yy, zz, xy, xz, yz = (
-            sum(arm[i] * arm[j] for arm in arms) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+            plain_sum(arm[i] * arm[j] for arm in arms)
+            for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
         )
         turning = _solved((yy + zz, -xy, -xz, xx + zz, -yz, xx + yy), mx, my, mz)
         u, v, w = turning

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from hub.planning.plan import Plan
 from schemas.codec import encode_as
 from schemas.lockstep import Ack
+from schemas.plain_sum import plain_sum
 from schemas.ros import Header, Time
 from schemas.trocar_msgs import CouplingEnergy
 
@@ -51,7 +52,7 @@ class EnergyBooks:
     @property
     def residual_j(self) -> float:
         """Sum over all bonds of the work received by the force side minus that of the motion side (J)."""
-        return sum(book.residual_j for book in self._books)
+        return plain_sum(book.residual_j for book in self._books)
 
     def encoded(self, time_ns: int) -> dict[str, bytes]:
         """Return the book of each bond, a `CouplingEnergy` in CDR."""

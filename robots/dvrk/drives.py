@@ -24,6 +24,7 @@ from robots.dvrk import psm as psm_arm
 from robots.dvrk.hand import Hand
 from robots.dvrk.instruments import Instrument
 from robots.dvrk.rolling_needle_driver import ROLLER
+from schemas.plain_sum import plain_sum
 
 __all__ = ["ECM", "FINGERS", "SMOOTHING", "Disc", "Drive", "discs", "friction", "psm"]
 
@@ -109,7 +110,9 @@ def psm(tool: Instrument) -> Mapping[str, Drive]:
     drives = {
         joint.name: Drive(*_ARM[joint.name], 0.0, joint.effort, joint.velocity) for joint in chain.joints[:3]
     }
-    square = {name: sum(disc.shares.get(name, 0.0) ** 2 for disc in discs(tool)) for name in _moved(tool)}
+    square = {
+        name: plain_sum(disc.shares.get(name, 0.0) ** 2 for disc in discs(tool)) for name in _moved(tool)
+    }
     limits = {joint.name: (joint.effort, joint.velocity) for joint in tool.joints}
     if tool.jaw is not None:
         # Both fingers turn by half the jaw's angle and share its inertia and stiffness; the torque of each
@@ -228,7 +231,7 @@ def friction(
     """
     result = {name: _friction(drives[name], v) for name, v in dq.items()}
     for disc in wrist:
-        torque = _friction(disc, sum(share * dq[name] for name, share in disc.shares.items()))
+        torque = _friction(disc, plain_sum(share * dq[name] for name, share in disc.shares.items()))
         for name, share in disc.shares.items():
             result[name] += share * torque
     return result

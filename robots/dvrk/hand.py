@@ -27,6 +27,7 @@ from robots.dvrk.contact_spheres import ContactSphere
 from robots.limits import TOLERANCE, distinct
 from robots.serial_chain import Joint
 from schemas.errors import MotionError, did_you_mean
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
 __all__ = ["Hand", "HandLink", "Mode", "Phalanx"]
@@ -163,7 +164,7 @@ class Hand:
     @property
     def reach(self) -> float:
         """From the end of the shaft to the end of the straight fingers, m."""
-        return self.palm + sum(phalanx.length for phalanx in self.phalanges) + self.radius
+        return self.palm + plain_sum(phalanx.length for phalanx in self.phalanges) + self.radius
 
     @cached_property
     def masses(self) -> Vector:

@@ -16,6 +16,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from schemas.plain_sum import plain_sum
+
 __all__ = ["ECM", "INSERTION_AXIS", "LINKAGES", "PITCH_AXIS", "PSM", "Linkage", "PassiveJoint", "Pin"]
 
 Point = tuple[float, float, float]
@@ -62,7 +64,7 @@ class Linkage:
 
 def _at(*vectors: tuple[float, float]) -> Point:
     """Return the point at the sum of vectors (y, z) in the linkage's plane."""
-    return (0.0, sum(v[0] for v in vectors), sum(v[1] for v in vectors))
+    return (0.0, plain_sum(v[0] for v in vectors), plain_sum(v[1] for v in vectors))
 
 
 # PSM. Vectors (y, z) at pitch 0; back link of 0.150 m leaning by 0.29073 rad, bars of 0.516 m (dvrk_env

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar
 
 from hub.participant import Record, flag, number
+from schemas.plain_sum import plain_sum
 from schemas.trocar_msgs import ScoreValue
 from tasks.events import Event
 from tasks.goals import Legs
@@ -61,7 +62,7 @@ class Icra2026(Rules[Icra2026State]):
             return
         state.time = now.time_s
         if now.is_smooth:
-            state.motion += sum(now.speeds) * now.period_s
+            state.motion += plain_sum(now.speeds) * now.period_s
         for event in events:
             if self._legs.take(event):
                 state.last = now.time_s

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
 __all__ = ["Prony"]
@@ -28,7 +29,7 @@ class Prony:
         Exact where the elastic force is linear between the samples; before the first there was none.
         """
         steps, rises = np.diff(time), np.diff(elastic, prepend=0.0)
-        force = (1.0 - sum(self.shares)) * elastic
+        force = (1.0 - plain_sum(self.shares)) * elastic
         for share, tau in zip(self.shares, self.times, strict=True):
             decay = np.exp(-steps / tau)
             gain = share * tau * -np.expm1(-steps / tau) / steps

@@ -21,6 +21,7 @@ from engines.mujoco.model.scene import build
 from engines.mujoco.params import SceneParams
 from robots.dvrk import drives
 from robots.dvrk.setup_joints import CartArm
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
 __all__ = ["UPRIGHT", "JointDynamics", "dynamics"]
@@ -100,7 +101,7 @@ def dynamics(
     alone = [
         [
             getattr(driven[name], kind)
-            + sum(getattr(disc, kind) * abs(disc.shares.get(name, 0.0)) ** power for disc in wrist)
+            + plain_sum(getattr(disc, kind) * abs(disc.shares.get(name, 0.0)) ** power for disc in wrist)
             for name in joints
         ]
         for kind, power in (("viscous_friction", 2), ("coulomb_friction", 1))

@@ -12,6 +12,7 @@ from learning.environments.environment import Environment
 from learning.environments.exercises import PegTransfer
 from learning.environments.oracles.waypoints import REACH, Plan, Seen, Waypoint, high, moved, over, remaining
 from robots.training.boards import Ring
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
 __all__ = ["bi_peg_transfer", "peg_transfer"]
@@ -46,7 +47,7 @@ def _ring_plan(env: Environment, hand: int, side: Vector) -> Plan:
     def crowding(seen: Seen, at: Vector) -> float:
         """Return how much another hand is in the way of a place on the ring."""
         off = [seen[f"{hand}/tip/position"] - seen["ring/position"] - at for hand in others]
-        return 100.0 * sum(max(0.0, _ROOM - float(np.linalg.norm(each[:2]))) for each in off)
+        return 100.0 * plain_sum(max(0.0, _ROOM - float(np.linalg.norm(each[:2]))) for each in off)
 
     def grasp(seen: Seen, over: float) -> tuple[Vector, float]:
         walls = _walls(ring, seen)
