@@ -37,7 +37,7 @@ class Listeners(Protocol):
 
 
 _MANY = 32
-"""Values of one port that may wait for their reader; the sender waits at some 160, a socket of Linux."""
+"""Values of one port that may wait for their reader; `PortReceiver` holds 4096, then it stops all others."""
 
 
 class HostLayout:
@@ -96,7 +96,7 @@ class HostLayout:
                 continue
             stride = plan.stride(planned.name, port.name)
             depth = self._depth(planned.name, port.name, here=True)
-            hosts = self._reading_hosts(planned.name, port.name)
+            is_read = self._is_read_elsewhere(planned.name, port.name)
             to_devices = port.variability == "event" and any(
                 (outlet.source, outlet.source_port) == (planned.name, port.name) for outlet in plan.to_devices
             )
@@ -105,7 +105,7 @@ class HostLayout:
                 publisher = self._wire.publisher(
                     planned,
                     port,
-                    hosts,
+                    is_read=is_read,
                     feeds=to_devices,
                     bundles=indices.get(port.name, ()),
                     stride_ns=stride * plan.step_ns,
@@ -123,17 +123,16 @@ class HostLayout:
             one.ports.append(output)
             # an observer misses steps: of each that it takes, all is published
             outputs = by_stride.setdefault(1 if planned.observer else stride, [])
-            outputs.insert(0 if hosts else len(outputs), output)  # first what another host waits for
+            outputs.insert(0 if is_read else len(outputs), output)  # first what another host waits for
         return by_stride
 
-    def _reading_hosts(self, source: str, port: str) -> list[str]:
-        """Return the other hosts that read an output."""
-        hosts = {
-            self._plan.participants[connection.target].host
+    def _is_read_elsewhere(self, source: str, port: str) -> bool:
+        """Return whether another host reads an output."""
+        return any(
+            (connection.source, connection.source_port) == (source, port)
+            and self._plan.participants[connection.target].host != self._name
             for connection in self._plan.connections
-            if (connection.source, connection.source_port) == (source, port)
-        }
-        return sorted(hosts - {self._name})
+        )
 
     def _depth(self, source: str, port: str, *, here: bool | None = None) -> int:
         """Return how many values of an output readers look back.

@@ -20,14 +20,12 @@ from hub.hosting.host_profile import HostProfile
 from hub.hosting.hub_channel import HubChannel, LinkChannel, ZenohChannel
 from hub.hosting.low_priority import lower_priority
 from hub.hosting.observing import Observing
-from hub.hosting.sent_vectors import VectorsToSend
 from hub.participant import Device, Stepped
 from hub.planning.plan import PlannedParticipant
 from hub.planning.renewal import made
 from hub.transport.control_client import ask, ask_as_child
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.host_link import HostLink
-from hub.transport.lane import may_spin
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
 from hub.transport.wire import Wire
@@ -76,19 +74,16 @@ class HostRun:
             keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
         )
         self._refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
-        spin = may_spin(len(plan.hosts()))
-        wire = Wire(session, keys, reply.run, self._refusals, host, spin=spin, watched=reply.watched)
+        wire = Wire(session, keys, reply.run, self._refusals, watched=reply.watched)
         stepped = {name: p for name, p in participants.items() if isinstance(p, Stepped)}
         self._profile = HostProfile(session, keys, host, plan, reply.run) if reply.profile else None
         if self._profile is not None:
             self._profile.process.prepare(stepped, wire)
-        self._vectors = VectorsToSend(reply.sent_with_acks)
         self._host = Host(
             host,
             plan,
             stepped,
             wire=wire,
-            listeners=self._vectors,
             place=None if link is None else link.place,
             successors={name: later for name, (_, later) in ready.items()},
         )
@@ -114,7 +109,7 @@ class HostRun:
         if not names:
             return None
         if link is not None:
-            return LinkChannel(link, names, self._check, self._vectors)
+            return LinkChannel(link, names, self._check)
         return ZenohChannel(self._session, self._keys, names, ack_key, self._refusals, self._check)
 
     def _attach_devices(
@@ -148,9 +143,7 @@ class HostRun:
         except ParticipantError as error:
             self._report_failure(error.participant, error.cause)
             raise
-        ready = self._request.model_copy(
-            update={"ready": True, "bonds": bonds, "vectors": self._vectors.groups}
-        )
+        ready = self._request.model_copy(update={"ready": True, "bonds": bonds})
         self._send_to_hub(ready)
         if self._observing is not None:
             self._observe(self._observing, ready)

@@ -8,7 +8,6 @@ from typing import Protocol
 import zenoh
 from zenoh.handlers import FifoChannel
 
-from hub.hosting.sent_vectors import VectorsToSend
 from hub.transport.envelope import signature
 from hub.transport.host_link import HostLink
 from hub.transport.refusals import Refusals
@@ -87,15 +86,10 @@ class ZenohChannel:
 
 
 class LinkChannel:
-    """A channel by the link to the hub that has started this host: all of a grant in one message.
+    """A channel by the link to the hub that has started this host: all acks of a grant in one message."""
 
-    It has the acks of all participants, and the `vectors` that the hub records or measures.
-    """
-
-    def __init__(
-        self, link: HostLink, names: Sequence[str], check: CheckGrant, vectors: VectorsToSend
-    ) -> None:
-        self._link, self._check, self._vectors = link, check, vectors
+    def __init__(self, link: HostLink, names: Sequence[str], check: CheckGrant) -> None:
+        self._link, self._check = link, check
         self._places = {name: place for place, name in enumerate(names)}
         self._acks: list[tuple[int, bytes]] = []
 
@@ -109,8 +103,7 @@ class LinkChannel:
         self._acks.append((self._places[name], pack_ack(ack)))
 
     def flush(self) -> None:
-        """Send the acks and vectors, if there are any: the hub reads no report of a host without a step."""
-        vectors = self._vectors.take()
-        if self._acks or vectors:
-            self._link.send_report(self._acks, vectors)
+        """Send the acks, if there are any: the hub reads none of a host without a step."""
+        if self._acks:
+            self._link.send_acks(self._acks)
             self._acks.clear()

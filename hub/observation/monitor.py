@@ -22,7 +22,6 @@ from hub.recording.chunk import Queued
 from hub.recording.recorder import Recorder
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
-from hub.transport.host_link import has_link
 from hub.transport.port_codec import PortCodec
 from hub.transport.refusals import Refusals
 from schemas.codec import encode
@@ -94,26 +93,6 @@ class Monitor:
 
     @property
     def away(self) -> dict[str, tuple[str, str]]:
-        """Participant and port of every watched output of another process, by key.
-
-        Those that are sent with acks are left out.
-        """
-        sent = set(self.sent_with_acks)
-        return {key: output for key, output in self._of_others.items() if output not in sent}
-
-    @property
-    def sent_with_acks(self) -> list[tuple[str, str]]:
-        """Participant and port of the vectors that other hosts send with their acks."""
-        return [
-            (name, port)
-            for name, port in self._of_others.values()
-            if (watched := self._by_port[name, port]).codec.vector is not None
-            and watched.planned.in_step
-            and has_link(watched.planned.host)
-        ]
-
-    @property
-    def _of_others(self) -> dict[str, tuple[str, str]]:
         """Participant and port of every output of another process that is recorded or measured, by key."""
         return {
             key: (w.planned.name, w.port.name)
@@ -137,7 +116,7 @@ class Monitor:
     def vectors_listener(
         self, planned: PlannedParticipant, ports: Sequence[Port]
     ) -> Callable[[int, int, bytes], None] | None:
-        """Return what receives vectors of a participant in this process, or of a host that sends them.
+        """Return what receives vectors of a participant in this process.
 
         It is called with step, time (ns) at which they are valid, and their bytes, one after the other. None:
         nothing receives them.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from hmac import compare_digest
 
@@ -11,7 +11,7 @@ from zenoh.handlers import FifoChannel
 
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.transport.envelope import signature
-from hub.transport.host_link import HubLink, SentVectors
+from hub.transport.host_link import HubLink
 from hub.transport.refusals import Refusals
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
@@ -42,7 +42,6 @@ class AckReceiver:
         refusals: Counts the messages that are refused.
         ack_keys: By host, the key with which it signs.
         links: By host, its link.
-        take_vectors: Is called with a host and the vectors that it has sent with its acks.
     """
 
     def __init__(
@@ -54,12 +53,11 @@ class AckReceiver:
         refusals: Refusals,
         ack_keys: Mapping[str, bytes],
         links: Mapping[str, HubLink],
-        take_vectors: Callable[[str, Sequence[SentVectors]], None],
     ) -> None:
         self._session, self._keys, self._run, self._refusals = session, keys, run, refusals
         self._wake_key = keys.ack("hub")
         self._planned = {keys.ack(name): plan.participants[name] for name in plan.order}
-        self._ack_keys, self._links, self._take_vectors = ack_keys, links, take_vectors
+        self._ack_keys, self._links = ack_keys, links
         self._linked_host = {
             name: planned.host for name in plan.order if (planned := plan.participants[name]).host in links
         }
@@ -100,9 +98,7 @@ class AckReceiver:
             yield from self._from_zenoh(sample, waiting)
 
     def _from_link(self, host: str, waiting: Sequence[str], *, wait: bool) -> Iterator[Accepted]:
-        report = self._links[host].report(wait=wait)
-        self._take_vectors(host, report.vectors)
-        for name, payload in report.acks:
+        for name, payload in self._links[host].acks(wait=wait):
             key = self._keys.ack(name)
             try:
                 accepted = self._accept(self._planned[key], payload, waiting, signed=True)
@@ -186,7 +182,7 @@ class AckReceiver:
     def _arrived(self) -> Iterator[tuple[str, bytes]]:
         """Yield the participant and the payload of every message of a host that has arrived."""
         for link in self._links.values():
-            while acks := link.report(wait=False).acks:
+            while acks := link.acks(wait=False):
                 yield from acks
         while (sample := self._subscriber.try_recv()) is not None:
             with suppress(MessageError):

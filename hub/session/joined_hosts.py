@@ -27,7 +27,6 @@ class JoinedHosts:
         directory: Where relative paths of the scenario start.
         run: The number of the run.
         watched: Outputs of which the hub needs every value.
-        sent_with_acks: More of them, vectors that hosts send with their acks.
         failed: Is called with participant and cause when a host reports a failure.
         ended: Is called with participant and reason when a host reports that one ends the session.
         ack_keys: By host, the key with which it signs its acks.
@@ -44,7 +43,6 @@ class JoinedHosts:
         directory: Path,
         run: int,
         watched: Sequence[tuple[str, str]],
-        sent_with_acks: Sequence[tuple[str, str]],
         failed: Callable[[str, str], None],
         ended: Callable[[str, str], None],
         *,
@@ -58,7 +56,7 @@ class JoinedHosts:
         self._renewals, self._live_from_ns = renewals, live_from_ns
         self._ack_keys = ack_keys
         self._programs_endpoint = programs_endpoint
-        self._watched, self._sent_with_acks = list(watched), list(sent_with_acks)
+        self._watched = list(watched)
         self._scenario = scenario
         self._plan = plan
         self._directory = directory
@@ -113,7 +111,6 @@ class JoinedHosts:
             params=params,
             directory=str(self._directory),
             watched=[output for output in self._watched if output[0] in names],
-            sent_with_acks=[output for output in self._sent_with_acks if output[0] in names],
             ack_key=self._ack_keys[request.host].hex(),
             programs_endpoint=self._programs_endpoint if request.is_local else "",
             profile=self._profile and request.is_local,
@@ -141,10 +138,6 @@ class JoinedHosts:
     def bonds(self) -> Mapping[str, tuple[BondSide, ...]]:
         """Return the bonds of all hosts' participants, with the numbers that `configure` has found."""
         return {name: sides for request in self._hosts.values() for name, sides in request.bonds.items()}
-
-    def vectors(self, host: str) -> Sequence[tuple[str, Sequence[str]]]:
-        """Return by number the groups of vectors that a host sends with its acks: participant and ports."""
-        return self._hosts[host].vectors
 
     def pid(self, host: str) -> int:
         """Return the process id of a host; 0 while it has not joined."""

@@ -30,7 +30,6 @@ from hub.session.bookkeeping import Bookkeeping
 from hub.session.clock import Clock
 from hub.session.control_server import ControlServer
 from hub.session.first_failure import FirstFailure
-from hub.session.host_vectors import HostVectors
 from hub.session.joined_hosts import JoinedHosts
 from hub.session.observer_reports import ObserverReports
 from hub.session.past import Past
@@ -40,7 +39,6 @@ from hub.session.run_state import RunState
 from hub.session.status_reporter import StatusReporter
 from hub.transport.control_messages import DescribeReply
 from hub.transport.host_link import HubLink, has_link
-from hub.transport.lane import may_spin
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
 from hub.transport.wire import Wire
@@ -126,9 +124,8 @@ class Run:
         self.clock = _clock(scenario, plan, spec.live_from or 0)
         self.monitor = Monitor(plan, keys, self.number, Measures(scenario, plan), recorder)
         ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
-        vectors = HostVectors(plan, self.monitor, lambda host: self.joined_hosts.vectors(host))
         self.acks = AckReceiver(
-            session, keys, plan, self.number, self.refusals, ack_keys, self.processes.links, vectors.take
+            session, keys, plan, self.number, self.refusals, ack_keys, self.processes.links
         )
         self.profile = self._profile() if spec.profiled else None
         self.host = self._host()
@@ -155,7 +152,6 @@ class Run:
             spec.directory,
             self.number,
             list(self.monitor.away.values()),
-            self.monitor.sent_with_acks,
             self.fail,
             self.end,
             ack_keys=ack_keys,
@@ -210,8 +206,7 @@ class Run:
 
     def _host(self) -> Host:
         """Return the host of this process, connected to the others over Zenoh."""
-        spin = may_spin(len(self.spec.plan.hosts()))
-        wire = Wire(self.session, self.keys, self.number, self.refusals, "hub", spin=spin)
+        wire = Wire(self.session, self.keys, self.number, self.refusals)
         if self.profile is not None:
             self.profile.prepare(self.spec.stepped, wire)
         spec = self.spec

@@ -8,7 +8,6 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from hub.hosting.interrupt import Interrupt
-from hub.hosting.open_files import allow_open_files
 from hub.observation.summary import Progress, Summary
 from hub.participant import Device, Stepped
 from hub.planning.plan import Plan
@@ -110,7 +109,6 @@ class Session:
         Raises ParticipantError or SessionError when the session fails (the recording is then closed and
         readable), ScenarioError if a bond's step is unstable, ConnectError if the endpoint is taken.
         """
-        allow_open_files(self.plan)
         recorder = Recorder(self._record, attachments=self._attachments) if self._record is not None else None
         with Interrupt() as interrupt:
             try:

@@ -1,1 +1,1 @@
-"""Values and control messages between processes, over Zenoh and over the fast lane."""
+"""Values and control messages between processes, over Zenoh."""

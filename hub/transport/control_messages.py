@@ -60,8 +60,6 @@ class JoinRequest(_Json):
     watching: bool = False
     """Its observers have seen the state at time 0."""
     bonds: dict[str, tuple[BondSide, ...]] = {}
-    vectors: list[tuple[str, list[str]]] = []
-    """By number, the groups of vectors that come with its acks: a participant and its ports."""
     failed: str = ""
     """Why the host has failed: `participant: cause`."""
     ended: str = ""
@@ -107,8 +105,6 @@ class JoinReply(_Json):
     directory: str
     watched: list[tuple[str, str]]
     """Outputs, as participant and port, of which the hub needs every value: for a recording or a measure."""
-    sent_with_acks: list[tuple[str, str]] = []
-    """More of them, vectors: a host with a link sends these with its acks."""
     ack_key: str
     """The key with which the host signs its acks, in hexadecimal digits."""
     programs_endpoint: str = ""

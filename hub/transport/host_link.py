@@ -1,8 +1,5 @@
 """The link of the hub to a host that it has started: a socket for grants and acks, and a shared number.
 
-With its acks a host sends the vectors that the hub records or measures
-(docs/decisions/0096-vectors-with-the-acks.md).
-
 The socket is made before the process, which inherits its end: it has no name under which another process
 could connect, and none that could be left behind. In the number the host notes which participant it steps:
 the hub knows it without a message of each. Linux only; other hosts have Zenoh.
@@ -18,9 +15,8 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from time import sleep
-from typing import NamedTuple
 
-__all__ = ["IDLE", "HostLink", "HubLink", "Report", "SentVectors", "has_link"]
+__all__ = ["IDLE", "HostLink", "HubLink", "has_link"]
 
 IDLE = -1
 """The shared number of a host that steps no participant."""
@@ -28,27 +24,12 @@ IDLE = -1
 _LENGTH = struct.Struct("<I")
 _ACK = struct.Struct("<HI")
 """In front of each ack: the place of its participant in the step order of the host, and its length."""
-_VECTORS = struct.Struct("<HqqI")
-"""In front of vectors: the number of their group, step, time (ns) at which they are valid, and length."""
 _WORD = 8
 _CHUNK = 4096
 _LOOK_S = 0.02
 """The hub waits no longer at once: it may have to look elsewhere."""
 _TIME_LIMIT = struct.pack("@ll", 0, round(_LOOK_S * 1e6))
 """`struct timeval` of socket(7), SO_RCVTIMEO."""
-
-
-SentVectors = tuple[int, int, int, bytes]
-"""Number of a group of outputs, step, time (ns) at which they are valid, and their vectors joined."""
-
-
-class Report(NamedTuple):
-    """What a host sends when it has done its part of a grant."""
-
-    acks: Sequence[tuple[str, bytes]] = ()
-    """Participants and their acks."""
-    vectors: Sequence[SentVectors] = ()
-    """What the hub records or measures, oldest first."""
 
 
 def has_link(host: str) -> bool:
@@ -130,8 +111,8 @@ class HubLink:
         """Send a grant."""
         self._messages.send(grant)
 
-    def report(self, *, wait: bool) -> Report:
-        """Return the next report; one without acks if it has not arrived.
+    def acks(self, *, wait: bool) -> list[tuple[str, bytes]]:
+        """Return participants and acks of the next message; none if it has not arrived.
 
         With `wait`, wait for it a moment.
         """
@@ -139,25 +120,15 @@ class HubLink:
         if message is None:
             if wait and self._messages.ended:
                 sleep(_LOOK_S)  # until the watchdog reports how the process has ended
-            return Report()
-        return self._parsed(message)
-
-    def _parsed(self, message: bytes) -> Report:
-        acks, vectors, start = list[tuple[str, bytes]](), list[SentVectors](), _LENGTH.size
-        end: int = start + _LENGTH.unpack_from(message)[0]
-        while start < end:
+            return []
+        acks, start = list[tuple[str, bytes]](), 0
+        while start < len(message):
             head: tuple[int, int] = _ACK.unpack_from(message, start)
             place, length = head
             start += _ACK.size
             acks.append((self._names[place], message[start : start + length]))
             start += length
-        while start < len(message):
-            of: tuple[int, int, int, int] = _VECTORS.unpack_from(message, start)
-            group, step, time_ns, length = of
-            start += _VECTORS.size
-            vectors.append((group, step, time_ns, message[start : start + length]))
-            start += length
-        return Report(acks, vectors)
+        return acks
 
     def close(self) -> None:
         """Close the link."""
@@ -189,13 +160,9 @@ class HostLink:
             sleep(1.0)  # the hub has ended, and so does this process
         return grant
 
-    def send_report(self, acks: Sequence[tuple[int, bytes]], vectors: Sequence[SentVectors] = ()) -> None:
-        """Send acks, each with the place of its participant, and vectors in one message."""
-        packed = b"".join(_ACK.pack(place, len(ack)) + ack for place, ack in acks)
-        parts = [_LENGTH.pack(len(packed)), packed]
-        for group, step, time_ns, data in vectors:
-            parts += _VECTORS.pack(group, step, time_ns, len(data)), data
-        self._messages.send(b"".join(parts))
+    def send_acks(self, acks: Sequence[tuple[int, bytes]]) -> None:
+        """Send acks, each with the place of its participant, in one message."""
+        self._messages.send(b"".join(_ACK.pack(place, len(ack)) + ack for place, ack in acks))
 
     def close(self) -> None:
         """Close the link; the hub takes it for the end of this process."""

@@ -1,4 +1,4 @@
-"""Publishes the values of an output port on Zenoh and on fast lanes."""
+"""Publishes the values of an output port on Zenoh."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import zenoh
 from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle
 from hub.transport.envelope import Tag
-from hub.transport.lane import LaneSender
 from hub.transport.page_feed import PageFeed
 from hub.transport.port_codec import PortCodec
 from hub.transport.publisher import Publisher
@@ -38,7 +37,6 @@ class PortPublisher:
         feeds: Wall-time devices receive its events.
         bundles: Where its signal goes to wall-time devices and observers, with its index in each.
         stride_ns: The simulated time between two values.
-        lanes: Fast lanes to other hosts of this machine.
     """
 
     def __init__(
@@ -54,10 +52,8 @@ class PortPublisher:
         feeds: bool,
         bundles: Sequence[tuple[Bundle, int]] = (),
         stride_ns: int = 0,
-        lanes: Sequence[LaneSender] = (),
     ) -> None:
         self.codec = PortCodec(port)
-        self._lanes = lanes
         self._run = run
         self._changed = changed
         self.always = always
@@ -82,7 +78,7 @@ class PortPublisher:
     def needed(self) -> bool:
         """Whether anybody receives the values."""
         bundled = any(bundle.needs(index) for bundle, index in self._bundles)
-        return bool(self._lanes or self._needed or bundled or self._pages.needed)
+        return bool(self._needed or bundled or self._pages.needed)
 
     def keep_first(self, value: Any) -> None:
         """Keep the value at time 0 for pages that come later, if later ones may lack something."""
@@ -90,8 +86,6 @@ class PortPublisher:
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`."""
-        for lane in self._lanes:
-            lane.send(step, value)
         if self._bundles:
             self._bundle(time_ns, value)
         if self._pages.needed:
@@ -123,8 +117,6 @@ class PortPublisher:
 
     def close(self) -> None:
         """Stop publishing."""
-        for lane in self._lanes:
-            lane.close()
         for publisher in self._publishers:
             publisher.close()
         self._pages.close()

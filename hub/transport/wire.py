@@ -1,4 +1,4 @@
-"""A host's connections to other processes: Zenoh, and fast lanes on the same machine."""
+"""A host's connections to other processes, over Zenoh."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import zenoh
 from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle, DeviceBundle, ObserverBundle
 from hub.transport.cells import RemoteCell
-from hub.transport.lane import LaneReceiver, LaneSender, has_lane, lane_address
 from hub.transport.port_publisher import PortPublisher
 from hub.transport.port_receiver import PortReceiver
 from hub.transport.refusals import Refusals
@@ -20,15 +19,13 @@ __all__ = ["Wire"]
 
 
 class Wire:
-    """A host's publishers and receivers on one Zenoh session, with its fast lanes.
+    """A host's publishers and receivers on one Zenoh session.
 
     Args:
         session: The Zenoh session.
         keys: The keys of the session.
         run: The number of the run.
         refusals: Counts the messages that are refused.
-        host: The host's name.
-        spin: Its lanes may keep a core busy while they wait.
         watched: The outputs of which the hub needs every value.
     """
 
@@ -38,13 +35,9 @@ class Wire:
         keys: Keys,
         run: int,
         refusals: Refusals,
-        host: str,
         *,
-        spin: bool,
         watched: Sequence[tuple[str, str]] = (),
     ) -> None:
-        self._spin = spin
-        self.host = host
         self._watched = set(watched)
         self.session = session
         self.keys = keys
@@ -52,7 +45,7 @@ class Wire:
         self.refusals = refusals
         self._publishers: list[PortPublisher] = []
         self._bundles: list[Bundle] = []
-        self._receivers: list[PortReceiver | LaneReceiver] = []
+        self._receivers: list[PortReceiver] = []
         self._cells: list[RemoteCell] = []
         self.changes = 0
         """How often somebody has begun or ceased to receive an output."""
@@ -86,20 +79,17 @@ class Wire:
         self,
         planned: PlannedParticipant,
         port: Port,
-        readers: Sequence[str],
         *,
+        is_read: bool,
         feeds: bool,
         bundles: Sequence[tuple[Bundle, int]],
         stride_ns: int,
     ) -> PortPublisher:
-        """Return a publisher of an output of a participant here; the hosts `readers` need every value.
+        """Return a publisher of an output of a participant here; other hosts need every value if it `is_read`.
 
         Wall-time devices receive its events if it `feeds` them; they and observers receive its signal in
         `bundles`, each with the signal's index in it. `stride_ns` is the simulated time between two values.
         """
-        fast = [host for host in readers if has_lane(port, self.host, host)]
-        lanes = [LaneSender(lane_address(self.run, planned.name, port.name, host)) for host in fast]
-        always = len(fast) < len(readers) or (planned.name, port.name) in self._watched
         publisher = PortPublisher(
             self.session,
             self.keys,
@@ -107,29 +97,18 @@ class Wire:
             port,
             self.run,
             self._count_change,
-            always=always,
+            always=is_read or (planned.name, port.name) in self._watched,
             feeds=feeds,
             bundles=bundles,
             stride_ns=stride_ns,
-            lanes=lanes,
         )
         self._publishers.append(publisher)
         return publisher
 
     def cell(self, planned: PlannedParticipant, port: Port, stride: int, depth: int) -> RemoteCell:
         """Return the cell of an output of a participant in another process."""
-        if has_lane(port, planned.host, self.host):
-            receiver = LaneReceiver(
-                lane_address(self.run, planned.name, port.name, self.host), port, spin=self._spin
-            )
-        else:
-            receiver = PortReceiver(
-                self.session,
-                self.keys.output(planned.key_role, planned.name, port.name),
-                port,
-                self.run,
-                self.refusals,
-            )
+        key = self.keys.output(planned.key_role, planned.name, port.name)
+        receiver = PortReceiver(self.session, key, port, self.run, self.refusals)
         self._receivers.append(receiver)
         cell = RemoteCell(planned.period, stride, depth, receiver)
         self._cells.append(cell)

@@ -104,14 +104,12 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
         file.source.directory,
         1,
         [("near", "out"), ("hand", "hand")],
-        [("near", "sent")],
         lambda *_: None,
         lambda *_: None,
         ack_keys=dict.fromkeys(plan.hosts(), b"key"),
     )
     reply = joined_hosts.join(JoinRequest(host="remote/hand", pid=1))
     assert (reply.session, set(reply.params), reply.watched) == ("apart", {"hand"}, [("hand", "hand")])
-    assert reply.sent_with_acks == []
     assert reply.plan == seen
     assert joined_hosts.join(JoinRequest(host="other", pid=2)).plan == plan
     with pytest.raises(MessageError, match="host 'other' has no participant 'hand' that could fail"):

@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 
-from hub.transport.host_link import IDLE, HostLink, HubLink, Report, has_link
+from hub.transport.host_link import IDLE, HostLink, HubLink, has_link
 from schemas.lockstep import Ack, Grant, pack_ack, pack_grant, unpack_grant
 from schemas.trocar_msgs import InletSample
 
@@ -37,21 +37,12 @@ def test_hosts_that_the_hub_starts_on_this_machine_have_one():
 
 def test_the_acks_of_all_participants_are_one_message(ends):
     hub, host = ends
-    assert hub.report(wait=False) == Report()
-    host.send_report([(0, ack(1)), (2, ack(2))])
-    host.send_report([(1, ack(3))])
-    assert hub.report(wait=True).acks == [("robot", ack(1)), ("camera", ack(2))]
-    assert hub.report(wait=False).acks == [("tissue", ack(3))]
-    assert hub.report(wait=True) == Report()
-
-
-def test_vectors_come_with_the_acks_in_their_order(ends):
-    hub, host = ends
-    vectors = [(0, -1, 0, b""), (1, 7, 2**40, bytes(24)), (0, 8, 9, b"12345678")]
-    host.send_report([(1, ack(3))], vectors)
-    host.send_report([(0, ack(4))])
-    assert hub.report(wait=True) == ([("tissue", ack(3))], vectors)
-    assert hub.report(wait=True) == ([("robot", ack(4))], [])
+    assert hub.acks(wait=False) == []
+    host.send_acks([(0, ack(1)), (2, ack(2))])
+    host.send_acks([(1, ack(3))])
+    assert hub.acks(wait=True) == [("robot", ack(1)), ("camera", ack(2))]
+    assert hub.acks(wait=False) == [("tissue", ack(3))]
+    assert hub.acks(wait=True) == []
 
 
 def test_a_grant_may_be_larger_than_the_buffer_of_a_socket(ends):
@@ -82,10 +73,10 @@ def test_the_hub_knows_which_participants_a_host_has_passed(ends):
 
 def test_what_a_host_has_sent_before_its_end_is_received(ends):
     hub, host = ends
-    host.send_report([(0, ack(4))])
+    host.send_acks([(0, ack(4))])
     host.close()
-    assert hub.report(wait=True).acks == [("robot", ack(4))]
-    assert hub.report(wait=True) == Report()
+    assert hub.acks(wait=True) == [("robot", ack(4))]
+    assert hub.acks(wait=True) == []
     hub.send_grant(b"to no one")
 
 

@@ -56,8 +56,8 @@ HEARD = [
         f"{PREFIX}/engine/{name}/ack"
         for name in ("away", "talker", "far_listener", "follower", "nobody", "hub")
     ),
-    f"{PREFIX}/engine/talker/out/words",
-    *(() if has_link("third") else (f"{PREFIX}/engine/far_listener/out/heard",)),
+    *(f"{PREFIX}/engine/{output}" for output in ("away/out/out", "pace/out/out", "talker/out/words")),
+    f"{PREFIX}/engine/far_listener/out/heard",
     *(f"{PREFIX}/device/idle_player/out/{port}" for port in ("hand", "buttons")),
 ]
 """Keys of this session that have a subscriber."""
@@ -69,8 +69,6 @@ UNHEARD = [
     f"{PREFIX}/engine/pace/out",
     f"{PREFIX}/alive/hub/hub",
     f"{PREFIX}/control/shutdown",
-    f"{PREFIX}/engine/away/out/out",  # the hub gets it on a lane, and with the acks
-    f"{PREFIX}/engine/pace/out/out",  # another host on this machine gets it on a lane of its own
     "trocar/other/hub/grant",
 ]
 ALL_AT_ONCE = [f"{PREFIX}/**", f"{PREFIX}/engine/*/ack", f"{PREFIX}/device/*/out/*", "**"]

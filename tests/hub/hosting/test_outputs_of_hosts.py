@@ -1,24 +1,10 @@
-"""What a host on this machine sends with its acks is recorded and measured as if the hub had computed it."""
+"""Outputs of a host process are recorded and measured as if the hub had computed them."""
 
 from collections import defaultdict
 from pathlib import Path
 
-import pytest
-
-from hub.hosting.sent_vectors import VectorsToSend
-from hub.observation.measures import Measures
-from hub.observation.monitor import Monitor
-from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
-from hub.session.host_vectors import HostVectors
-from hub.transport.host_link import has_link
-from schemas.errors import ParticipantError
-from schemas.keys import Keys
-from schemas.ports import Port
-from schemas.vectors import VectorCodec
 from tests.hub.conftest import Prepare
-
-pytestmark = pytest.mark.skipif(not has_link("other"), reason="hosts have links on Linux alone")
 
 TEXT = """\
 name: apart
@@ -66,28 +52,3 @@ def test_measures_alone_need_no_recording(prepare: Prepare) -> None:
     apart, together = (prepare(TEXT, one_host=one).run() for one in (False, True))
     assert apart.measures == together.measures
     assert all(value is not None for value in apart.measures.values())
-
-
-def test_only_groups_with_a_port_that_is_wanted_are_sent(prepare: Prepare) -> None:
-    planned = prepare(TEXT).plan.participants["often"]
-    (port,) = (port for port in planned.ports if port.causality == "output")
-    kept = VectorsToSend([("often", "out")])
-    assert kept.vectors_listener(planned, [Port(name="other", causality="output", size=2)]) is None
-    keep = kept.vectors_listener(planned, [port])
-    assert keep is not None
-    assert kept.groups == [("often", ["out"])]
-    keep(3, 4_000_000, b"data")
-    assert kept.take() == [(0, 3, 4_000_000, b"data")]
-    assert kept.take() == []
-
-
-def test_vectors_of_another_size_end_the_session(prepare: Prepare, tmp_path: Path) -> None:
-    session = prepare(TEXT)
-    plan, scenario = session.plan, session.scenario
-    size = 8 * VectorCodec(plan.participants["often"].port("out")).size
-    with Recorder(tmp_path / "run", attachments={}) as recorder:
-        monitor = Monitor(plan, Keys("apart"), 1, Measures(scenario, plan), recorder)
-        vectors = HostVectors(plan, monitor, lambda _: [("often", ["out"])])
-        vectors.take("other", [(0, 0, 1_000_000, bytes(size))])
-        with pytest.raises(ParticipantError, match=f"vectors of {size - 8} bytes, expected {size}"):
-            vectors.take("other", [(0, 1, 2_000_000, bytes(size - 8))])
