@@ -85,7 +85,7 @@ class Wire:
         bundles: Sequence[tuple[Bundle, int]],
         stride_ns: int,
     ) -> PortPublisher:
-        """Return a publisher of an output of a participant here; other hosts need every value if it `is_read`.
+        """Return a publisher of an output of a participant here; other hosts read it if `is_read`.
 
         Wall-time devices receive its events if it `feeds` them; they and observers receive its signal in
         `bundles`, each with the signal's index in it. `stride_ns` is the simulated time between two values.
