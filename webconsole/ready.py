@@ -1,54 +1,74 @@
 """A process of `trocar` that has imported what it needs, and waits for its arguments.
 
-`python -P -m webconsole.ready MODULE ...`: a line of its standard input has the arguments, a list in JSON; at
-the end of the input without one it ends. To import, and to read the definitions of messages and kinds,
-takes two seconds, which is done while a person still reads the form of a fork.
+`python -P -m webconsole.ready MODULE ...`: a line of its standard input has the arguments, a list in JSON. At
+the end of the input, however the process at the other end of the pipe has ended, it ends as by SIGTERM. To
+import, and to read the definitions of messages and kinds, takes two seconds, which is done while a person
+still reads the form of a fork.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
-from typing import IO
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from time import sleep
 
 __all__ = ["ReadyProcess", "main"]
 
+_PATIENCE_S = 10.0
+"""Time in which a session closes its recording and ends its hosts."""
+
 
 class ReadyProcess:
-    """A process that waits for its arguments.
+    """A process that waits for its arguments, and ends with the process that has made it.
 
     Args:
         modules: What it imports; one that cannot be imported is left to the command, which says why.
-        said: Where it writes what it says.
     """
 
-    def __init__(self, modules: Sequence[str], said: IO[bytes]) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "webconsole.ready", *modules],
-            stdin=subprocess.PIPE,
-            stdout=said,
-            stderr=said,
-            start_new_session=True,
-        )
+    def __init__(self, modules: Sequence[str]) -> None:
+        with NamedTemporaryFile(delete=False) as file:
+            self._file = Path(file.name)
+            self._said = self._file.open("rb")
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "webconsole.ready", *modules],
+                stdin=subprocess.PIPE,
+                stdout=file,
+                stderr=file,
+                start_new_session=True,
+            )
+        with suppress(PermissionError):  # an open file of Windows keeps its name
+            self._file.unlink()
+
+    def said(self) -> str:
+        """Return the output of the process so far."""
+        self._said.seek(0)
+        return self._said.read().decode(errors="replace")
 
     def run(self, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
         """Let it run `trocar` with these arguments, and return it."""
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):  # it has ended: its exit code tells how
             self.process.stdin.write(json.dumps([*arguments]).encode() + b"\n")
-            self.process.stdin.close()
+            self.process.stdin.flush()
         return self.process
 
     def close(self) -> None:
-        """Let it end without arguments."""
+        """Let it end."""
         assert self.process.stdin is not None
-        self.process.stdin.close()
+        with suppress(BrokenPipeError):
+            self.process.stdin.close()
         self.process.wait()
+        self._said.close()
+        self._file.unlink(missing_ok=True)
 
 
 def main() -> None:
@@ -60,12 +80,24 @@ def main() -> None:
     line = sys.stdin.readline()
     if not line:
         return
+    pipe = os.dup(sys.stdin.fileno())
     with open(os.devnull) as nothing:  # noqa: PTH123
         os.dup2(nothing.fileno(), sys.stdin.fileno())
+    threading.Thread(target=_end_with_pipe, args=(pipe,), name="parent", daemon=True).start()
     sys.argv = ["trocar", *json.loads(line)]
     from hub.command_line import main as command
 
     command()
+
+
+def _end_with_pipe(pipe: int) -> None:
+    """End this process when the other end of a pipe is closed: in order, so that a recording is whole."""
+    while os.read(pipe, 1024):
+        pass
+    # a shell lets a program in the background, and so what that starts, ignore SIGINT
+    os.kill(os.getpid(), signal.SIGTERM)
+    sleep(_PATIENCE_S)
+    os._exit(1)
 
 
 def _read_definitions() -> None:

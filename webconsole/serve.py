@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import logging
+import signal
 import webbrowser
 from contextlib import ExitStack
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import FrameType
 from typing import TYPE_CHECKING
 
 from hub.command_line.display import console as terminal
 from hub.hosting.end_with_parent import end_with_parent
+from hub.hosting.interrupt import Interrupt
 from hub.recording.recover import recover
 from schemas.errors import CutShortError
 from webconsole.console import Console
@@ -47,7 +50,7 @@ def serve(
     role: Role = "operator",
     parent: int | None = None,
 ) -> None:
-    """Serve the page of a recording, or of a running session, until Ctrl-C.
+    """Serve the page of a recording, or of a running session, until Ctrl-C, SIGTERM or the terminal's end.
 
     Args:
         recording: The recording; None: a running session.
@@ -67,10 +70,17 @@ def serve(
     if parent is not None:
         end_with_parent(parent)
     with ExitStack() as stack:
+        stack.enter_context(Interrupt())  # uvicorn raises SIGTERM again once it has shut down
+        if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+            signal.signal(signal.SIGHUP, _terminate)
         listening = on_loopback(port) if listen is None else with_tls(listen, certificates)
         stack.enter_context(listening.socket)
         source = Live(endpoint, session, parent) if recording is None else opened_recording(recording, stack)
         _serve(source, listening, role, browse=browse, foxglove=foxglove)
+
+
+def _terminate(_number: int, _frame: FrameType | None) -> None:
+    signal.raise_signal(signal.SIGTERM)
 
 
 def opened_recording(recording: Path, stack: ExitStack) -> Recorded:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import logging
 import re
-import signal
 import subprocess
 import threading
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from importlib.metadata import entry_points
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import sleep
 from typing import Any
 
@@ -50,20 +48,13 @@ class Ready:
     """
 
     def __init__(self, modules: Sequence[str]) -> None:
-        self._directory = TemporaryDirectory()
-        with self.said("hub").open("wb") as hub, self.said("page").open("wb") as page:
-            self.hub = ReadyProcess((_COMMAND, *modules), hub)
-            self.page = ReadyProcess((_COMMAND, "webconsole.serve", *_scenes()), page)
-
-    def said(self, process: str) -> Path:
-        """Return the file with what `hub` or `page` says."""
-        return Path(self._directory.name, process)
+        self.hub = ReadyProcess((_COMMAND, *modules))
+        self.page = ReadyProcess((_COMMAND, "webconsole.serve", *_scenes()))
 
     def close(self) -> None:
-        """Let those end that did not get arguments."""
-        for one in (self.hub, self.page):
-            one.close()
-        self._directory.cleanup()
+        """Let both processes end."""
+        self.hub.close()
+        self.page.close()
 
 
 def _scenes() -> list[str]:
@@ -120,10 +111,10 @@ class StartedSession:
         }
 
     def end(self) -> None:
-        """End the session as Ctrl-C would; its recording is closed in order."""
+        """End the session as SIGTERM does; its recording is closed in order."""
         if not self.ended:
             self._asked_to_end = True
-            self._hub.send_signal(signal.SIGINT)
+            self._hub.terminate()  # not SIGINT: a shell lets a server in the background ignore it
 
     def close(self) -> None:
         """End the session and wait for it."""
@@ -145,7 +136,7 @@ class StartedSession:
                     self._look(client)
                 sleep(_LOOK_S)
         if self._hub.returncode and not self._asked_to_end:
-            said = self._ready.said("hub").read_text(encoding="utf-8", errors="replace")[-_MOST_SAID:]
+            said = self._ready.hub.said()[-_MOST_SAID:]
             self.error = said.partition("error: ")[2].strip() or said.strip() or "it ended without a word"
         if self._viewer is not None:
             self._viewer.terminate()
@@ -153,7 +144,7 @@ class StartedSession:
         self._ready.close()
 
     def _look(self, client: zenoh.Session) -> None:
-        if not self.link and (found := _LINK.search(self._ready.said("page").read_text(encoding="utf-8"))):
+        if not self.link and (found := _LINK.search(self._ready.page.said())):
             self.link = found[0]
         if self.time_s < self.live_from_s:
             for reply in client.get(Keys("*").status, timeout=_PATIENCE_S):
