@@ -1,6 +1,6 @@
-"""What `trocar model fk` prints: where an arm's tip stands.
+"""Forward kinematics for `trocar model fk`: the pose of an arm's tip.
 
-The command itself is mounted beside the model's other commands.
+The command itself is mounted beside the other commands of `trocar model`.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ __all__ = ["TipPose", "fk", "table"]
 
 
 class TipPose(TypedDict):
-    """Pose of an arm's tip in the frame `frame`: what the real system publishes as `local/measured_cp`."""
+    """Pose of an arm's tip in the frame `frame`, as in the real system's `local/measured_cp`."""
 
     arm: str
     frame: str
     joints: list[str]
     q: list[float]
-    """By joint, rad and m."""
+    """Joint positions, rad and m."""
     p: list[float]
     """Position, m."""
     R: list[list[float]]
@@ -31,15 +31,15 @@ class TipPose(TypedDict):
 
 
 def fk(arm: str, tool: str | None, q: Sequence[float]) -> TipPose:
-    """Return where the tip of `arm` stands at joint positions `q` (rad, m).
+    """Return the pose of the tip of `arm` at joint positions `q` (rad, m).
 
     Args:
-        arm: one of `robots.dvrk.arms.ARMS`.
-        tool: instrument of a PSM, by name or number, or endoscope of the ECM; None for the usual one.
-        q: one number per joint; the setup joint of the ECM also takes its four that move.
+        arm: a name of `robots.dvrk.arms.ARMS`.
+        tool: instrument of a PSM, by name or number, or endoscope of the ECM; None: the default tool.
+        q: a number per joint; the setup joint of the ECM also takes the four moving joints.
 
     Raises:
-        MotionError: unknown arm or tool, another number of joints, or a joint out of its range.
+        MotionError: unknown arm or tool, wrong number of joints, or a joint out of range.
     """
     kinematics = chain(arm, tool)
     positions = [*q, 0.0, 0.0] if arm == "SUJ/ECM" and len(q) == 4 else list(q)

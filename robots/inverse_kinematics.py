@@ -1,8 +1,8 @@
 """Inverse kinematics of a serial chain by damped least squares on the pose error.
 
 Levenberg-Marquardt after Sugihara, "Solvability-Unconcerned Inverse Kinematics by the Levenberg-Marquardt
-Method", IEEE Transactions on Robotics 27(5), 2011: the damping falls with the squared error, so that a
-reachable goal is met quadratically and an unreachable one approached without chatter.
+Method", IEEE Transactions on Robotics 27(5), 2011: the damping falls with the squared error, so a reachable
+goal is met quadratically and an unreachable goal approached without chatter.
 """
 
 from __future__ import annotations
@@ -18,34 +18,27 @@ from schemas.vectors import Vector
 __all__ = ["LastFrames", "pursue"]
 
 _LENGTH = 0.1
-"""Weighs orientation against position: 1 rad counts as much as 0.1 m, about what the tip's distance from the
-RCM makes of it.
-"""
+"""Weight of orientation against position: 1 rad counts as 0.1 m, about the tip's distance from the RCM."""
 _LITTLE = 1e-4
-"""The same for an arm of fewer than six joints, which cannot have both: position first.
-
-What orientation then costs of it is some nanometres.
-"""
+"""Weight of orientation for an arm of fewer than six joints: position first, with an error of nanometres."""
 _LEAST_DAMPING = 1e-12
-"""Of the normal equations (m^2): below any singular value of the weighted Jacobian at which a joint still
-moves the tip by a micrometre.
+"""Least damping of the normal equations, m^2: below the singular values of the weighted Jacobian for a joint
+motion of the tip by a micrometre.
 """
 _MET = 1e-15
-"""m; length of the weighted error at which a goal is met: some ten times the rounding error of the forward
-kinematics.
-"""
+"""Weighted error of a goal considered met, m: some ten times the rounding error of the forward kinematics."""
 _CORRECTIONS = 4
-"""At most, per call; each squares the error, so that two do at the usual speeds."""
+"""Most corrections per call; each squares the error, and two suffice at the usual speeds."""
 
 
 class LastFrames:
-    """The frames of a chain, computed once for the positions that were asked for last.
+    """Frames of a chain, cached for the last positions.
 
-    A control loop starts where it ended a step before, and reads there where the tip is.
+    A control loop starts at the positions of the last step, and reads the tip there.
     """
 
     def __init__(self, chain: SerialChain) -> None:
-        """Take the kinematics."""
+        """`chain`: the kinematics."""
         self._chain, self._positions = chain, b""
         self._frames = np.empty(0)
 
@@ -64,21 +57,21 @@ def pursue(
     largest_move: Vector,
     frames_at: Callable[[Vector], Vector] | None = None,
 ) -> Vector:
-    """Return joint positions, shape (n,), that meet the goal, or are nearer to it than `q`.
+    """Return joint positions, shape (n,), at the goal or nearer to the goal than `q`.
 
-    They are inside the joint ranges and `largest_move`.
+    The positions stay inside the joint ranges and `largest_move`.
 
-    For each step of a control loop: a goal that moves at the usual speeds is met to 1e-15 m, one out of reach
-    followed to where the weighted error is least; a goal that is met moves nothing, not by rounding either.
-    An arm of fewer than six joints meets the position and turns as well as it can.
+    For each step of a control loop: a goal moving at the usual speeds is met to 1e-15 m, an unreachable goal
+    followed with least weighted error. A met goal causes no motion, not even by rounding. An arm of fewer
+    than six joints meets the position, with the orientation as near as possible.
 
     Args:
         chain: the kinematics.
-        q: where to start, shape (n,), rad and m.
+        q: start, shape (n,), rad and m.
         position: goal of the tip in the base frame, m, shape (3,).
         orientation: goal of the tip in the base frame, quaternion (x, y, z, w).
-        largest_move: of each joint, shape (n,); all joints slow down together, so that the way stays
-        straight.
+        largest_move: largest move of each joint, shape (n,); all joints slow down together, so the path stays
+            straight.
         frames_at: `chain.frames`, or `LastFrames` of it.
     """
     length = _LENGTH if len(q) >= 6 else _LITTLE
@@ -126,9 +119,9 @@ def _error(tip: Vector, position: Vector, orientation: Vector, length: float) ->
 def _correction(
     chain: SerialChain, q: Vector, frames: Vector, error: Vector, squared: float, length: float
 ) -> Vector:
-    """Return a move, shape (n,), that stays inside the joint ranges; `squared` is that of the error.
+    """Return a move, shape (n,), inside the joint ranges; `squared`: squared error.
 
-    Joints that would leave theirs go to its end, and the others correct as much as they can.
+    A joint about to leave its range stops at the end of the range; the remaining joints correct further.
     """
     jacobian = chain.jacobian(frames)
     jacobian[3:] *= length

@@ -1,10 +1,9 @@
 """Kinematics of a serial chain in modified Denavit-Hartenberg form.
 
-Link i stands to link i-1 as Rx(alpha) Tx(a) Rz(theta) Tz(d) (Craig, Introduction to Robotics, section 3.4); q
-is added to theta of a revolute and to d of a prismatic joint. A table in standard form becomes one in
-modified form by `from_standard`.
+Link i is at Rx(alpha) Tx(a) Rz(theta) Tz(d) in link i-1 (Craig, Introduction to Robotics, section 3.4); q is
+added to theta of a revolute and to d of a prismatic joint. `from_standard` converts a table in standard form.
 
-A chain takes one configuration, shape (n,), or many at once, shape (..., n).
+A chain takes a configuration, shape (n,), or many at once, shape (..., n).
 """
 
 from __future__ import annotations
@@ -28,9 +27,9 @@ except ImportError:  # there was no compiler, or numpy's inner loops are not whe
 __all__ = ["Joint", "SerialChain", "SerialChains", "check", "compiled", "jerk_limit"]
 
 _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
-"""Whose products are those of a cross product."""
+"""Index orders for the two products of each element of a cross product."""
 _RISE = 0.1
-"""Time (s) in which a trajectory's acceleration grows from 0 to its limit.
+"""Time of a trajectory's acceleration to grow from 0 to its limit, s.
 
 The dVRK's own trajectories (Reflexxes, type II) do not limit jerk; for the choice see docs/decisions/0007.
 """
@@ -43,7 +42,7 @@ def jerk_limit(acceleration: float) -> float:
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: its modified DH row and its limits, all in rad or m, s, N m or N.
+    """A joint: modified DH row and limits, in rad or m, s, N m or N.
 
     Units of the limits: range rad, m; velocity rad/s, m/s; effort N m, N; acceleration rad/s^2, m/s^2; jerk
     rad/s^3, m/s^3.
@@ -68,12 +67,12 @@ class Joint:
         return "rad" if self.kind == "revolute" else "m"
 
     def refusal(self, position: float) -> str:
-        """Return the sentence that refuses a position out of range, in rad or m."""
+        """Return the sentence of refusal of a position out of range, in rad or m."""
         value, lower, upper = distinct(position, self.lower, self.upper)
         return f"joint {self.name} at {value} {self.unit}, allowed are {lower} .. {upper}"
 
     def transform(self, q: float) -> Vector:
-        """Return the pose of this link in the link before it, shape (4, 4), at joint position `q`."""
+        """Return the pose of this link in the previous link, shape (4, 4), at joint position `q`."""
         theta, d = (self.theta + q, self.d) if self.kind == "revolute" else (self.theta, self.d + q)
         ca, sa, ct, st = _cos(self.alpha), _sin(self.alpha), _cos(theta), _sin(theta)
         return np.array(
@@ -98,13 +97,12 @@ class SerialChain:
     """Forward kinematics and geometric Jacobian of n joints and a tip fixed to the last link."""
 
     def __init__(self, joints: Sequence[Joint], tip: Vector, base: Vector | None = None) -> None:
-        """Take the joints from the base outwards.
+        """Build the chain.
 
         Args:
-            joints: the n joints.
+            joints: the n joints, from the base outwards.
             tip: pose of the tip in the last link's frame, shape (4, 4).
-            base: pose of the frame before the first joint in the base frame, shape (4, 4); None where they
-            are one.
+            base: pose of the frame before the first joint in the base frame, shape (4, 4); None: identity.
         """
         self.joints = tuple(joints)
         self.tip = tip
@@ -135,12 +133,12 @@ class SerialChain:
         if base is not None:
             basis[0] = base @ basis[0]
         self.basis = basis.reshape(len(self.joints), 3, 16)
-        """Of the links' transforms, whose factors are 1, cos q or 0, and sin q or q."""
+        """Basis of the links' transforms, for the factors 1, cos q or 0, and sin q or q."""
         slides = np.array([joint.kind == "prismatic" for joint in joints], np.float64)
         self.numbers = self.basis, np.ascontiguousarray(tip), self.lower, self.upper, slides
-        """What the compiled functions take."""
+        """Arguments of the compiled functions."""
         self._free: list[_Workspace] = []
-        """Workspaces of `frames` that no thread uses now."""
+        """Workspaces of `frames`, not in use by any thread."""
         # Where the factors of the Jacobian's cross products are in the numbers of `frames`, (2, 3, n) each.
         at = np.arange(0, 16 * len(self.joints), 16) + np.arange(0, 12, 4)[:, None]  # (3, n): first column
         self._axes = at + 2
@@ -152,10 +150,10 @@ class SerialChain:
     def from_standard(cls, joints: Sequence[Joint], tip: Vector) -> SerialChain:
         """Return the chain of joints with DH rows of standard form.
 
-        There, link i is at Rz(theta) Tz(d) Tx(a) Rx(alpha) in link i-1.
+        In standard form, link i is at Rz(theta) Tz(d) Tx(a) Rx(alpha) in link i-1.
 
-        Only the frames between base and tip differ from those of the standard form: each stands before the a
-        and alpha of its own row, which go to the row after it, the last ones to the tip.
+        Only the frames between base and tip differ from the standard form: the a and alpha of a row move to
+        the next row, of the last row to the tip.
         """
         last = Joint("", "revolute", joints[-1].alpha, joints[-1].a, 0.0, 0.0, 0.0, 0.0).transform(0.0)
         before = [(0.0, 0.0), *((joint.alpha, joint.a) for joint in joints[:-1])]
@@ -187,11 +185,11 @@ class SerialChain:
         return poses
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state of a copy: workspaces, whose arrays share memory, cannot be copied."""
+        """Return the state of a copy, without workspaces: their arrays share memory."""
         return self.__dict__ | {"_free": []}
 
     def out_of_range(self, q: Vector) -> list[str]:
-        """Return a sentence for each joint of `q`, shape (n,), outside its range by more than `tolerance`."""
+        """Return a sentence for each joint of `q`, shape (n,), out of range by more than `tolerance`."""
         return [
             joint.refusal(value)
             for joint, value, slack in zip(self.joints, q.tolist(), self.tolerance.tolist(), strict=True)
@@ -208,7 +206,7 @@ class SerialChain:
             raise MotionError(f"not all positions are finite: {wrong.tolist()} of {', '.join(self.names)}")
 
     def check(self, q: Vector) -> None:
-        """Raise MotionError if `q` is not n finite numbers, each inside its joint's range or `tolerance`."""
+        """Raise MotionError if `q` is not n finite numbers within the joint ranges and `tolerance`."""
         self.check_form(q)
         if q.ndim > 1:
             raise MotionError(
@@ -228,7 +226,7 @@ class SerialChain:
         return np.clip(q, self.lower, self.upper)
 
     def contains(self, q: Vector) -> bool:
-        """Say whether each position of `q`, shape (n,), is a number inside its range, not at an end of it."""
+        """Return whether each position of `q`, shape (n,), is strictly inside the joint's range."""
         for value, (lower, upper) in zip(q.tolist(), self._ranges, strict=True):
             if not lower < value < upper:
                 return False
@@ -239,7 +237,7 @@ class SerialChain:
 
         Positions may be outside the joint ranges.
 
-        Raises MotionError for another number of joints, or a position that is not finite.
+        Raises MotionError for another number of joints, or a position not finite.
         """
         self.check_form(q)
         return self.frames(q)[..., -1, :, :]
@@ -248,12 +246,10 @@ class SerialChain:
         """Return J, shape (..., 6, n), with twist of the tip (m/s, rad/s) = J dq, from `frames(q)`.
 
         Args:
-            frames: what `frames(q)` returned.
-            frame: in which the twist is expressed; its point is the tip's origin either way. In the tip's
-            frame it is the dVRK's
-                `body/jacobian`; its `spatial/jacobian` is the twist of the point at the base frame's origin
-                instead
-                (jhu-cisst/cisst, cisstRobot/code/robManipulator.cpp, JacobianSpatial).
+            frames: result of `frames(q)`.
+            frame: axes of the twist; the point is the tip's origin either way. The Jacobian in the tip's
+                frame is the dVRK's `body/jacobian`. The dVRK's `spatial/jacobian` has the point at the base
+                frame's origin (jhu-cisst/cisst, cisstRobot/code/robManipulator.cpp, JacobianSpatial).
         """
         if frames.ndim == 3 and frame == "base":
             return self._jacobian_of_one(frames)
@@ -287,14 +283,14 @@ class SerialChain:
 
 
 class _Workspace:
-    """Where the frames of one configuration are computed, with all views of its arrays made beforehand.
+    """Arrays for the frames of one configuration, with all views made beforehand.
 
-    The products are those of `_frames` to the bit: `dot` calls the same function of BLAS as `matmul`, at a
-    third of the cost.
+    The products equal the products of `_frames` to the bit: `dot` calls the same function of BLAS as
+    `matmul`, at a third of the cost.
     """
 
     def __init__(self, basis: Vector, tip: Vector, prismatic: Sequence[int]) -> None:
-        """Take `SerialChain.basis`, shape (n, 3, 16), the tip, shape (4, 4), and the prismatic joints."""
+        """`basis`: `SerialChain.basis`, shape (n, 3, 16); `tip`: shape (4, 4); `prismatic`: joint indices."""
         n = len(basis)
         self._basis, self._prismatic = basis, prismatic
         self._factors, self._links = np.ones((n, 1, 3)), np.empty((n, 1, 16))
@@ -322,13 +318,14 @@ class _Workspace:
 
 
 class SerialChains:
-    """Several chains of n joints of the same kinds, for which numpy is called as often as for one.
+    """Several chains of n joints of the same kinds, at the number of numpy calls of a single chain.
 
-    Their frames are those of each `SerialChain.frames` to the bit; Jacobians come from any of the chains.
+    The frames equal the frames of each `SerialChain.frames` to the bit; Jacobians come from any of the
+    chains.
     """
 
     def __init__(self, chains: Sequence[SerialChain]) -> None:
-        """Take k chains."""
+        """`chains`: k chains."""
         self.prismatic = chains[0].prismatic
         self.basis = np.stack([chain.basis for chain in chains])[:, None]  # (k, 1, n, 3, 16)
         self._tips = np.stack([chain.tip for chain in chains])[:, None]  # (k, 1, 4, 4)
@@ -342,7 +339,7 @@ class SerialChains:
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether kinematics are compiled here, what that means, and the remedy, for `trocar doctor`."""
+    """Return whether kinematics are compiled here, the consequence, and the remedy, for `trocar doctor`."""
     works = compiled is not None
     detail = "compiled" if works else "in Python: the same results, several times slower"
     return works, detail, "install a C compiler, then install Trocar again"
@@ -351,7 +348,7 @@ def check() -> tuple[bool, str, str]:
 def _frames(q: Vector, basis: Vector, tip: Vector, prismatic: Sequence[int]) -> Vector:
     """Return the poses of links and tips, shape (..., n + 1, 4, 4), at positions `q`, shape (..., n).
 
-    `basis` is that of one chain or of several, shape (..., n, 3, 16), and `tip` has shape (..., 4, 4).
+    `basis`: basis of one chain or of several, shape (..., n, 3, 16); `tip`: shape (..., 4, 4).
     """
     n = q.shape[-1]
     factors = np.ones((*q.shape, 1, 3))

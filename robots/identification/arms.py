@@ -1,4 +1,4 @@
-"""The arms whose dynamics can be identified: what moves, what turns it, and what is known beforehand."""
+"""Arms with identifiable dynamics: bodies, drives, and known parameters."""
 
 from __future__ import annotations
 
@@ -26,11 +26,12 @@ _PSM_BODIES = (
     "pitch_top",
     "counterweight",
 )
-"""Whose pseudo-inertias are found; the instrument's own bodies weigh grams and keep their known masses."""
+"""Bodies with identified pseudo-inertias; bodies of the instrument weigh grams and keep their known masses.
+"""
 
 
 class IdentifiedArm(NamedTuple):
-    """One arm with what it holds; n joints, those of the chain first, then the jaw if it is one of them."""
+    """An arm with its instrument; n joints, first the joints of the chain, then optionally the jaw."""
 
     tool: str
     """Instrument or endoscope."""
@@ -46,11 +47,11 @@ class IdentifiedArm(NamedTuple):
     discs: tuple[drives.Disc, ...]
     """Published; the shares are of these joints."""
     start: tuple[float, ...]
-    """Where the arm homes, its jaw half open; rad and m, shape (n,)."""
+    """Home position of the arm, jaw half open; rad and m, shape (n,)."""
 
 
 def of_psm(tool: Instrument, *, jaw: bool = False) -> IdentifiedArm:
-    """Return a PSM with `tool`; `jaw`: its jaw is a joint too, else it stands still."""
+    """Return a PSM with `tool`; `jaw`: the jaw is a joint too, otherwise at rest."""
     chain, bodies, driven = psm.chain(tool), inertia.psm(tool), dict(drives.psm(tool))
     joints, discs, start = chain.joints, drives.discs(tool), psm.home(tool)
     if jaw and tool.jaw is not None:
@@ -76,7 +77,7 @@ def of_psm(tool: Instrument, *, jaw: bool = False) -> IdentifiedArm:
 
 
 def of_ecm() -> IdentifiedArm:
-    """Return the ECM; its endoscope is among the bodies to be found."""
+    """Return the ECM; the endoscope is among the identified bodies."""
     chain = ecm.chain()
     return IdentifiedArm(
         tool="endoscope",

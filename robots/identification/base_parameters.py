@@ -1,4 +1,4 @@
-"""Base parameters: the combinations of an arm's parameters that its efforts depend on.
+"""Base parameters: the identifiable combinations of an arm's parameters.
 
 Measurements tell combinations only. QR with column pivoting picks independent columns W1 of a regressor W;
 the others are W2 = W1 K, so that W p = W1 (p1 + K p2) (Gautier, "Numerical calculation of the base inertial
@@ -20,10 +20,10 @@ __all__ = ["BaseParameters", "base_parameters"]
 
 _STATES = 300
 _SLOWEST = 1e-3
-"""Of the random velocities, as a share of the limit: dry friction differs at low ones."""
+"""Smallest random velocity, as a fraction of the limit: dry friction differs at low velocities."""
 _TOLERANCE = 1e-8
-"""Of the largest diagonal element of R, columns scaled to length 1: what is smaller is the error of the
-central difference.
+"""Smallest relevant diagonal element of R, relative to the largest, with columns of length 1: smaller
+elements are errors of the central difference.
 """
 
 
@@ -31,9 +31,9 @@ class BaseParameters(NamedTuple):
     """How P parameters combine to B base parameters."""
 
     columns: NDArray[np.intp]
-    """Of the regressor, which stand for the base parameters, shape (B,)."""
+    """Columns of the regressor for the base parameters, shape (B,)."""
     combination: Vector
-    """From all parameters to the base parameters, shape (B, P)."""
+    """Map from all parameters to the base parameters, shape (B, P)."""
 
 
 def base_parameters(model: LinearModel) -> BaseParameters:

@@ -1,12 +1,12 @@
-"""Motions that excite an arm: Fourier series of least condition number, within its limits.
+"""Exciting motions of an arm: Fourier series of least condition number, within the arm's limits.
 
 Each period is q(t) = start + sum_k a_k sin(k w t) + b_k (cos(k w t) - 1) in every joint (Swevers et al.,
 "Optimal robot excitation and identification", IEEE Transactions on Robotics and Automation 13(5), 1997), with
-sum k a_k = 0 and sum k^2 b_k = 0: it starts and ends at rest at `start`. The coefficients are scaled such
-that position, velocity or acceleration just stays within the limits. The condition number is that of the base
-regressor, columns of length 1, of this period and those before it, so that each period adds what the others
-leave out. The search starts from the best of some random motions, with a fixed seed: the same call gives the
-same motion.
+sum k a_k = 0 and sum k^2 b_k = 0: the motion starts and ends at rest at `start`. The coefficients are scaled
+to the limits of position, velocity or acceleration. Minimised is the condition number of the base regressor,
+columns of length 1, of this period and all periods before, so each period complements the earlier periods.
+The search starts from the best of some random motions, with a fixed seed: the same call gives the same
+motion.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ __all__ = ["PERIOD", "Excitation", "excitation"]
 PERIOD = 20.0
 """s."""
 _HARMONICS = 6
-"""Up to 0.3 Hz: what moves faster is beyond the accelerations of the arm's own joints."""
+"""Number of harmonics, up to 0.3 Hz: faster motions exceed the acceleration limits of the arm's joints."""
 _SHARE = 0.9
-"""Of the limits."""
+"""Used fraction of the limits."""
 _STATES = 50
-"""Of a period in the regressor, and ten times as many against the limits."""
+"""States of a period in the regressor; ten times as many are checked against the limits."""
 _TRIES = 30
 _ITERATIONS = 4
 _INSERTION = 2
@@ -49,11 +49,11 @@ class Excitation(NamedTuple):
     ddq: Vector
     """rad/s^2 and m/s^2, shape (N, n)."""
     condition: float
-    """Of the base regressor, columns of length 1."""
+    """Condition number of the base regressor, columns of length 1."""
 
 
 class _Series:
-    """Fourier series of n joints with J free numbers each, which start and end at rest at `start`."""
+    """Fourier series of n joints with J free numbers each, starting and ending at rest at `start`."""
 
     def __init__(self, arm: IdentifiedArm) -> None:
         k = np.arange(1.0, _HARMONICS + 1.0)
@@ -72,7 +72,7 @@ class _Series:
         self._dense = self._bases(np.arange(0.0, PERIOD, PERIOD / (10 * _STATES)))
 
     def _bases(self, time: Vector) -> tuple[Vector, Vector, Vector]:
-        """Return what the free numbers of a joint are multiplied by: q - start, dq, ddq, each (N, J)."""
+        """Return the factors of a joint's free numbers in q - start, dq and ddq, each (N, J)."""
         w = self._frequencies
         sin, cos = np.sin(np.outer(time, w)), np.cos(np.outer(time, w))
         return (
@@ -130,7 +130,7 @@ def excitation(arm: IdentifiedArm, periods: int, rate: float, seed: int = 0) -> 
 
 
 def _null_space(row: Vector) -> Vector:
-    """Return an orthonormal basis of what is orthogonal to `row`, shape (K, K - 1)."""
+    """Return an orthonormal basis of the complement of `row`, shape (K, K - 1)."""
     return np.linalg.svd(row[None, :])[2][1:].T
 
 

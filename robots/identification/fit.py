@@ -1,11 +1,11 @@
-"""The parameters of an arm that explain its measured efforts and that an arm can have.
+"""Physically feasible parameters of an arm from measured efforts.
 
-First weighted least squares over the base parameters: the weight of a joint is one over the standard
-deviation of what an unweighted fit leaves there (Swevers et al., IEEE Control Systems 27(5), 2007). It gives
+First weighted least squares over the base parameters: the weight of a joint is the inverse standard deviation
+of the residual of an unweighted fit (Swevers et al., IEEE Control Systems 27(5), 2007). The result is the
 standard deviations and the condition number. Then the parameters themselves, physically feasible: the
 pseudo-inertia of each body is (L M) (L M)^T with L of the published body and M lower triangular with diagonal
-exp(x) (Rucker and Wensing, RA-L 2022), friction, springs and rotors are not negative. What the measurements
-do not tell stays near the published values. How sharply friction changes its sign is chosen before
+exp(x) (Rucker and Wensing, RA-L 2022); friction, springs and rotors are not negative. Unidentifiable
+parameters stay near the published values. The sharpness of friction's change of sign is chosen before
 (`robots.identification.friction`).
 """
 
@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 
 from robots.identification.arms import IdentifiedArm
 from robots.identification.base_parameters import BaseParameters, base_parameters
-from robots.identification.friction import Candidate, chosen, grid, picked
+from robots.identification.friction import Candidate, choose_shape, columns_of_picks, grid
 from robots.identification.linear_model import BODY_SIZE, LinearModel, pseudo_inertias
 from robots.identification.signals import Samples
 from schemas.errors import RecordingError
@@ -28,12 +28,15 @@ from schemas.vectors import Vector
 __all__ = ["LARGEST_CONDITION", "Fit", "fit", "relative_residual"]
 
 LARGEST_CONDITION = 1e5
-"""Of the scaled base regressor; above it the motion excites some base parameters too little to tell them."""
+"""Largest condition number of the scaled base regressor; above, the motion excites some base parameters too
+little.
+"""
 _TRAINED = 0.75
-"""Of the samples, the first ones; the rest is not seen by the fit and judges it."""
+"""Fraction of the samples, from the first on, used by the fit; the rest judges the fit."""
 _PRIOR = 1e-2
-"""Weight of a change of a body by exp(1), or of another parameter by its scale, against one standard
-deviation of one measured effort."""
+"""Weight of a change of a body by exp(1), or of another parameter by its scale, against a standard deviation
+of a measured effort.
+"""
 _SCALES = {
     "armature": 1e-2,
     "stiffness": 0.1,
@@ -44,40 +47,40 @@ _SCALES = {
 }
 """kg m^2 and kg, N m/rad and N/m, N m and N, N m s/rad and N s/m: the order of the published values."""
 _SCALE_OF_DISC = 0.1
-"""Of the friction of a disc, against that of a joint."""
+"""Scale of the friction of a disc, relative to the friction of a joint."""
 _LEAST = 1e-6
-"""Of friction, springs and rotors."""
+"""Least friction, springs and rotors."""
 _FARTHEST = 5.0
-"""Of x in the exp(x) of a body: masses between 1/20000 and 20000 times the published ones."""
+"""Largest |x| in the exp(x) of a body: masses from 1/20000 to 20000 times the published mass."""
 _TRIANGLE = np.tril_indices(4)
 _DIAGONAL = _TRIANGLE[0] == _TRIANGLE[1]
 _UPPER = np.triu_indices(4)
 
 
 class Fit(NamedTuple):
-    """What was found; P parameters of the model, B base parameters, n joints."""
+    """Result of a fit; P parameters of the model, B base parameters, n joints."""
 
     model: LinearModel
-    """Whose parameters these are, with the shape of the friction that was found."""
+    """Model of the parameters, with the chosen shape of friction."""
     parameters: Vector
     """Feasible, shape (P,)."""
     base: BaseParameters
     base_values: Vector
-    """By weighted least squares, shape (B,)."""
+    """Base parameters by weighted least squares, shape (B,)."""
     base_deviations: Vector
     """Standard deviations of these, shape (B,)."""
     base_shares: Vector
-    """Root mean square of what each of these does to the effort, over that of the measured effort, at the
-    joint where it does most, shape (B,).
+    """Largest contribution of each base parameter to the effort of a joint: root mean square, relative to the
+    measured effort, shape (B,).
     """
     condition: float
-    """Of the base regressor, columns scaled to length 1."""
+    """Condition number of the base regressor, columns scaled to length 1."""
     residual: Vector
-    """Of the feasible parameters on the samples not seen, as `relative_residual`, shape (n,)."""
+    """Residual of the feasible parameters on the test samples, as `relative_residual`, shape (n,)."""
     published_residual: Vector
-    """Of the published parameters there, shape (n,)."""
+    """Residual of the published parameters on the test samples, shape (n,)."""
     time: Vector
-    """s, shape (N,); recordings follow one another."""
+    """Time, s, shape (N,); recordings are concatenated."""
     predicted: Vector
     """Efforts of the feasible parameters, shape (N, n)."""
     published: Vector
@@ -85,7 +88,7 @@ class Fit(NamedTuple):
     measured: Vector
     """Filtered, shape (N, n)."""
     test: slice
-    """Which of these were not seen."""
+    """Test samples, not used by the fit."""
 
 
 def fit(
@@ -96,16 +99,16 @@ def fit(
     stribeck: bool = False,
     judged: Samples | None = None,
 ) -> Fit:
-    """Return the dynamic parameters of an arm that explain the samples of all recordings.
+    """Return the dynamic parameters of an arm with the least error on the samples of all recordings.
 
     Args:
-        recorded: of the joints of `arm`.
-        arm: which one, with what it holds.
-        gravity: its acceleration in the arm's base frame, m/s^2, shape (3,); of an upright base unless given.
+        recorded: recordings of the joints of `arm`.
+        arm: the arm with its instrument.
+        gravity: gravity in the arm's base frame, m/s^2, shape (3,); by default for an upright base.
         stribeck: whether dry friction may be larger at rest.
-        judged: a recording that is kept back to judge the result; the last quarter of all unless given.
+        judged: a recording kept back to judge the result; by default the last quarter of the samples.
 
-    Raises RecordingError if the motion does not excite the arm enough to tell them.
+    Raises RecordingError if the motion does not excite the arm enough.
     """
     rows = _Rows.of(LinearModel(arm, gravity), [*recorded, *([judged] if judged else [])], stribeck=stribeck)
     unseen = judged.kept if judged else round((1.0 - _TRAINED) * len(rows.time))
@@ -152,7 +155,7 @@ class _Rows(NamedTuple):
     regressor: Vector
     """Shape (N, n, P)."""
     carried: Vector
-    """Efforts of what is known, shape (N, n)."""
+    """Efforts of the known parameters, shape (N, n)."""
     measured: Vector
     """Efforts, shape (N, n)."""
     dry: list[Candidate]
@@ -184,17 +187,17 @@ class _Rows(NamedTuple):
 
 
 def _with_friction(rows: _Rows, seen: slice) -> _Rows:
-    """Return the rows with the shape of the friction that explains the seen ones best."""
+    """Return the rows with the shape of friction of least error on the samples of the fit."""
     model, effort = rows.model, rows.measured - rows.carried
     base = base_parameters(model)
     coulomb = model.parts["coulomb"]
     fixed = [column for column in base.columns.tolist() if not coulomb.start <= column < coulomb.stop]
     sigma = _noise(rows.regressor[seen][..., base.columns], effort[seen])[:, None]
     weighted = [Candidate(one.shape, one.columns[seen] / sigma) for one in rows.dry]
-    shape, picks = chosen(
+    shape, picks = choose_shape(
         model.shares, rows.regressor[seen][..., fixed] / sigma, weighted, effort[seen] / sigma[:, 0]
     )
-    columns = picked([one.columns for one in rows.dry], picks)
+    columns = columns_of_picks([one.columns for one in rows.dry], picks)
     regressor = np.concatenate([rows.regressor[..., : coulomb.start], columns], axis=-1)
     return rows._replace(model=LinearModel(model.arm, model.gravity, shape), regressor=regressor)
 
@@ -209,7 +212,7 @@ def _least_squares(rows: Vector, goal: Vector) -> tuple[Vector, Vector]:
 
 
 def relative_residual(predicted: Vector, measured: Vector) -> Vector:
-    """Return the root mean square of the error over that of the measured effort, by joint, shape (n,)."""
+    """Return root mean square error over root mean square measured effort, by joint, shape (n,)."""
     error, scale = (np.sqrt(np.mean(values**2, axis=0)) for values in (predicted - measured, measured))
     return error / np.maximum(scale, np.finfo(float).tiny)
 
@@ -228,12 +231,12 @@ def _condition(regressor: Vector, base: BaseParameters) -> float:
 
 
 def _samples_per_independent(samples: Samples) -> float:
-    """Return how many samples tell as much as one: what is filtered has two independent ones a period."""
+    """Return the number of samples per independent sample: two are independent in a period of the cut-off."""
     return max(1.0, 1.0 / (2.0 * samples.cutoff * float(samples.time[1] - samples.time[0])))
 
 
 def _noise(regressor: Vector, effort: Vector) -> Vector:
-    """Return the standard deviation of what unweighted least squares leaves at each joint, shape (n,)."""
+    """Return the standard deviation of the residual of unweighted least squares by joint, shape (n,)."""
     count, n, size = regressor.shape
     found = np.linalg.lstsq(regressor.reshape(-1, size), effort.ravel())[0]
     left = np.sqrt(np.sum((effort - regressor @ found) ** 2, axis=0) / max(1, count - size / n))

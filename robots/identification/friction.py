@@ -1,9 +1,8 @@
-"""How sharply dry friction changes with the velocity, chosen from measurements.
+"""Shape of dry friction over velocity, chosen from measurements.
 
-The efforts are linear in all parameters but these: each thing that rubs has a smoothing of its Coulomb
-friction and, if asked for, a Stribeck velocity. They are taken from a grid, one thing after the other until
-nothing changes, so that least squares leave the least. All candidates are columns of one normal matrix,
-which makes a trial a small solve.
+The efforts are linear in all parameters but the shapes: each rubbing pair has a smoothing of its Coulomb
+friction and optionally a Stribeck velocity. Shapes are chosen on a grid for the least residual, pair after
+pair until no change helps. All candidates are columns of one normal matrix, so a trial is a small solve.
 """
 
 from __future__ import annotations
@@ -18,27 +17,27 @@ from robots.dvrk.drives import SMOOTHING
 from robots.identification.linear_model import FrictionShape, LinearModel
 from schemas.vectors import Vector
 
-__all__ = ["Candidate", "chosen", "grid", "picked"]
+__all__ = ["Candidate", "choose_shape", "columns_of_picks", "grid"]
 
 _SMOOTHINGS = SMOOTHING * 2.0 ** np.arange(-1, 6)
-"""s/rad and s/m: half to 32 times the published one."""
+"""Smoothings, s/rad and s/m: half to 32 times the published value."""
 _STRIBECK = np.array([0.003, 0.01, 0.03, 0.1])
-"""Velocities, as shares of the fastest that the thing turns by the joints' limits."""
+"""Stribeck velocities, as fractions of the largest velocity of the pair at the joints' limits."""
 _ROUNDS = 5
 _SMALL = 1e-12
-"""Of the largest eigenvalue of the scaled normal matrix: below it a direction is not known."""
+"""Smallest relevant eigenvalue of the scaled normal matrix, relative to the largest."""
 
 
 class Candidate(NamedTuple):
-    """One shape on the grid."""
+    """A shape on the grid."""
 
     shape: FrictionShape
     columns: Vector
-    """Filtered, those of dry friction, shape (N, n, rubbing or twice that)."""
+    """Filtered columns of dry friction, shape (N, n, pairs or 2 pairs)."""
 
 
 def grid(model: LinearModel, *, stribeck: bool) -> list[FrictionShape]:
-    """Return all shapes on the grid, the same for all things that rub."""
+    """Return all shapes on the grid, the same for all rubbing pairs."""
     fastest = np.abs(model.shares) @ np.array([joint.velocity for joint in model.arm.joints])
     return [
         FrictionShape(np.full(len(model.rubbing), smoothing), share * fastest if stribeck else None)
@@ -46,16 +45,16 @@ def grid(model: LinearModel, *, stribeck: bool) -> list[FrictionShape]:
     ]
 
 
-def chosen(
+def choose_shape(
     shares: Vector, fixed: Vector, dry: list[Candidate], effort: Vector
 ) -> tuple[FrictionShape, list[int]]:
-    """Return the shape that leaves the least, and for each thing that rubs the candidate it is of.
+    """Return the shape of least residual, and the candidate of each rubbing pair.
 
     Args:
-        shares: of the model; things that turn alike have one shape.
-        fixed: columns of all other base parameters, weighted, shape (N, n, columns).
-        dry: the candidates of all recordings together, weighted.
-        effort: weighted, shape (N, n).
+        shares: shares of the model; pairs with equal motion have the same shape.
+        fixed: weighted columns of all base parameters without dry friction, shape (N, n, columns).
+        dry: weighted candidates of all recordings together.
+        effort: weighted efforts, shape (N, n).
     """
     rubbing = len(dry[0].shape.smoothing)
     kinds = dry[0].columns.shape[-1] // rubbing
@@ -86,8 +85,8 @@ def chosen(
     return _shape([one.shape for one in dry], picks.tolist()), picks.tolist()
 
 
-def picked(columns: Sequence[Vector], picks: Sequence[int]) -> Vector:
-    """Return the columns of candidate `picks[i]` for each thing i that rubs."""
+def columns_of_picks(columns: Sequence[Vector], picks: Sequence[int]) -> Vector:
+    """Return the columns of candidate `picks[i]` for each rubbing pair i."""
     result = np.empty_like(columns[0])
     for i, pick in enumerate(picks):
         result[..., i :: len(picks)] = columns[pick][..., i :: len(picks)]

@@ -1,11 +1,12 @@
-"""The efforts of an arm as a linear function of its dynamic parameters.
+"""Efforts of an arm as a linear function of the dynamic parameters.
 
 effort = sum_b trace(Y_b^T J_b) + armature ddq + stiffness q + offset + friction. J_b is the pseudo-inertia of
-a body of the arm (`robots.dvrk.dynamics`). What rubs are the arm's own joints and the discs of an instrument,
-each turning by v = sum of share dq; its friction viscous v + coulomb tanh(s v) goes to the joints by the same
-shares, which is the coupling of the cables. Stribeck's friction adds static exp(-(v / w)^2) tanh(s v)
-(Armstrong et al., "A survey of models, analysis tools and compensation methods for the control of machines
-with friction", Automatica 30(7), 1994). s and w are not linear: `FrictionShape` has them. SI units, radians.
+a body of the arm (`robots.dvrk.dynamics`). Rubbing pairs are the arm's own joints and the discs of an
+instrument, each turning at v = sum of share dq; the friction viscous v + coulomb tanh(s v) of a pair acts on
+the joints by the same shares, the coupling of the cables. Stribeck's friction adds static exp(-(v / w)^2)
+tanh(s v) (Armstrong et al., "A survey of models, analysis tools and compensation methods for the control of
+machines with friction", Automatica 30(7), 1994). The efforts are not linear in s and w (`FrictionShape`). SI
+units, radians.
 """
 
 from __future__ import annotations
@@ -24,33 +25,33 @@ __all__ = ["BODY_SIZE", "FrictionShape", "LinearModel", "pseudo_inertias"]
 _UPPER = np.triu_indices(4)
 _TWICE = np.where(_UPPER[0] == _UPPER[1], 1.0, 2.0)
 BODY_SIZE = len(_TWICE)
-"""Parameters of one body: the upper triangle of its pseudo-inertia, by rows."""
+"""Number of parameters of a body: the upper triangle of the pseudo-inertia, by rows."""
 _AT_ONCE = 1000
-"""States of which the regressor is computed together: some megabytes."""
+"""Number of states per computation of the regressor: some megabytes."""
 
 
 class FrictionShape(NamedTuple):
-    """What friction is not linear in, for each thing that rubs."""
+    """Nonlinear parameters of friction, for each rubbing pair."""
 
     smoothing: Vector
-    """s/rad, s/m: how fast Coulomb friction changes its sign, shape (rubbing,)."""
+    """Sharpness s of Coulomb friction's change of sign, s/rad or s/m, shape (rubbing,)."""
     stribeck: Vector | None = None
-    """rad/s, m/s: at which velocity static friction has fallen to 1/e; None without it."""
+    """Velocity w of static friction at 1/e, rad/s or m/s; None: no static friction."""
 
 
 class LinearModel:
     """The regressor of an arm; n joints, P parameters.
 
     Attributes:
-        arm: which one.
-        gravity: its acceleration in the arm's base frame, or None.
+        arm: the arm.
+        gravity: gravity in the arm's base frame, or None.
         joints: names of the n joints.
-        rubbing: names of what rubs: joints and discs.
-        shares: by how much each of these turns with each joint, shape (rubbing, n).
-        shape: of the friction.
-        parts: where each kind of parameter is among the P.
-        names: of the P parameters.
-        nominal: the published values, shape (P,).
+        rubbing: names of the rubbing pairs: joints and discs.
+        shares: velocity of each pair per velocity of each joint, shape (rubbing, n).
+        shape: shape of the friction.
+        parts: positions of each kind of parameter among the P parameters.
+        names: names of the P parameters.
+        nominal: published values, shape (P,).
     """
 
     def __init__(
@@ -59,10 +60,9 @@ class LinearModel:
         """Build the model of `arm`.
 
         Args:
-            arm: which one.
-            gravity: its acceleration in the arm's base frame, m/s^2, shape (3,); of an upright base unless
-                given.
-            shape: of the friction; Coulomb's, as published, unless given.
+            arm: the arm.
+            gravity: gravity in the arm's base frame, m/s^2, shape (3,); by default for an upright base.
+            shape: shape of the friction; by default Coulomb friction as published.
         """
         self.arm, self.joints = arm, tuple(joint.name for joint in arm.joints)
         self.gravity, moving = gravity, len(arm.chain.joints)
@@ -100,7 +100,7 @@ class LinearModel:
         )
 
     def regressor(self, q: Vector, dq: Vector, ddq: Vector) -> tuple[Vector, Vector]:
-        """Return the derivatives of the efforts by the parameters, and the efforts that carry what is known.
+        """Return the derivatives of the efforts by the parameters, and the efforts of the known parameters.
 
         Arguments (N, n); results (N, n, P) and (N, n).
         """
@@ -138,7 +138,7 @@ class LinearModel:
         return np.concatenate([coulomb, self.spread(direction * np.exp(-((v / shape.stribeck) ** 2)))], -1)
 
     def spread(self, values: Vector) -> Vector:
-        """Return what friction does to the joints, shape (N, n, rubbing), of `values`, (N, rubbing)."""
+        """Return the joint efforts, shape (N, n, rubbing), of friction `values`, (N, rubbing)."""
         return self.shares.T * values[:, None, :]
 
 

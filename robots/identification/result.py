@@ -1,4 +1,4 @@
-"""From a fit to the file that a scenario names."""
+"""Conversion of a fit to a file of dynamics for scenarios."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["own_dynamics"]
 
 
 def own_dynamics(found: Fit, cutoff: float, recordings: Sequence[str]) -> OwnDynamics:
-    """Return the content of the file: `found`, with how it was found."""
+    """Return the content of the file: the parameters of `found` and their provenance."""
     model = found.model
     values = {name: found.parameters[part].tolist() for name, part in model.parts.items()}
     bodies = pseudo_inertias(found.parameters[model.parts["body"]])
@@ -41,7 +41,7 @@ def own_dynamics(found: Fit, cutoff: float, recordings: Sequence[str]) -> OwnDyn
 
 
 def _friction(model: LinearModel, values: Mapping[str, list[float]]) -> dict[str, DiscLosses]:
-    """Return the friction of what rubs, by name."""
+    """Return the friction of each rubbing pair, by name."""
     static = values.get("static", [0.0] * len(model.rubbing))
     velocities = (
         [None] * len(model.rubbing) if model.shape.stribeck is None else model.shape.stribeck.tolist()

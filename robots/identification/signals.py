@@ -1,9 +1,9 @@
-"""From measured joint states to what a regression takes: one clock, no noise, accelerations.
+"""Measured joint states prepared for a regression: a common clock, no noise, accelerations.
 
 Positions and efforts are put on a uniform clock by linear interpolation, then passed forward and backward
 through a Butterworth low-pass (no phase shift; Swevers, Verdonck, De Schutter, "Dynamic model identification
 for industrial robots", IEEE Control Systems 27(5), 2007). Velocities and accelerations are central
-differences of the filtered positions, so that all three are of one motion. The regressor passes the same
+differences of the filtered positions, consistent with the positions. The regressor passes the same
 filter as the efforts, as friction changes faster than the cut-off when a joint turns back (Gautier,
 "Dynamic identification of robots with power model", ICRA 1997).
 """
@@ -21,11 +21,11 @@ from schemas.vectors import Vector
 __all__ = ["LEAST_DURATION", "ORDER", "Measured", "Samples", "filtered"]
 
 ORDER = 4
-"""Of the Butterworth low-pass, in each of its two directions."""
+"""Order of the Butterworth low-pass in each direction."""
 LEAST_DURATION = 5.0
-"""s; a shorter recording is refused: it holds no period of an exciting motion."""
+"""Least duration of a recording, s: a period of an exciting motion."""
 _EDGE_PERIODS = 2.0
-"""Periods of the cut-off frequency at both ends that are not used."""
+"""Unused time at both ends, in periods of the cut-off frequency."""
 
 
 class Measured(NamedTuple):
@@ -56,7 +56,7 @@ class Samples(NamedTuple):
 
     @property
     def inner(self) -> slice:
-        """Return which samples are not near an end, where the filter has no neighbours."""
+        """Return the samples away from the ends, where the filter has no neighbours."""
         edge = int(np.ceil(_EDGE_PERIODS / (self.cutoff * float(self.time[1] - self.time[0]))))
         return slice(edge, len(self.time) - edge)
 
@@ -67,10 +67,10 @@ class Samples(NamedTuple):
 
 
 def filtered(measured: Measured, cutoff: float, rate: float) -> Samples:
-    """Return `measured` without what is faster than `cutoff` (Hz), `rate` samples per second (Hz) at most.
+    """Return `measured` below the frequency `cutoff` (Hz), at most `rate` samples per second.
 
-    Raises RecordingError for numbers that are not finite, times that do not increase, and a recording that is
-    too short or too slow for the cut-off.
+    Raises RecordingError for numbers not finite, times not increasing, and a recording too short or too slow
+    for the cut-off.
     """
     _check(measured, cutoff)
     step = float(np.median(np.diff(measured.time)))

@@ -1,7 +1,7 @@
-"""Peg boards and the triangular rings that are carried between posts: numbers with their sources. SI units.
+"""Peg boards and their triangular rings: numbers with sources. SI units.
 
-The frame of a board is in the middle of its top: x to the surgeon's right, y away from the surgeon, z up. The
-frame of a ring is in its middle, z along its axis, y to one corner of the triangle.
+The frame of a board is in the middle of the top: x to the surgeon's right, y away from the surgeon, z up. The
+frame of a ring is in the middle, z along the axis, y to a corner of the triangle.
 
 Sources: SRC26 = surgical-robotics-ai/surgical_robotics_challenge, branch icra2026-challenge (commit 26bb2f6),
 ADF/Phantoms/Pegboards/pegboard_symmetric_with_wall.yaml and the collision mesh of its block; SURROL =
@@ -25,10 +25,10 @@ __all__ = ["BOARDS", "Board", "Ring", "Wall"]
 
 @dataclass(frozen=True)
 class Wall:
-    """An upright slab on a board, which a ring is to be carried over."""
+    """An upright slab on a board, an obstacle for rings."""
 
     centre: tuple[float, float]
-    """Of its foot on the board, m in the board's frame."""
+    """Centre of the slab's foot in the board's frame, m."""
     size: tuple[float, float, float]
     """Along x, y and z of the board, m."""
 
@@ -38,15 +38,15 @@ class Ring:
     """A tube with the outline of an equilateral triangle: a block with a hole."""
 
     inradius: float
-    """From its axis to the inner faces, m: the radius of the widest post that fits."""
+    """Distance from the axis to the inner faces, m: the radius of the widest possible post."""
     thickness: float
-    """Of its three walls, m."""
+    """Thickness of the three walls, m."""
     height: float
-    """Along its axis, m."""
+    """Height along the axis, m."""
     mass: float
     """kg."""
     friction: float
-    """Coulomb's coefficient towards all that it touches."""
+    """Coefficient of Coulomb friction."""
 
     @property
     def side(self) -> float:
@@ -56,7 +56,7 @@ class Ring:
 
 @dataclass(frozen=True)
 class Board:
-    """A board with posts, and which of them rings start on and belong on."""
+    """A board with posts, among them start posts and target posts."""
 
     size: tuple[float, float, float]
     """Along x, y and z, m."""
@@ -67,9 +67,9 @@ class Board:
     post_height: float
     """Over the board's top, m."""
     starts: tuple[int, ...]
-    """Indices of the posts that rings start on, one ring each."""
+    """Indices of the start posts, with one ring each."""
     targets: tuple[int, ...]
-    """Indices of the posts that rings are carried to; any of them will do for any ring."""
+    """Indices of the target posts; any target post is right for any ring."""
     ring: Ring
     wall: Wall | None = None
 
@@ -79,7 +79,7 @@ _RUBBER = 1.2e3
 
 
 def _ring(inradius: float, thickness: float, height: float, friction: float) -> Ring:
-    """Return a ring of rubber, whose mass is that of its walls."""
+    """Return a ring of rubber with the mass of its walls."""
     outer, inner = inradius + thickness, inradius
     area = 3.0 * sqrt(3.0) * (outer**2 - inner**2)
     return Ring(inradius, thickness, height, _RUBBER * area * height, friction)
@@ -101,12 +101,12 @@ _ICRA = Board(
     ring=_ring(inradius=4.1e-3, thickness=0.8e-3, height=15.2e-3, friction=0.5),
     wall=Wall(centre=(-0.1e-3, -10.0e-3), size=(0.004, 0.080, 0.100)),
 )
-"""SRC26: 18 posts at a pitch of 20 mm in x and 30 mm in y, 40 mm to 80 mm from a wall 100 mm high. Its camera
-looks along -y of its world from y = 0.354 m, so the axes of the board are turned by 180 degrees against that
-world. Rules: three rings start on posts of the left side, any; we take the middle column. Any post of the
-right side will do. The ring's outer outline is 16.9 mm wide and 14.7 mm deep. Its mass there, 0.1 kg, would
-be a density of 170 g/cm^3 in those walls; ours are of rubber. Its restitution 0.1 is left out: contacts are
-critically damped (docs/decisions/0053).
+"""SRC26: 18 posts at a pitch of 20 mm in x and 30 mm in y, 40 mm to 80 mm from a wall 100 mm high. The camera
+of SRC26 looks along -y of the world from y = 0.354 m, so the axes of the board are turned by 180 degrees
+against that world. Rules: three rings start on any posts of the left side (here: the middle column), and any
+post of the right side is a target. The ring's outer outline is 16.9 mm wide and 14.7 mm deep. The ring's mass
+in SRC26, 0.1 kg, would mean walls of 170 g/cm^3; our rings are of rubber. The restitution of 0.1 is left out:
+contacts are critically damped (docs/decisions/0053).
 """
 
 _SURROL_POSTS = _posts(
@@ -128,10 +128,10 @@ _SURROL = Board(
     targets=(0, 1, 2, 3, 4, 5),
     ring=_ring(inradius=4.1e-3, thickness=0.8e-3, height=14.5e-3, friction=1.0),
 )
-"""SURROL: 12 pegs of radius 1.5 mm, whose collision shapes have 1.0 mm, 26 mm over a board whose x points to
-the surgeon there and y to the right. Four rings start on four of the six pegs of the left side, drawn anew
-each time; we take those at its edges. The ring, 17 mm wide and 14.7 mm deep, has 10 g there and an inertia of
-1 kg m^2; ours is of rubber.
+"""SURROL: 12 pegs of radius 1.5 mm (collision shapes: 1.0 mm), 26 mm over a board with x to the surgeon and y
+to the right in SURROL. Four rings start on four of the six pegs of the left side, drawn anew each time; we
+take the pegs at the edges. The ring, 17 mm wide and 14.7 mm deep, has 10 g and 1 kg m^2 in SURROL; ours is of
+rubber.
 """
 
 _FLS = Board(
@@ -143,8 +143,8 @@ _FLS = Board(
     targets=(0, 1, 2, 3, 4, 5),
     ring=_ring(inradius=4.5e-3, thickness=0.8e-3, height=15.0e-3, friction=1.0),
 )
-"""FLS: six rings with openings of 4.5 mm radius, pegs 2.25 mm wide. Where the twelve pegs stand, and how high
-ring and pegs are, none of our sources states: as on the board of SURROL, which imitates it.
+"""FLS: six rings with openings of 4.5 mm radius, pegs 2.25 mm wide. Our sources do not state the positions of
+the twelve pegs and the heights of rings and pegs: taken from the board of SURROL, an imitation of FLS.
 """
 
 BOARDS: Mapping[str, Board] = MappingProxyType({"icra2026": _ICRA, "surrol": _SURROL, "fls": _FLS})

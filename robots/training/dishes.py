@@ -1,7 +1,8 @@
-"""The dishes and small pieces of the authors' pick-and-place scene: numbers with their sources. SI units.
+"""Dishes and small pieces of the authors' pick-and-place scene: numbers with sources. SI units.
 
 The scene's frame is on the table, amid the three dishes: x to the surgeon's right, y away from the surgeon, z
-up. The frame of a dish is in the middle of its underside, z up; that of a piece is in its middle.
+up. The frame of a dish is in the middle of the underside, z up; the frame of a piece is in the piece's
+middle.
 
 Source: unina-icaros/dvrk-vrep (commit 88fe597), dVRK-training_pick&place.ttt.
 """
@@ -24,7 +25,7 @@ class Dish:
     inner_radius: float
     """m."""
     height: float
-    """Of the rim over the table, m."""
+    """Height of the rim over the table, m."""
 
 
 @dataclass(frozen=True)
@@ -36,19 +37,19 @@ class Piece:
     mass: float
     """kg."""
     friction: float
-    """Coulomb's coefficient towards all that it touches."""
+    """Coefficient of Coulomb friction."""
 
 
 DISH = Dish(outer_radius=29.85e-3, inner_radius=28.8e-3, height=21.9e-3)
-"""Cylinder, Cylinder0 and Cylinder1: 59.7 mm wide, inner radius 28.8 mm, 21.9 mm high. They weigh 1 kg each
-there; here they stand fast and have no floor, so that what is in them lies on the table.
+"""Cylinder, Cylinder0 and Cylinder1: 59.7 mm wide, inner radius 28.8 mm, 21.9 mm high, 1 kg each. Here dishes
+are fixed and have no floor: pieces inside lie on the table.
 """
 
 DISHES: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"left": (-0.054, -0.013), "middle": (0.0, 0.026), "right": (0.054, -0.013)}
 )
 """x and y (m) of each dish in the scene's frame: Cylinder at (-1.458, -0.051), Cylinder0 at (-1.419, 0.003)
-and Cylinder1 at (-1.457, 0.057) on the authors' table, whose y is taken for our x.
+and Cylinder1 at (-1.457, 0.057) on the authors' table; the table's y is our x.
 """
 
 PIECE = Piece(size=(9.0e-3, 14.0e-3, 20.5e-3), mass=0.289e-3, friction=1.0)

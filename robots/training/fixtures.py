@@ -1,4 +1,4 @@
-"""The fixed things of a training scene as a scenario states them: which one, and where it is."""
+"""Fixtures of a training scene as stated in a scenario: kind and pose."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class _Fixture(BaseModel):
 
     @property
     def pose(self) -> Vector:
-        """Its frame in the world, shape (4, 4), m."""
+        """Pose of the fixture in the world, shape (4, 4), m."""
         pose = np.eye(4)
         pose[:3, :3] = rotation.matrix(np.array(self.orientation))
         pose[:3, 3] = self.position
@@ -38,28 +38,27 @@ class _Fixture(BaseModel):
 
 
 class BoardParams(_Fixture):
-    """A board with posts; its frame is in the middle of its top, x to the surgeon's right, z up."""
+    """A board with posts; the frame is in the middle of the top, x to the surgeon's right, z up."""
 
     kind: Literal["board"]
     board: BoardName
 
     @property
     def measures(self) -> Board:
-        """Its posts, wall and rings."""
+        """Posts, wall and rings of the board."""
         return BOARDS[self.board]
 
 
 class DishParams(_Fixture):
-    """A round dish with an upright rim; its frame is in the middle of its underside, z up."""
+    """A round dish with an upright rim; the frame is in the middle of the underside, z up."""
 
     kind: Literal["dish"]
 
 
 class PhantomParams(_Fixture):
-    """A pad to be sutured; its frame is in the middle of its skin, x to the surgeon's right, z up.
+    """A pad to be sutured; the frame is in the middle of the skin, x to the surgeon's right, z up.
 
-    What stands in the scene is the base under the skin; the skin itself is a participant of kind
-    `suture-pad`.
+    The fixture is the base under the skin; the skin itself is a participant of kind `suture-pad`.
     """
 
     kind: Literal["phantom"]
@@ -67,12 +66,12 @@ class PhantomParams(_Fixture):
 
     @property
     def measures(self) -> Phantom:
-        """Its skin, base and holes."""
+        """Skin, base and holes of the phantom."""
         return PHANTOMS[self.phantom]
 
 
 class DiscBoxParams(_Fixture):
-    """A red box with four white discs (`robots.training.targets`); its frame is amid the discs, z up."""
+    """A red box with four white discs (`robots.training.targets`); the frame is amid the discs, z up."""
 
     kind: Literal["disc-box"]
 
@@ -80,4 +79,4 @@ class DiscBoxParams(_Fixture):
 FixtureParams = Annotated[
     BoardParams | DishParams | PhantomParams | DiscBoxParams, Field(discriminator="kind")
 ]
-"""One thing that stands fast."""
+"""Parameters of a fixture."""

@@ -1,4 +1,4 @@
-"""The needle of a scene as participants that are not the engine read it: which wire it is."""
+"""The needle of a scene for participants beside the engine: the shape of the wire."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["NeedleObject", "needles_of"]
 
 
 class NeedleObject(BaseModel):
-    """What makes the wire, of an object of kind `needle`; everything else is the engine's."""
+    """Wire of an object of kind `needle`; other parameters belong to the engine."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
@@ -27,7 +27,7 @@ class NeedleObject(BaseModel):
 
     @property
     def shape(self) -> NeedleShape:
-        """Its wire."""
+        """Shape of the wire."""
         named = NEEDLES[self.needle]
         return NeedleShape(
             radius=self.radius or named.radius,

@@ -1,8 +1,8 @@
-"""Suturing needles: a round wire bent to an arc, with the frames that scenes and rules name. SI units.
+"""Suturing needles: a round wire bent to an arc, with the frames of scenes and rules. SI units.
 
-The frame of a needle is in the centre of its arc, z normal to its plane, x to the middle of the wire, so that
-the wire is at the angles from -arc/2 (the base, where the thread is swaged) to +arc/2 (the tip): a positive
-turn about z drives it on. This is the frame of objects of kind `needle`.
+The frame of a needle is in the centre of the arc, z normal to the plane of the arc, x to the middle of the
+wire. The wire is at the angles from -arc/2 (the base with the thread) to +arc/2 (the tip): a positive
+rotation about z drives the needle forward. This is the frame of objects of kind `needle`.
 
 Sources: VREP = unina-icaros/dvrk-vrep (commit 88fe597), dVRK-suturing.ttt; SRC =
 surgical-robotics-ai/surgical_robotics_challenge, scripts/surgical_robotics_challenge/utils/
@@ -32,11 +32,11 @@ class NeedleShape:
     """A round wire bent to an arc of a circle."""
 
     radius: float
-    """Of the centre line, m."""
+    """Radius of the centre line, m."""
     arc: float
-    """From base to tip, rad."""
+    """Angle from base to tip, rad."""
     wire_radius: float
-    """Of the cross-section, m."""
+    """Radius of the cross-section, m."""
     middle: float = 0.0
     """Angle of the frame `mid` in the needle's frame, rad; 0 is half way along the wire."""
 
@@ -61,7 +61,7 @@ class NeedleShape:
 
     @property
     def bonded(self) -> Vector:
-        """The points that a bond pushes on: base, half way and tip, m in the needle's frame, shape (3, 3)."""
+        """Points of a bond: base, half way and tip, m in the needle's frame, shape (3, 3)."""
         return self.points(np.array([-self.arc / 2.0, 0.0, self.arc / 2.0]))
 
     @property
@@ -78,20 +78,20 @@ def _frame(radius: float, angle: float) -> Vector:
 
 
 _SH = NeedleShape(radius=26e-3 / pi, arc=pi, wire_radius=0.4e-3)
-"""A half circle with 26 mm of wire, hence a radius of 8.28 mm: the maker's length of a needle called SH,
-which the authors' paper names. Assumed: the wire, which is that of `sh-plus`. A catalogue of comparable
-needles (itemscatalogue.redcross.int) has 25.9 mm.
+"""A half circle with 26 mm of wire, hence a radius of 8.28 mm: the maker's length of a needle SH, as named in
+the authors' paper. Assumed: the wire's radius, taken from `sh-plus`. A catalogue of comparable needles
+(itemscatalogue.redcross.int) has 25.9 mm.
 """
 
 _SH_PLUS = NeedleShape(radius=11.44e-3, arc=radians(180.9), wire_radius=0.4e-3)
-"""VREP: as it is in the authors' scene, 38 % longer than the one they name."""
+"""VREP: needle of the authors' scene, 38 % longer than the needle named in the paper."""
 
 _SRC_BASE, _SRC_MID, _SRC_TIP = (-9.513e-3, 1.026e-3), (-4.099e-3, 8.965e-3), (6.618e-3, 6.973e-3)
-"""SRC: frames of the needle in that of its mesh, m; the tip is on the right there."""
+"""SRC: frames of the needle in the frame of the mesh, m; the tip is on the right in SRC."""
 
 
 def _through(base: tuple[float, float], mid: tuple[float, float], tip: tuple[float, float]) -> NeedleShape:
-    """Return the needle through three points of its plane, m."""
+    """Return the needle through three points of a plane, m."""
     a, b, c = (np.array(point) for point in (base, mid, tip))
     # the centre is as far from b and c as from a
     centre = np.linalg.solve(2.0 * np.array([b - a, c - a]), np.array([b @ b - a @ a, c @ c - a @ a]))
@@ -106,12 +106,12 @@ def _through(base: tuple[float, float], mid: tuple[float, float], tip: tuple[flo
 
 
 _SRC = _through(_SRC_BASE, _SRC_MID, _SRC_TIP)
-"""SRC: radius 9.39 mm, 132.5 degrees from base to tip; its mesh is 1.0 mm thick. Its mass there, 0.5 kg,
-would be a density of 29 kg/cm^3; ours is of steel, as all needles are.
+"""SRC: radius 9.39 mm, 132.5 degrees from base to tip, mesh 1.0 mm thick. The mass in SRC, 0.5 kg, would mean
+a density of 29 kg/cm^3; our needles are of steel.
 """
 
 NEEDLES: Mapping[NeedleName, NeedleShape] = MappingProxyType({"sh": _SH, "sh-plus": _SH_PLUS, "src": _SRC})
 """The needles by name."""
 
 DEFAULT: NeedleName = "sh-plus"
-"""The one that a scene has unless it names another."""
+"""Needle of a scene by default."""

@@ -1,13 +1,13 @@
-"""Phantoms for suturing: the pad, where a needle goes in and where it comes out. Numbers with sources; SI.
+"""Phantoms for suturing: the pad, and entries and exits of the needle. Numbers with sources; SI.
 
-The frame of a phantom is in the middle of its skin, x to the surgeon's right, y away from the surgeon, z out
-of the tissue. The frame of a hole has z out of the tissue too, along the needle: against its way where it
-goes in, along it where it comes out. Stitches go from right to left, as a right hand makes them.
+The frame of a phantom is in the middle of the skin, x to the surgeon's right, y away from the surgeon, z out
+of the tissue. The frame of a hole has z out of the tissue too, along the needle: against the needle's motion
+at an entry, along the motion at an exit. Stitches go from right to left, for a right hand.
 
 Sources: VREP = unina-icaros/dvrk-vrep (commit 88fe597), dVRK-suturing.ttt; SRC =
-surgical-robotics-ai/surgical_robotics_challenge, ADF/Phantoms/*/phantom.yaml, bodies Entry1 to Exit4. There
-the surgeon's right is -x: they are turned by half a turn. Our skins are level; those holes are at most 1.0 mm
-above or below.
+surgical-robotics-ai/surgical_robotics_challenge, ADF/Phantoms/*/phantom.yaml, bodies Entry1 to Exit4. The
+surgeon's right is -x in SRC: the holes are rotated by half a turn. Our skins are level; holes of SRC are at
+most 1.0 mm above or below.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ PhantomName = Literal["branch-top", "src-3d-med", "src-straight", "src-simple"]
 
 @dataclass(frozen=True)
 class Phantom:
-    """A level pad of soft material on a base, and its pairs of holes."""
+    """A level pad of soft material on a base, with pairs of holes."""
 
     skin: tuple[float, float, float]
-    """Of the soft part, along x, y and z, m."""
+    """Size of the soft part along x, y and z, m."""
     base: float
-    """Height of the hard base under it, m."""
+    """Height of the hard base under the skin, m."""
     entries: Vector
     """Frames of the holes where the needle goes in, shape (n, 4, 4), in the phantom's frame."""
     exits: Vector
-    """Frames of the holes where it comes out, shape (n, 4, 4)."""
+    """Frames of the needle's exits, shape (n, 4, 4)."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -54,7 +54,7 @@ class Phantom:
 
 
 _Row = tuple[float, float, float, float, float]
-"""x, y, z in mm, and the angles by which z of the frame is turned about y and then about z, rad."""
+"""x, y, z in mm, and the rotation of the frame's z about y and then about z, rad."""
 
 
 def _frames(rows: Sequence[_Row]) -> Vector:
@@ -69,7 +69,7 @@ def _frames(rows: Sequence[_Row]) -> Vector:
 def _src(
     skin: tuple[float, float, float], base: float, entries: Sequence[_Row], exits: Sequence[_Row]
 ) -> Phantom:
-    """Return a phantom from frames in a world whose -x is the surgeon's right: about the middle of them."""
+    """Return a phantom from frames in a world with the surgeon's right at -x, centred on the frames."""
     holes = _frames([*entries, *exits])
     holes[:, :3, 3] -= holes[:, :3, 3].mean(axis=0)
     turn = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -94,7 +94,7 @@ _3D_MED = _src(
         (32.978, 236.962, 742.690, 0.94571, 0.26578),
     ),
 )
-"""SRC, 3D_MED. Its outline is a mesh; the size of our pad is assumed, wide enough for all stitches."""
+"""SRC, 3D_MED. The outline in SRC is a mesh; the size of our pad is assumed, wide enough for all stitches."""
 
 _STRAIGHT = _src(
     (0.075, 0.075, 0.012),
@@ -112,8 +112,8 @@ _STRAIGHT = _src(
         (28.844, 201.308, 746.233, 1.22631, 0.08223),
     ),
 )
-"""SRC, 3D_MED_STRAIGHT; its exits 2 and 3 are also turned about x, by 3 and 4 degrees, which is left out. The
-size of our pad is assumed.
+"""SRC, 3D_MED_STRAIGHT. Left out: a rotation of exits 2 and 3 about x by 3 and 4 degrees. The size of our pad
+is assumed.
 """
 
 _SIMPLE = _src(
@@ -132,12 +132,14 @@ _SIMPLE = _src(
         (34.78, 127.03, 717.99, 0.80535, 0.0),
     ),
 )
-"""SRC, Simple: 79.7 x 173 x 39.3 mm, of which the upper 12 mm are soft here (assumed)."""
+"""SRC, Simple: 79.7 x 173 x 39.3 mm; the upper 12 mm are soft here (assumed)."""
 
 _BITE, _APART = 16.0, 12.0
-"""Of the stitches on the authors' pad: 8 mm either side of the wound and 12 mm apart, mm (assumed)."""
+"""Width and pitch of the stitches on the authors' pad, mm: 8 mm either side of the wound, 12 mm apart
+(assumed).
+"""
 _UPRIGHT = pi / 2.0 - asin(_BITE / 2.0 / 11.44)
-"""Angle of a needle of 11.44 mm against the normal where it makes such a bite, rad."""
+"""Angle between a needle of 11.44 mm and the normal at the entry of a bite of 16 mm, rad."""
 
 
 def _branch_top() -> Phantom:
@@ -150,7 +152,7 @@ def _branch_top() -> Phantom:
 
 
 _BRANCH_TOP = _branch_top()
-"""VREP: skin 160 x 119.5 x 23.7 mm on a base 31.6 mm high. Its scene states no stitches; ours are assumed."""
+"""VREP: skin 160 x 119.5 x 23.7 mm on a base 31.6 mm high. The scene has no stitches; ours are assumed."""
 
 PHANTOMS: Mapping[PhantomName, Phantom] = MappingProxyType(
     {"branch-top": _BRANCH_TOP, "src-3d-med": _3D_MED, "src-straight": _STRAIGHT, "src-simple": _SIMPLE}

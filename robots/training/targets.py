@@ -1,6 +1,6 @@
 """The target of the authors' visual servoing: four white discs on a red box. Numbers with their sources, SI.
 
-Its frame is in the middle of the discs' plane, x along the longer side of the box, z up.
+The frame is in the middle of the discs' plane, x along the longer side of the box, z up.
 
 Source: unina-icaros/dvrk-vrep (commit 88fe597), dVRK-visualservoing.ttt; order of the points and their wanted
 features from its V-REP_catkin_ws/src (commit 65ef3cc), node tracker_blobs_ibvs_real.
@@ -13,11 +13,11 @@ __all__ = ["BOX", "DISCS", "DISC_HEIGHT", "DISC_RADIUS", "GOAL", "Corners"]
 BOX = (0.140, 0.100, 0.040)
 """Along x, y and z, m."""
 DISC_RADIUS, DISC_HEIGHT = 12.5e-3, 0.6e-3
-"""m; the height is that of the discs over the box."""
+"""Radius of the discs, and height of the discs over the box, m."""
 
 
 Corners = tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
-"""Of the quadrangle that the discs make: x and y of each, in their order along its outline."""
+"""Corners of the quadrangle of the discs: x and y, in order along the outline."""
 
 DISCS: Corners = ((-0.03, -0.02), (-0.03, 0.02), (0.03, 0.02), (0.03, -0.02))
 """Centres of the discs, m."""

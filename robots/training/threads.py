@@ -1,4 +1,4 @@
-"""The thread behind a suturing needle as a scene states it: an elastic rod of equal segments. SI units."""
+"""The thread of a suturing needle in a scene: an elastic rod of equal segments. SI units."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from schemas.quantity import Density, Length, Pressure, Speed
 __all__ = ["THREAD", "ThreadParams"]
 
 THREAD = "thread"
-"""The soft body as which it is drawn: `<this>/nodes`."""
+"""Name of the soft body for drawing the thread: `<name>/nodes`."""
 _GRAVITY = 9.81
 """m/s^2."""
 
 
 class ThreadParams(BaseModel):
-    """A thread that is swaged into the base of a needle, and straight behind it at time 0."""
+    """A thread swaged into the base of a needle, straight behind the needle at time 0."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -54,6 +54,6 @@ class ThreadParams(BaseModel):
 
     @property
     def relaxation(self) -> float:
-        """Bending stiffness over drag, m^4/s: E I / c, where the drag c makes its weight sink so fast."""
+        """Bending stiffness over drag, m^4/s: E I / c, with the drag c for the stated speed of sinking."""
         drag = self.density * pi * self.radius**2 * _GRAVITY / self.sinking
         return self.young * pi * self.radius**4 / 4.0 / drag
