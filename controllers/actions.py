@@ -17,7 +17,19 @@ from pydantic import Field, model_validator
 
 from controllers.motion.frames import base_in_world, pose
 from controllers.motion.params import Arms, MotionParams, PsmParams, SetupJoints
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, integer, number
+from hub.participant import (
+    Controller,
+    Inputs,
+    Outputs,
+    Params,
+    Record,
+    Setup,
+    array,
+    integer,
+    number,
+    signal_in,
+    signal_out,
+)
 from robots import rotation
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import Mounting
@@ -170,12 +182,11 @@ class Actions(Controller):
     def ports(self) -> tuple[Port, ...]:
         """The action in; goals of joints, jaw and tip, and the number of goals out of reach, out."""
         count = _NUMBERS * len(self._hands)
-        action = Port(
-            name="action",
-            causality="input",
+        action = signal_in(
+            "action",
+            description="of each hand x, y, z, turn and jaw, from -1 to 1",
             size=count,
             start=(0.0,) * count,
-            description="of each hand x, y, z, turn and jaw, from -1 to 1",
         )
         return (action, *(port for hand in self._hands for port in _ports(hand)))
 
@@ -210,13 +221,8 @@ def _ports(hand: _Hand) -> tuple[Port, ...]:
     names = tuple(joint.name for joint in hand.chain.joints)
     joints, goal, refused = f"{hand.arm}/servo_jp", f"{hand.arm}/goal_cp", f"{hand.arm}/refused"
     return (
-        Port(name=joints, causality="output", type=JointState.ros_type, names=names),
-        Port(name=f"{hand.arm}/jaw/servo_jp", causality="output", type=JointState.ros_type, names=("jaw",)),
-        Port(name=goal, causality="output", type=PoseStamped.ros_type, frame="world"),
-        Port(
-            name=refused,
-            causality="output",
-            type=Float64Message.ros_type,
-            description="goals out of reach, which were not taken",
-        ),
+        signal_out(joints, JointState, names=names),
+        signal_out(f"{hand.arm}/jaw/servo_jp", JointState, names=("jaw",)),
+        signal_out(goal, PoseStamped, frame="world"),
+        signal_out(refused, Float64Message, "goals out of reach, which were not taken"),
     )

@@ -10,8 +10,21 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from pydantic import Field
 
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, flag, number
-from robots.dvrk import crtk
+from controllers.ports import measured_joints
+from hub.participant import (
+    Controller,
+    Inputs,
+    Outputs,
+    Params,
+    Record,
+    Setup,
+    array,
+    event_out,
+    flag,
+    number,
+    signal_in,
+    signal_out,
+)
 from robots.dvrk.musha import HAND
 from robots.dvrk.parameters import ArmName
 from schemas.errors import SessionError, StateError
@@ -81,64 +94,21 @@ class Caliper(Controller):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Hand and tissue in; the command to the fingers and the widths out."""
-        state, scalar = JointState.ros_type, Float64Message.ros_type
+        scalar, size = Float64Message, 3 * _SPHERES
         motors, bones = tuple(joint.name for joint in HAND.joints), tuple(link.name for link in HAND.links)
+        at, force = "of the hand's contact spheres", "on the hand's contact spheres"
+        width = "between the fingertips' surfaces when both have touched; 0 before"
+        true_width = "of the mesh at rest along the line through both fingertips"
         return (
-            Port(name="start", causality="input", type=scalar, start=(0.0,), description="1: measure"),
-            Port(
-                name="hand",
-                causality="input",
-                type=state,
-                names=motors,
-                fields=crtk.MEASURED,
-                description="its measured_js",
-            ),
-            Port(
-                name="phalanges",
-                causality="input",
-                type=state,
-                names=bones,
-                fields=crtk.MEASURED,
-                description="their measured_js",
-            ),
-            Port(
-                name="position",
-                causality="input",
-                size=3 * _SPHERES,
-                unit="m",
-                frame="world",
-                description="of the hand's contact spheres",
-            ),
-            Port(
-                name="force",
-                causality="input",
-                size=3 * _SPHERES,
-                unit="N",
-                frame="world",
-                description="on the hand's contact spheres",
-            ),
-            Port(
-                name="nodes",
-                causality="input",
-                type=SoftBodyState.ros_type,
-                frame="world",
-                description="of the organ",
-            ),
-            Port(name=self._command, causality="output", type=state, variability="event"),
-            Port(
-                name="width",
-                causality="output",
-                type=scalar,
-                unit="m",
-                description="between the fingertips' surfaces when both have touched; 0 before",
-            ),
-            Port(
-                name="true_width",
-                causality="output",
-                type=scalar,
-                unit="m",
-                description="of the mesh at rest along the line through both fingertips",
-            ),
+            signal_in("start", scalar, "1: measure", start=(0.0,)),
+            measured_joints("hand", motors, "its measured_js"),
+            measured_joints("phalanges", bones, "their measured_js"),
+            signal_in("position", description=at, size=size, unit="m", frame="world"),
+            signal_in("force", description=force, size=size, unit="N", frame="world"),
+            signal_in("nodes", SoftBodyState, "of the organ", frame="world"),
+            event_out(self._command, JointState),
+            signal_out("width", scalar, width, unit="m"),
+            signal_out("true_width", scalar, true_width, unit="m"),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002

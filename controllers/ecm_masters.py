@@ -19,7 +19,22 @@ from typing import ClassVar, cast
 import numpy as np
 from pydantic import Field
 
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, Value, array, flag
+from controllers.ports import NO_TWIST, measured_joints
+from hub.participant import (
+    Controller,
+    Inputs,
+    Outputs,
+    Params,
+    Record,
+    Setup,
+    Value,
+    array,
+    event_in,
+    event_out,
+    flag,
+    signal_in,
+    signal_out,
+)
 from robots import rotation
 from robots.dvrk import crtk, ecm
 from schemas.crtk import OperatingState
@@ -112,65 +127,23 @@ class EcmMasters(Controller):
     @property
     def ports(self) -> tuple[Port, ...]:
         """The masters, the pedal and the endoscope's setpoint in; commands to it and to the masters out."""
-        age, pose, twist = self.params.max_age, PoseStamped.ros_type, TwistStamped.ros_type
-        still, joints = ecm.HOME + (0.0,) * 8, JointState.ros_type
+        age = self.params.max_age
         return (
+            *(signal_in(f"{master}/measured_cp", PoseStamped, max_age_ns=age) for master in _MASTERS),
+            *(signal_in(f"{master}/measured_cv", TwistStamped, start=NO_TWIST) for master in _MASTERS),
+            event_in("buttons", Joy, "button 0: follows while it is held"),
+            measured_joints(
+                "measured_js", ecm.JOINT_NAMES, "setpoint_js of a motion controller", start=ecm.HOME
+            ),
+            event_in("operating_state", OperatingState, "of the ECM"),
+            event_out("ECM/servo_jp", JointState, "while it follows"),
             *(
-                Port(name=f"{master}/measured_cp", causality="input", type=pose, max_age_ns=age)
-                for master in _MASTERS
-            ),
-            *(
-                Port(name=f"{master}/measured_cv", causality="input", type=twist, start=(0.0,) * 6)
-                for master in _MASTERS
-            ),
-            Port(
-                name="buttons",
-                causality="input",
-                type=Joy.ros_type,
-                variability="event",
-                description="button 0: follows while it is held",
-            ),
-            Port(
-                name="measured_js",
-                causality="input",
-                type=joints,
-                names=ecm.JOINT_NAMES,
-                fields=crtk.MEASURED,
-                start=still,
-                description="setpoint_js of a motion controller",
-            ),
-            Port(
-                name="operating_state",
-                causality="input",
-                type=OperatingState.ros_type,
-                variability="event",
-                description="of the ECM",
-            ),
-            Port(
-                name="ECM/servo_jp",
-                causality="output",
-                type=joints,
-                variability="event",
-                description="while it follows",
-            ),
-            *(
-                Port(name=f"{master}/{name}", causality="output", type=type_, variability="event")
+                event_out(f"{master}/{name}", type_)
                 for master in _MASTERS
                 for name, type_ in _COMMANDS.items()
             ),
-            Port(
-                name="following",
-                causality="output",
-                type=BoolMessage.ros_type,
-                description="whether the endoscope follows",
-            ),
-            Port(
-                name="warning",
-                causality="output",
-                type=StringMessage.ros_type,
-                variability="event",
-                description="why it does not",
-            ),
+            signal_out("following", BoolMessage, "whether the endoscope follows"),
+            event_out("warning", StringMessage, "why it does not"),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002

@@ -24,6 +24,7 @@ from typing import ClassVar, Literal, Self, cast
 import numpy as np
 from pydantic import Field, model_validator
 
+from controllers.ports import measured_joints
 from hub.participant import (
     Controller,
     Inputs,
@@ -33,8 +34,12 @@ from hub.participant import (
     Setup,
     array,
     choice,
+    event_in,
+    event_out,
     flag,
     number,
+    signal_in,
+    signal_out,
 )
 from robots import rotation
 from robots.dvrk import crtk, ecm
@@ -188,89 +193,20 @@ class EcmTeleoperation(Controller):
     def ports(self) -> tuple[Port, ...]:
         """The head, mode, scale and the arm's state in; the command to its servos out."""
         p, names = self.params, ecm.JOINT_NAMES
-        at_rest = p.start + (0.0,) * (2 * _JOINTS)
+        scale, moves = "motion of the camera over that of the head", "with which the command moves"
         read = "read at the start and whenever the arm becomes ready"
         return (
-            Port(
-                name="pose",
-                causality="input",
-                type=PoseStamped.ros_type,
-                max_age_ns=p.max_age,
-                description="pose of the head: x ahead, y left, z up",
-            ),
-            Port(
-                name="twist",
-                causality="input",
-                type=TwistStamped.ros_type,
-                max_age_ns=p.max_age,
-                description="of the head, in the frame of its pose",
-            ),
-            Port(
-                name="mode",
-                causality="input",
-                type=StringMessage.ros_type,
-                variability="event",
-                description=" or ".join(_MODES),
-            ),
-            Port(
-                name="buttons",
-                causality="input",
-                type=Joy.ros_type,
-                variability="event",
-                description="mode and dead-man, as the parameters say",
-            ),
-            Port(
-                name="scale",
-                causality="input",
-                type=Float64Message.ros_type,
-                start=(p.scale,),
-                description="motion of the camera over that of the head",
-            ),
-            Port(
-                name="operating_state",
-                causality="input",
-                type=OperatingState.ros_type,
-                variability="event",
-                description="of the ECM; unconnected: ready",
-            ),
-            Port(
-                name="measured_js",
-                causality="input",
-                type=JointState.ros_type,
-                names=names,
-                fields=crtk.MEASURED,
-                start=at_rest,
-                description=read,
-            ),
-            Port(
-                name="servo_jp",
-                causality="output",
-                type=JointState.ros_type,
-                names=names,
-                description="command to the ECM's joint servos",
-            ),
-            Port(
-                name="joint_velocity",
-                causality="output",
-                type=JointState.ros_type,
-                names=names,
-                fields=("velocity",),
-                description="with which the command moves",
-            ),
-            Port(
-                name="active_mode",
-                causality="output",
-                type=StringMessage.ros_type,
-                variability="event",
-                description="whenever it changes",
-            ),
-            Port(
-                name="warning",
-                causality="output",
-                type=StringMessage.ros_type,
-                variability="event",
-                description="a command that is refused",
-            ),
+            signal_in("pose", PoseStamped, "pose of the head: x ahead, y left, z up", max_age_ns=p.max_age),
+            signal_in("twist", TwistStamped, "of the head, in the frame of its pose", max_age_ns=p.max_age),
+            event_in("mode", StringMessage, " or ".join(_MODES)),
+            event_in("buttons", Joy, "mode and dead-man, as the parameters say"),
+            signal_in("scale", Float64Message, scale, start=(p.scale,)),
+            event_in("operating_state", OperatingState, "of the ECM; unconnected: ready"),
+            measured_joints("measured_js", names, read, start=p.start),
+            signal_out("servo_jp", JointState, "command to the ECM's joint servos", names=names),
+            signal_out("joint_velocity", JointState, moves, names=names, fields=("velocity",)),
+            event_out("active_mode", StringMessage, "whenever it changes"),
+            event_out("warning", StringMessage, "a command that is refused"),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002

@@ -22,7 +22,21 @@ import numpy as np
 from pydantic import Field
 
 from controllers.motion.params import Arms, EcmParams, PsmParams
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, Value, array, flag, number
+from controllers.ports import measured_joints
+from hub.participant import (
+    Controller,
+    Inputs,
+    Outputs,
+    Params,
+    Record,
+    Setup,
+    Value,
+    array,
+    event_in,
+    event_out,
+    flag,
+    number,
+)
 from robots.dvrk import crtk
 from schemas.crtk import OperatingState
 from schemas.ports import Port
@@ -116,86 +130,29 @@ class _Arm:
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        name, names = self._name, tuple(joint.name for joint in self._chain.joints)
-        still = (0.0,) * (3 * len(names))
-        real = {
-            "causality": "input",
-            "type": JointState.ros_type,
-            "fields": crtk.MEASURED,
-            "max_age_ns": self._max_age_ns,
-        }
-        command = {"causality": "output", "type": JointState.ros_type, "variability": "event"}
-        rows = [
-            {
-                "name": f"real/{name}/measured_js",
-                "names": names,
-                "start": still,
-                "description": "of the real arm",
-            }
-            | real,
-            {
-                "name": f"{name}/measured_js",
-                "names": names,
-                "start": still,
-                "causality": "input",
-                "type": JointState.ros_type,
-                "fields": crtk.MEASURED,
-            },
-            {
-                "name": f"{name}/operating_state",
-                "causality": "input",
-                "type": OperatingState.ros_type,
-                "variability": "event",
-            },
-            {
-                "name": f"{name}/servo_jp",
-                "description": "positions and velocities of each sample of the real arm",
-            }
-            | command,
-            {
-                "name": f"{name}/hold",
-                "causality": "output",
-                "type": EmptyMessage.ros_type,
-                "variability": "event",
-                "description": "when the real arm is silent",
-            },
-            {
-                "name": f"{name}/warning",
-                "causality": "output",
-                "type": StringMessage.ros_type,
-                "variability": "event",
-                "description": "why the arm holds",
-            },
-            {
-                "name": f"{name}/distance",
-                "causality": "output",
-                "type": Float64Message.ros_type,
-                "variability": "event",
-                "unit": "m",
-                "description": "between the tips, at every step at which the simulated arm follows",
-            },
-            {
-                "name": f"{name}/lag",
-                "causality": "output",
-                "type": Float64Message.ros_type,
-                "variability": "event",
-                "unit": "s",
-                "description": "by which the simulated arm is behind, at every step at which both move",
-            },
-        ]
-        if self._jaw:
-            start = (0.0, 0.0, 0.0)
-            rows.append(
-                {
-                    "name": f"real/{name}/jaw/measured_js",
-                    "names": ("jaw",),
-                    "start": start,
-                    "description": "of the real jaw",
-                }
-                | real
-            )
-            rows.append({"name": f"{name}/jaw/servo_jp"} | command)
-        return tuple(Port.model_validate(row) for row in rows)
+        name, names, age = self._name, tuple(joint.name for joint in self._chain.joints), self._max_age_ns
+        command = "positions and velocities of each sample of the real arm"
+        distance = "between the tips, at every step at which the simulated arm follows"
+        lag = "by which the simulated arm is behind, at every step at which both move"
+        jaw = f"real/{name}/jaw/measured_js"
+        return (
+            measured_joints(f"real/{name}/measured_js", names, "of the real arm", start=(), max_age_ns=age),
+            measured_joints(f"{name}/measured_js", names, start=()),
+            event_in(f"{name}/operating_state", OperatingState),
+            event_out(f"{name}/servo_jp", JointState, command),
+            event_out(f"{name}/hold", EmptyMessage, "when the real arm is silent"),
+            event_out(f"{name}/warning", StringMessage, "why the arm holds"),
+            event_out(f"{name}/distance", Float64Message, distance, unit="m"),
+            event_out(f"{name}/lag", Float64Message, lag, unit="s"),
+            *(
+                (
+                    measured_joints(jaw, ("jaw",), "of the real jaw", start=(), max_age_ns=age),
+                    event_out(f"{name}/jaw/servo_jp", JointState),
+                )
+                if self._jaw
+                else ()
+            ),
+        )
 
     def step(self, t: int, h: int, inputs: Inputs) -> dict[str, Value]:
         """Command the simulated arm to the newest sample, and compare the two."""

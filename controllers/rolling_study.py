@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hub.participant import Controller, Inputs, Outputs, Params, Setup
+from hub.participant import Controller, Inputs, Outputs, Params, Setup, signal_out
 from robots.dvrk.stitch_study import study
 from schemas.ports import Port
 from schemas.ros import Float64Message
@@ -34,10 +34,7 @@ class RollingStudy(Controller):
     @property
     def ports(self) -> tuple[Port, ...]:
         """The shares."""
-        return tuple(
-            Port(name=name, causality="output", type=Float64Message.ros_type, description=meaning)
-            for name, meaning in _MEANINGS.items()
-        )
+        return tuple(signal_out(name, Float64Message, meaning) for name, meaning in _MEANINGS.items())
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Make the study."""

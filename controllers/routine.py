@@ -13,7 +13,20 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field
 
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, flag, integer
+from hub.participant import (
+    Controller,
+    Inputs,
+    Outputs,
+    Params,
+    Record,
+    Setup,
+    array,
+    event_in,
+    event_out,
+    flag,
+    integer,
+    signal_out,
+)
 from robots.dvrk.musha import HAND
 from robots.dvrk.parameters import UnitQuaternion
 from robots.dvrk.setup_joints import CartArm
@@ -190,27 +203,10 @@ class Routine(Controller):
             ("warning", StringMessage.ros_type),
         )
         return (
-            *(
-                Port(name=f"{arm}/{name}", causality="input", type=type_, variability="event")
-                for arm in self._arms
-                for name, type_ in events
-            ),
-            *(
-                Port(name=name, causality="output", type=types[name], variability="event")
-                for name in self._commands
-            ),
-            Port(
-                name="step",
-                causality="output",
-                type=Float64Message.ros_type,
-                description="number of the present step, from 0",
-            ),
-            Port(
-                name="done",
-                causality="output",
-                type=Float64Message.ros_type,
-                description="1 when all steps are done",
-            ),
+            *(event_in(f"{arm}/{name}", type_) for arm in self._arms for name, type_ in events),
+            *(event_out(name, types[name]) for name in self._commands),
+            signal_out("step", Float64Message, "number of the present step, from 0"),
+            signal_out("done", Float64Message, "1 when all steps are done"),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, integer
+from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, integer, signal_out
 from robots import rotation
 from schemas.ports import Port
 from schemas.quantity import Duration, Length
@@ -63,7 +63,7 @@ class SwayingPhantom(Controller):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Its surface."""
-        return (Port(name="nodes", causality="output", type=SoftBodyState.ros_type, frame="world"),)
+        return (signal_out("nodes", SoftBodyState, frame="world"),)
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Start where it is at time 0, with the triangles of its surface."""

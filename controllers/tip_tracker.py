@@ -13,12 +13,13 @@ from pydantic import Field, model_validator
 
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import Arms, EcmParams, MotionParams, SetupJoints
-from hub.participant import Controller, Inputs, Outputs, Params, Setup
+from controllers.ports import measured_joints
+from hub.participant import Controller, Inputs, Outputs, Params, Setup, event_out, signal_in
 from robots.dvrk import crtk, ecm, endoscope
 from robots.dvrk.crtk import Mounting
 from robots.dvrk.endoscope import FAR, NEAR, StereoCamera
 from schemas.ports import Port
-from schemas.ros import Header, JointState, Point, Pose, PoseStamped, PoseWithCovariance, Time
+from schemas.ros import Header, Point, Pose, PoseStamped, PoseWithCovariance, Time
 from schemas.ros import PoseWithCovarianceStamped as Seen
 from schemas.vectors import Vector
 
@@ -71,37 +72,17 @@ class TipTracker(Controller):
     @property
     def ports(self) -> tuple[Port, ...]:
         """True tips and the true joints of the ECM in; sightings out."""
-        joints = JointState.ros_type
-        tips = (
-            Port(
-                name=f"{arm}/measured_cp",
-                causality="input",
-                type=PoseStamped.ros_type,
-                frame=crtk.base_frame(arm),
-                description="as the robot has it, not its controller",
-            )
-            for arm in self._bases
+        true, seen = (
+            "as the robot has it, not its controller",
+            "where the tip is seen; its orientation is not",
         )
         return (
-            Port(
-                name="ECM/measured_js",
-                causality="input",
-                type=joints,
-                names=ecm.JOINT_NAMES,
-                fields=crtk.MEASURED,
-            ),
-            *tips,
+            measured_joints("ECM/measured_js", ecm.JOINT_NAMES),
             *(
-                Port(
-                    name=f"{arm}/seen",
-                    causality="output",
-                    type=Seen.ros_type,
-                    variability="event",
-                    frame=crtk.WORLD_FRAME,
-                    description="where the tip is seen; its orientation is not",
-                )
+                signal_in(f"{arm}/measured_cp", PoseStamped, true, frame=crtk.base_frame(arm))
                 for arm in self._bases
             ),
+            *(event_out(f"{arm}/seen", Seen, seen, frame=crtk.WORLD_FRAME) for arm in self._bases),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002

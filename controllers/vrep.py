@@ -17,8 +17,23 @@ import numpy as np
 from pydantic import Field
 
 from controllers.motion.params import Arms, EcmParams, PsmParams, SetupJoints
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, Value, array, flag, number
-from robots.dvrk import crtk, setup_joints
+from controllers.ports import measured_joints
+from hub.participant import (
+    Controller,
+    Inputs,
+    Outputs,
+    Params,
+    Record,
+    Setup,
+    Value,
+    array,
+    event_in,
+    event_out,
+    flag,
+    number,
+    signal_out,
+)
+from robots.dvrk import setup_joints
 from robots.dvrk.setup_joints import CartArm
 from schemas.ports import Port
 from schemas.ros import BoolMessage, JointState, StringMessage
@@ -78,23 +93,14 @@ class VrepScene(Controller):
     @property
     def ports(self) -> tuple[Port, ...]:
         """The topics of the scene, and the robot's own ports."""
-        still = {"causality": "output", "type": JointState.ros_type}
         return (
             *(port for arm in self._arms for port in arm.ports),
-            Port(
-                name="release_needle",
-                causality="input",
-                type=BoolMessage.ros_type,
-                variability="event",
-                description="true: every jaw opens",
-            ),
-            Port.model_validate(
-                {
-                    "name": "dvrk/setup_joint/state_joint_current",
-                    "size": self._setup.size,
-                    "description": "right, left, camera",
-                }
-                | still
+            event_in("release_needle", BoolMessage, "true: every jaw opens"),
+            signal_out(
+                "dvrk/setup_joint/state_joint_current",
+                JointState,
+                "right, left, camera",
+                size=self._setup.size,
             ),
         )
 
@@ -161,54 +167,20 @@ class _Arm:
     def ports(self) -> Iterator[Port]:
         name, dvrk, names = self._name, f"dvrk/{self._name}", tuple(joint.name for joint in self._joints)
         for topic in _DESIRED:
-            yield Port(
-                name=f"{dvrk}/{topic}",
-                causality="input",
-                type=JointState.ros_type,
-                variability="event",
-                description="set directly",
-            )
-        yield _measured(f"{name}/measured_js", names)
-        yield Port(name=f"{name}/servo_jp", causality="output", type=JointState.ros_type, names=names)
-        yield Port(
-            name=f"{dvrk}/state_joint_current",
-            causality="output",
-            type=JointState.ros_type,
-            size=len(names),
-            fields=("position", "velocity"),
+            yield event_in(f"{dvrk}/{topic}", JointState, "set directly")
+        yield measured_joints(f"{name}/measured_js", names, start=())
+        yield signal_out(f"{name}/servo_jp", JointState, names=names)
+        yield signal_out(
+            f"{dvrk}/state_joint_current", JointState, size=len(names), fields=("position", "velocity")
         )
         if self._state_topic:
-            yield Port(
-                name=f"{dvrk}/set_robot_state",
-                causality="input",
-                type=StringMessage.ros_type,
-                variability="event",
-                description="echoed",
-            )
-            yield Port(
-                name=self._state_topic, causality="output", type=StringMessage.ros_type, variability="event"
-            )
+            yield event_in(f"{dvrk}/set_robot_state", StringMessage, "echoed")
+            yield event_out(self._state_topic, StringMessage)
         if self._jaw is not None:
-            yield Port(
-                name=f"{dvrk}/state_jaw_desired",
-                causality="input",
-                type=JointState.ros_type,
-                variability="event",
-                description="of half the opening",
-            )
-            yield _measured(f"{name}/jaw/measured_js", (self._jaw.name,))
-            yield Port(
-                name=f"{name}/jaw/servo_jp",
-                causality="output",
-                type=JointState.ros_type,
-                names=(self._jaw.name,),
-            )
-            yield Port(
-                name=f"{dvrk}/state_jaw_current",
-                causality="output",
-                type=JointState.ros_type,
-                description="half the opening",
-            )
+            yield event_in(f"{dvrk}/state_jaw_desired", JointState, "of half the opening")
+            yield measured_joints(f"{name}/jaw/measured_js", (self._jaw.name,), start=())
+            yield signal_out(f"{name}/jaw/servo_jp", JointState, names=(self._jaw.name,))
+            yield signal_out(f"{dvrk}/state_jaw_current", JointState, "half the opening")
 
     def step(self, inputs: Inputs, *, release: bool) -> dict[str, Value]:
         """Read what is desired, and publish what is measured."""
@@ -242,18 +214,6 @@ class _Arm:
     def _open(self, opening: float) -> None:
         if self._jaw is not None:
             self.state.jaw_desired = min(max(opening, self._jaw.lower), self._jaw.upper)
-
-
-def _measured(name: str, names: tuple[str, ...]) -> Port:
-    still = (0.0,) * (3 * len(names))
-    return Port(
-        name=name,
-        causality="input",
-        type=JointState.ros_type,
-        names=names,
-        fields=crtk.MEASURED,
-        start=still,
-    )
 
 
 def _fits(desired: JointState, count: int) -> bool:

@@ -14,7 +14,18 @@ from typing import ClassVar, cast
 
 from pydantic import Field
 
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, flag, integer
+from hub.participant import (
+    Controller,
+    Inputs,
+    Outputs,
+    Params,
+    Record,
+    Setup,
+    event_in,
+    event_out,
+    flag,
+    integer,
+)
 from robots.dvrk.crtk import base_frame
 from robots.dvrk.endoscope import BASELINE
 from schemas.ports import Port
@@ -85,17 +96,8 @@ class VrepSutures(Controller):
             "state_current": StringMessage.ros_type,
         }
         return (
-            *(
-                Port(name=f"{_PLANNER}/{topic}", causality="input", type=type_, variability="event")
-                for topic, type_ in types.items()
-            ),
-            Port(
-                name="markers",
-                causality="output",
-                type=MarkerArray.ros_type,
-                variability="event",
-                description="blue and red points, disc and banner",
-            ),
+            *(event_in(f"{_PLANNER}/{topic}", type_) for topic, type_ in types.items()),
+            event_out("markers", MarkerArray, "blue and red points, disc and banner"),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002

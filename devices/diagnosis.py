@@ -6,8 +6,7 @@ import logging
 from enum import IntEnum
 
 from devices.samples import clock_of
-from hub.participant import Sample
-from schemas.ports import Port
+from hub.participant import Sample, event_out
 from schemas.ros import DiagnosticStatus
 
 __all__ = ["Diagnosis", "Level"]
@@ -35,14 +34,9 @@ class Diagnosis:
             port: name of the port.
             simulated_time: whether the device lives in simulated time.
         """
-        self.port = Port(
-            name=port,
-            causality="output",
-            type=DiagnosticStatus.ros_type,
-            variability="event",
-            clock=clock_of(simulated_time=simulated_time),
-            description="each change of the device's condition: what, and what to do",
-        )
+        meaning = "each change of the device's condition: what, and what to do"
+        clock = clock_of(simulated_time=simulated_time)
+        self.port = event_out(port, DiagnosticStatus, meaning, clock=clock)
         self._device = device
         self._last: tuple[Level, str, str] | None = None
 

@@ -17,7 +17,7 @@ from pydantic import Field
 from devices.diagnosis import Diagnosis, Level
 from devices.samples import SampleTimer, pose_sample, twist_sample
 from devices.vendor_axes import Quaternion, Vector3, quaternion, vector
-from hub.participant import Device, Params, Sample
+from hub.participant import Device, Params, Sample, signal_out
 from robots import rotation
 from schemas.errors import DeviceError
 from schemas.ports import Port
@@ -97,15 +97,7 @@ class Headset(Device):
         self._rate, self._max_age_ns = params.rate, params.max_age
         self._diagnosis = Diagnosis(name)
         self._pose, self._twist = (
-            Port(
-                name=port,
-                causality="output",
-                type=type_,
-                frame=f"{name}_base",
-                max_age_ns=params.max_age,
-                clock="wall",
-                description=text,
-            )
+            signal_out(port, type_, text, frame=f"{name}_base", max_age_ns=params.max_age, clock="wall")
             for port, type_, text in (
                 ("pose", PoseStamped.ros_type, "of the head: x ahead, y to the left, z up"),
                 ("twist", TwistStamped.ros_type, "of the head, along the axes of the base frame"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hub.participant import event_in, event_out, signal_in, signal_out
 from robots.dvrk.mounted import MountedEcm
 from schemas.ports import Port
 from schemas.ros import BoolMessage, Float64Message, PoseStamped, WrenchStamped
@@ -12,7 +13,6 @@ from tasks.params import TaskParams
 
 __all__ = ["task_ports"]
 
-_POSE, _NUMBER = PoseStamped.ros_type, Float64Message.ros_type
 _NO_POSE, _NO_WRENCH = (*(0.0,) * 6, 1.0), (0.0,) * 6
 
 
@@ -22,76 +22,33 @@ def task_ports(params: TaskParams) -> tuple[Port, ...]:
 
 
 def _inputs(params: TaskParams) -> Iterator[Port]:
+    wrench = "on the instrument; the force of both together is what may be excessive"
+    following = "whether a hand leads the arm: `following` of its teleoperation"
     for arm, mounted in params.arms.items():
-        is_camera = isinstance(mounted, MountedEcm)
-        yield Port(
-            name=f"{arm}/measured_cp",
-            causality="input",
-            type=_POSE,
-            frame=f"{arm}_base",
-            start=_NO_POSE if is_camera else None,
-            description="of the endoscope's camera" if is_camera else "of the instrument's tip",
-        )
-        if is_camera:
+        pose, base = f"{arm}/measured_cp", f"{arm}_base"
+        if isinstance(mounted, MountedEcm):
+            yield signal_in(pose, PoseStamped, "of the endoscope's camera", frame=base, start=_NO_POSE)
             continue
+        yield signal_in(pose, PoseStamped, "of the instrument's tip", frame=base)
         for kind in ("tip", "rigid"):
-            yield Port(
-                name=f"{arm}/{kind}_wrench",
-                causality="input",
-                type=WrenchStamped.ros_type,
-                frame=f"{arm}_base",
-                start=_NO_WRENCH,
-                description="on the instrument; the force of both together is what may be excessive",
-            )
-        yield Port(
-            name=f"{arm}/following",
-            causality="input",
-            type=BoolMessage.ros_type,
-            variability="event",
-            description="whether a hand leads the arm: `following` of its teleoperation",
-        )
+            yield signal_in(f"{arm}/{kind}_wrench", WrenchStamped, wrench, frame=base, start=_NO_WRENCH)
+        yield event_in(f"{arm}/following", BoolMessage, following)
     for thing in params.objects:
-        yield Port(name=f"{thing}/pose", causality="input", type=_POSE, frame="world")
-        yield Port(
-            name=f"{thing}/held_by",
-            causality="input",
-            type=_NUMBER,
-            description="number of the PSM that holds it, 0: none",
-        )
+        yield signal_in(f"{thing}/pose", PoseStamped, frame="world")
+        yield signal_in(f"{thing}/held_by", Float64Message, "number of the PSM that holds it, 0: none")
     yield _impulse("tools", "between instruments of different arms")
     if params.fixtures:
         yield _impulse("fixtures", "between instruments and boards, posts, walls and dishes")
 
 
 def _impulse(what: str, between: str) -> Port:
-    return Port(
-        name=f"{what}/impulse",
-        causality="input",
-        type=_NUMBER,
-        unit="N*s",
-        start=(0.0,),
-        description=f"of all contacts {between} since the start",
-    )
+    meaning = f"of all contacts {between} since the start"
+    return signal_in(f"{what}/impulse", Float64Message, meaning, unit="N*s", start=(0.0,))
 
 
 def _outputs(params: TaskParams) -> Iterator[Port]:
-    yield Port(
-        name="events",
-        causality="output",
-        type=TaskEvent.ros_type,
-        variability="event",
-        description="as they happen",
-    )
-    yield Port(
-        name="score",
-        causality="output",
-        type=ScoreCard.ros_type,
-        period_ns=params.card_period,
-        description="metrics, and the scores by each set of rules, so far",
-    )
-    yield Port(
-        name="progress", causality="output", type=_NUMBER, description="share of the goals that are reached"
-    )
-    yield Port(
-        name="done", causality="output", type=_NUMBER, description="1 when all goals have been reached"
-    )
+    score = "metrics, and the scores by each set of rules, so far"
+    yield event_out("events", TaskEvent, "as they happen")
+    yield signal_out("score", ScoreCard, score, period_ns=params.card_period)
+    yield signal_out("progress", Float64Message, "share of the goals that are reached")
+    yield signal_out("done", Float64Message, "1 when all goals have been reached")

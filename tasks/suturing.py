@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self, cast
 
 from pydantic import Field, model_validator
 
-from hub.participant import Inputs, Outputs, Params, Setup
+from hub.participant import Inputs, Outputs, Params, Setup, event_in, signal_in
 from robots.training.fixtures import FixtureParams, PhantomParams
 from robots.training.needle_object import NeedleObject, needles_of
 from schemas.ports import Port
@@ -150,30 +150,11 @@ class SuturingTask(Task):
 
 
 def _tissue_ports() -> Iterator[Port]:
-    number = Float64Message.ros_type
+    estimate = "of the needle, as a tracker has it: challenge 1 compares it with where the needle is"
     for name, unit in _SIGNALS:
-        yield Port(name=f"tissue/{name}", causality="input", type=number, unit=unit, start=(0.0,))
+        yield signal_in(f"tissue/{name}", Float64Message, unit=unit, start=(0.0,))
     for name in ("entry", "exit"):
-        yield Port(name=f"tissue/{name}", causality="input", size=3, unit="m", start=(0.0, 0.0, 0.0))
-    yield Port(
-        name="tissue/events",
-        causality="input",
-        type=TaskEvent.ros_type,
-        variability="event",
-        description="of a suturing pad",
-    )
-    yield Port(
-        name="estimate/pose",
-        causality="input",
-        type=PoseStamped.ros_type,
-        frame="world",
-        start=(*(0.0,) * 6, 1.0),
-        description="of the needle, as a tracker has it: challenge 1 compares it with where the needle is",
-    )
-    yield Port(
-        name="report",
-        causality="input",
-        type=BoolMessage.ros_type,
-        variability="event",
-        description="true: the stitch is made; without a source, as soon as it counts",
-    )
+        yield signal_in(f"tissue/{name}", size=3, unit="m", start=(0.0, 0.0, 0.0))
+    yield event_in("tissue/events", TaskEvent, "of a suturing pad")
+    yield signal_in("estimate/pose", PoseStamped, estimate, frame="world", start=(*(0.0,) * 6, 1.0))
+    yield event_in("report", BoolMessage, "true: the stitch is made; without a source, as soon as it counts")

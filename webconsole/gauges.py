@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hub.participant import signal_out
 from schemas.codec import decode
-from schemas.ports import Port
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import CouplingEnergy, SessionStatus
 from schemas.vectors import Vector
@@ -44,9 +44,9 @@ class Gauge(NamedTuple):
 def hub_outlets(scenario: Scenario) -> Iterator[Outlet]:
     """Yield what the hub itself publishes of a session."""
     for bond in scenario.bonds:
-        port = Port(name=f"energy/{bond.name}", causality="output", type=CouplingEnergy.ros_type)
+        port = signal_out(f"energy/{bond.name}", CouplingEnergy)
         yield Outlet(HUB, port)
-    yield Outlet(HUB, Port(name="status", causality="output", type=SessionStatus.ros_type))
+    yield Outlet(HUB, signal_out("status", SessionStatus))
 
 
 def _energy(payload: bytes) -> Vector:

@@ -10,12 +10,14 @@ from math import pi
 from typing import Any
 
 from controllers.dvrk_console.params import DvrkConsoleParams
+from controllers.ports import NO_POSE, measured_joints
+from hub.participant import event_in, event_out, signal_in, signal_out
 from robots.dvrk import crtk
 from robots.dvrk.console_topics import BUTTON, CONSOLE, PEDALS, SYSTEM, TELEOPERATION
 from schemas.crtk import OperatingState, StringStamped
 from schemas.message import Message
 from schemas.ports import Port
-from schemas.ros import BoolMessage, Float64Message, JointState, PoseStamped, StringMessage
+from schemas.ros import BoolMessage, Float64Message, PoseStamped, StringMessage
 
 __all__ = ["NO_GRIPPER", "EventOutputs", "console_ports"]
 
@@ -73,17 +75,11 @@ def console_ports(params: DvrkConsoleParams) -> tuple[Port, ...]:
         | _named("footpedals", PEDALS.events)
     )
     return (
-        *_events(
-            "input", commands | {f"{arm}/operating_state": OperatingState.ros_type for arm in params.arms}
-        ),
-        *_events("output", events | {f"{arm}/state_command": StringStamped.ros_type for arm in params.arms}),
-        Port(
-            name="teleop/ECM/buttons",
-            causality="output",
-            type=BUTTON,
-            variability="event",
-            description="button 0: the camera pedal leads the endoscope",
-        ),
+        *_events_in(commands),
+        *(event_in(f"{arm}/operating_state", OperatingState) for arm in params.arms),
+        *_events_out(events),
+        *(event_out(f"{arm}/state_command", StringStamped) for arm in params.arms),
+        event_out("teleop/ECM/buttons", BUTTON, "button 0: the camera pedal leads the endoscope"),
         *(port for master in masters for port in _master(master)),
         *(
             _pose(f"{arm}/setpoint_cp", "of the tip, in the camera's frame: masters are turned like it")
@@ -93,21 +89,16 @@ def console_ports(params: DvrkConsoleParams) -> tuple[Port, ...]:
     )
 
 
-def _events(causality: str, types: Mapping[str, str]) -> Iterator[Port]:
-    for name, type_ in types.items():
-        yield Port.model_validate(
-            {"name": name, "causality": causality, "type": type_, "variability": "event"}
-        )
+def _events_in(types: Mapping[str, str]) -> Iterator[Port]:
+    return (event_in(name, type_) for name, type_ in types.items())
+
+
+def _events_out(types: Mapping[str, str]) -> Iterator[Port]:
+    return (event_out(name, type_) for name, type_ in types.items())
 
 
 def _pose(name: str, meaning: str) -> Port:
-    return Port(
-        name=name,
-        causality="input",
-        type=PoseStamped.ros_type,
-        start=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-        description=meaning,
-    )
+    return signal_in(name, PoseStamped, meaning, start=NO_POSE)
 
 
 def _named(prefix: str, types: Mapping[str, str]) -> dict[str, str]:
@@ -116,46 +107,26 @@ def _named(prefix: str, types: Mapping[str, str]) -> dict[str, str]:
 
 def _master(master: str) -> Iterable[Port]:
     return (
-        *_events("input", {f"{master}/operating_state": OperatingState.ros_type}),
+        event_in(f"{master}/operating_state", OperatingState),
         _pose(f"{master}/measured_cp", "of the master, in the display's frame"),
-        Port(
-            name=f"{master}/gripper/measured_js",
-            causality="input",
-            type=JointState.ros_type,
-            names=("gripper",),
-            fields=crtk.MEASURED,
-            start=(NO_GRIPPER, 0.0, 0.0),
-            description="opening of the gripper, as the motors' encoders measure it",
+        measured_joints(
+            f"{master}/gripper/measured_js",
+            ("gripper",),
+            "opening of the gripper, as the motors' encoders measure it",
+            start=(NO_GRIPPER,),
         ),
-        *_events("output", _named(master, _MASTER_COMMANDS)),
+        *_events_out(_named(master, _MASTER_COMMANDS)),
     )
 
 
 def _teleoperation(name: str, params: DvrkConsoleParams) -> Iterable[Port]:
-    leads = f"teleop/{name}"
+    leads, gripper = f"teleop/{name}", "to the `teleoperation`: 0 closed .. 1 open, negative: none"
     return (
-        *_events(
-            "input",
-            _named(name, TELEOPERATION.commands)
-            | dict.fromkeys((f"{leads}/state", f"{leads}/warning"), StringMessage.ros_type),
-        ),
-        *_events("output", _named(name, TELEOPERATION.events)),
-        *_events(
-            "output",
-            {f"{leads}/buttons": BUTTON}
-            | dict.fromkeys((f"{leads}/lock_rotation", f"{leads}/lock_translation"), BoolMessage.ros_type),
-        ),
-        Port(
-            name=f"{leads}/scale",
-            causality="output",
-            type=Float64Message.ros_type,
-            start=(params.scale,),
-            description="to the `teleoperation`",
-        ),
-        Port(
-            name=f"{leads}/gripper",
-            causality="output",
-            type=Float64Message.ros_type,
-            description="to the `teleoperation`: 0 closed .. 1 open, negative: none",
-        ),
+        *_events_in(_named(name, TELEOPERATION.commands)),
+        *(event_in(f"{leads}/{said}", StringMessage) for said in ("state", "warning")),
+        *_events_out(_named(name, TELEOPERATION.events)),
+        event_out(f"{leads}/buttons", BUTTON),
+        *(event_out(f"{leads}/lock_{motion}", BoolMessage) for motion in ("rotation", "translation")),
+        signal_out(f"{leads}/scale", Float64Message, "to the `teleoperation`", start=(params.scale,)),
+        signal_out(f"{leads}/gripper", Float64Message, gripper),
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from controllers.expert.hand import HandPhase
+from controllers.ports import measured_joints
+from hub.participant import event_in, event_out, signal_in, signal_out
 from robots.dvrk import crtk
 from schemas.ports import Port
 from schemas.ros import Float64Message, JointState, PoseStamped, StringMessage
@@ -29,45 +31,32 @@ _PHASES = ", ".join(f"{phase:d} {phase.name.lower()}" for phase in HandPhase)
 
 def expert_ports(arms: Iterable[str], things: Iterable[str]) -> tuple[Port, ...]:
     """Return the ports for these arms and things."""
-    number = Float64Message.ros_type
     return (
         *(port for arm in arms for port in (*hand_ports(arm), _phase_port(arm))),
         *(
             port
             for thing in things
             for port in (
-                Port(
-                    name=f"objects/{thing}/pose", causality="input", type=PoseStamped.ros_type, frame="world"
-                ),
-                Port(name=f"objects/{thing}/held_by", causality="input", type=number),
+                signal_in(f"objects/{thing}/pose", PoseStamped, frame="world"),
+                signal_in(f"objects/{thing}/held_by", Float64Message),
             )
         ),
-        *(
-            Port(name=name, causality="output", type=number, description=meaning)
-            for name, meaning in PROGRESS.items()
-        ),
-        Port(
-            name="status",
-            causality="output",
-            type=StringMessage.ros_type,
-            variability="event",
-            description="which thing is left where it is, and why, as soon as that is known",
+        *(signal_out(name, Float64Message, meaning) for name, meaning in PROGRESS.items()),
+        event_out(
+            "status", StringMessage, "which thing is left where it is, and why, as soon as that is known"
         ),
     )
 
 
 def hand_ports(arm: str) -> Iterator[Port]:
     """Yield the ports of one hand of any expert."""
-    pose, joints = PoseStamped.ros_type, JointState.ros_type
-    yield Port(name=f"{arm}/local/measured_cp", causality="input", type=pose, frame=crtk.base_frame(arm))
-    yield Port(
-        name=f"{arm}/jaw/measured_js", causality="input", type=joints, names=("jaw",), fields=crtk.MEASURED
-    )
+    yield signal_in(f"{arm}/local/measured_cp", PoseStamped, frame=crtk.base_frame(arm))
+    yield measured_joints(f"{arm}/jaw/measured_js", ("jaw",))
     for event in EVENTS:
-        yield Port(name=f"{arm}/{event}", causality="input", type=StringMessage.ros_type, variability="event")
-    yield Port(name=f"{arm}/servo_cp", causality="output", type=pose, variability="event")
-    yield Port(name=f"{arm}/jaw/move_jp", causality="output", type=joints, variability="event")
+        yield event_in(f"{arm}/{event}", StringMessage)
+    yield event_out(f"{arm}/servo_cp", PoseStamped)
+    yield event_out(f"{arm}/jaw/move_jp", JointState)
 
 
 def _phase_port(arm: str) -> Port:
-    return Port(name=f"{arm}/phase", causality="output", type=Float64Message.ros_type, description=_PHASES)
+    return signal_out(f"{arm}/phase", Float64Message, _PHASES)

@@ -6,10 +6,10 @@ each of them means to this controller.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping
 
 from controllers.motion.params import EcmParams, PsmParams
+from hub.participant import event_in, event_out, signal_in, signal_out
 from robots.dvrk import crtk
 from robots.dvrk.setup_joints import CartArm, joint_names
 from schemas.ports import Port
@@ -122,23 +122,22 @@ def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns
     """
     joints = tuple(joint.name for joint in params.chain.joints)
     gripper, held = params.gripper, params.equipment[0]
-    yield from _events(arm, "input", _COMMANDS | EQUIPMENT_COMMANDS[held])
+    yield from _events(event_in, arm, _COMMANDS | EQUIPMENT_COMMANDS[held])
     if gripper is not None:
-        yield from _events(f"{arm}/{gripper.name}", "input", _GRIPPER_COMMANDS)
-    yield from _events(arm, "output", _EVENTS | {held: _EQUIPMENT})
+        yield from _events(event_in, f"{arm}/{gripper.name}", _GRIPPER_COMMANDS)
+    yield from _events(event_out, arm, _EVENTS | {held: _EQUIPMENT})
     yield from _joint_states(arm, joints, period_ns)
     yield from _cartesian_states(arm, reference, period_ns)
     yield from _wrench_states(arm, len(joints), reference, period_ns)
     yield from _settings(arm, joints, reference, period_ns)
     yield from _servo(arm, joints)
-    yield Port(
-        name=f"drive/{arm}/control_mode",
-        causality="output",
-        size=2,
+    yield signal_out(
+        f"drive/{arm}/control_mode",
         description=(
             "of arm and gripper: 0 off, 1 position, 2 effort; 3 and 4: position and effort without gravity"
             " compensation"
         ),
+        size=2,
     )
     if gripper is not None:
         driven = tuple(joint.name for joint in gripper.joints)
@@ -148,51 +147,39 @@ def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns
 
 def setup_joint_ports(arm: CartArm, cart: str, period_ns: int) -> Iterator[Port]:
     """Yield the ports of the setup joints that carry `arm` on the cart, whose frame is `cart`."""
-    prefix, output = f"SUJ/{arm}", partial(Port, causality="output", period_ns=period_ns)
-    yield from _events(prefix, "input", _SETUP_JOINT_COMMANDS)
-    yield from _events(prefix, "output", _SETUP_JOINT_EVENTS)
-    yield output(name=f"{prefix}/measured_js", type=JointState.ros_type, names=joint_names(arm))
-    yield output(
-        name=f"{prefix}/local/measured_cp",
-        type=PoseStamped.ros_type,
-        frame=cart,
-        description="of the arm's base frame",
+    prefix = f"SUJ/{arm}"
+    yield from _events(event_in, prefix, _SETUP_JOINT_COMMANDS)
+    yield from _events(event_out, prefix, _SETUP_JOINT_EVENTS)
+    yield signal_out(f"{prefix}/measured_js", JointState, names=joint_names(arm), period_ns=period_ns)
+    yield signal_out(
+        f"{prefix}/local/measured_cp", PoseStamped, "of the arm's base frame", frame=cart, period_ns=period_ns
     )
 
 
-def _events(prefix: str, causality: str, meanings: Mapping[str, str]) -> Iterator[Port]:
+def _events(
+    declare: Callable[[str, str, str], Port], prefix: str, meanings: Mapping[str, str]
+) -> Iterator[Port]:
     for name, meaning in meanings.items():
-        row = {"name": f"{prefix}/{name}", "causality": causality, "type": _TYPES[name]}
-        yield Port.model_validate(row | {"variability": "event", "description": meaning})
+        yield declare(f"{prefix}/{name}", _TYPES[name], meaning)
 
 
 def _joint_states(prefix: str, names: tuple[str, ...], period_ns: int) -> Iterator[Port]:
     for name in ("measured_js", "setpoint_js"):
-        yield Port(
-            name=f"{prefix}/{name}",
-            causality="output",
-            type=JointState.ros_type,
-            names=names,
-            fields=crtk.MEASURED,
-            period_ns=period_ns,
+        yield signal_out(
+            f"{prefix}/{name}", JointState, names=names, fields=crtk.MEASURED, period_ns=period_ns
         )
 
 
 def _cartesian_states(arm: str, reference: str, period_ns: int) -> Iterator[Port]:
     for prefix in ("", "local/"):
         for name, type_ in crtk.CARTESIAN_STATES.items():
-            yield Port(
-                name=f"{arm}/{prefix}{name}",
-                causality="output",
-                type=type_,
-                frame=crtk.frame_of(arm, prefix + name, reference),
-                period_ns=period_ns,
-                description="of the tip" if name.endswith("_cp") else "of the tip's origin",
-            )
+            meaning = "of the tip" if name.endswith("_cp") else "of the tip's origin"
+            frame = crtk.frame_of(arm, prefix + name, reference)
+            yield signal_out(f"{arm}/{prefix}{name}", type_, meaning, frame=frame, period_ns=period_ns)
 
 
 def _wrench_states(arm: str, joints: int, reference: str, period_ns: int) -> Iterator[Port]:
-    output = partial(Port, causality="output", period_ns=period_ns)
+    size, shape = 6 * joints, (6, joints)
     frames = {"body": crtk.tip_frame(arm), "spatial": crtk.base_frame(arm)}
     for name, type_ in crtk.WRENCH_STATES.items():
         kind = name.partition("/")[0]
@@ -200,38 +187,36 @@ def _wrench_states(arm: str, joints: int, reference: str, period_ns: int) -> Ite
         meaning = "that balances the joint efforts"
         if not seen:
             meaning += f"; in {frames[kind]}, or in {reference} with set_cf_orientation_absolute"
-        yield output(name=f"{arm}/{name}", type=type_, frame=seen, description=meaning)
+        yield signal_out(f"{arm}/{name}", type_, meaning, frame=seen, period_ns=period_ns)
         meaning = f"twist of the tip in {frames[kind]}, linear part first, from joint velocities"
         if kind == "spatial":
             meaning += ", of the point at its origin"
-        yield output(name=f"{arm}/{kind}/jacobian", size=6 * joints, shape=(6, joints), description=meaning)
+        jacobian = f"{arm}/{kind}/jacobian"
+        yield signal_out(jacobian, description=meaning, size=size, shape=shape, period_ns=period_ns)
 
 
 def _settings(arm: str, joints: tuple[str, ...], reference: str, period_ns: int) -> Iterator[Port]:
-    output = partial(Port, causality="output", period_ns=period_ns)
-    yield output(
-        name=f"SUJ/{arm}/measured_cp",
-        type=PoseStamped.ros_type,
-        frame=reference,
-        description="of the arm's base frame: where the setup joints hold it",
-    )
-    for name, meaning in (
+    base = "of the arm's base frame: where the setup joints hold it"
+    weight = "that carries the weight that the controller knows; 0 while it is switched off"
+    ratios = (
         ("ratio", "of velocity and acceleration; 0 where they differ"),
         ("ratio_v", "of the velocity"),
         ("ratio_a", "of the acceleration"),
-    ):
-        yield output(name=f"{arm}/trajectory_j/{name}", type=Float64Message.ros_type, description=meaning)
-    yield output(
-        name=f"{arm}/gravity_compensation/setpoint_js",
-        type=JointState.ros_type,
+    )
+    yield signal_out(f"SUJ/{arm}/measured_cp", PoseStamped, base, frame=reference, period_ns=period_ns)
+    for name, meaning in ratios:
+        yield signal_out(f"{arm}/trajectory_j/{name}", Float64Message, meaning, period_ns=period_ns)
+    yield signal_out(
+        f"{arm}/gravity_compensation/setpoint_js",
+        JointState,
+        weight,
         names=joints,
         fields=("effort",),
-        description="that carries the weight that the controller knows; 0 while it is switched off",
+        period_ns=period_ns,
     )
 
 
 def _servo(prefix: str, names: tuple[str, ...]) -> Iterator[Port]:
-    port = partial(Port, type=JointState.ros_type, names=names)
-    yield port(name=f"sense/{prefix}/measured_js", causality="input", fields=crtk.MEASURED)
-    yield port(name=f"drive/{prefix}/servo_jp", causality="output")
-    yield port(name=f"drive/{prefix}/servo_jf", causality="output", fields=("effort",))
+    yield signal_in(f"sense/{prefix}/measured_js", JointState, names=names, fields=crtk.MEASURED)
+    yield signal_out(f"drive/{prefix}/servo_jp", JointState, names=names)
+    yield signal_out(f"drive/{prefix}/servo_jf", JointState, names=names, fields=("effort",))

@@ -20,11 +20,12 @@ from controllers.needle_tracker.filter import Estimate, View
 from controllers.needle_tracker.noise import Noise
 from controllers.needle_tracker.overlay import drawn
 from controllers.needle_tracker.params import TrackerParams
-from controllers.needle_tracker.ports import CAMERA, tracker_ports
+from controllers.needle_tracker.ports import tracker_ports
 from controllers.needle_tracker.pose import framed, inverse, vector_of
 from controllers.needle_tracker.segmentation import Region, detected, region_about
 from controllers.needle_tracker.tracking import Belief, Settings, followed
 from controllers.opencv import opencv, pixels
+from controllers.ports import CAMERA
 from hub.participant import (
     Controller,
     Inputs,

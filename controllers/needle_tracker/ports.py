@@ -2,105 +2,66 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from controllers.needle_tracker.params import TrackerParams
+from controllers.ports import CAMERA, camera_inputs, measured_joints
+from hub.participant import event_out, signal_out
 from robots.dvrk import crtk, ecm
 from robots.dvrk.endoscope import EYES
 from schemas.ports import Port
 from schemas.ros import (
-    CameraInfo,
     Float64Message,
     Float64MultiArray,
     Image,
-    JointState,
     PoseStamped,
     PoseWithCovarianceStamped,
     StringMessage,
 )
 
-__all__ = ["CAMERA", "tracker_ports"]
-
-CAMERA = "left_optical"
-"""`frame_id` of the left camera: x right, y down, z ahead."""
+__all__ = ["tracker_ports"]
 
 
 def tracker_ports(params: TrackerParams) -> tuple[Port, ...]:
     """Return all ports."""
-    came = partial(Port, causality="input", variability="event")
-    goes = partial(Port, causality="output")
-    joints = partial(Port, causality="input", type=JointState.ros_type, fields=crtk.MEASURED)
     arm, base = params.arm, crtk.base_frame(params.arm)
     held = tuple(joint.name for joint in params.holder.chain.joints)
     eyes = EYES if params.eyes == "both" else EYES[:1]
     return (
-        *(
-            came(name=f"{eye}/image_raw", type=Image.ros_type, description="rgb8 or bgr8, rectified")
-            for eye in eyes
-        ),
-        *(
-            came(name=f"{eye}/camera_info", type=CameraInfo.ros_type, description="its projection P is used")
-            for eye in eyes
-        ),
-        joints(name=f"{arm}/measured_js", names=held, description="of the arm that holds the needle"),
-        joints(
-            name="ECM/measured_js", names=ecm.JOINT_NAMES, description="of the arm that holds the cameras"
-        ),
-        goes(
-            name="kalmanOutput",
-            type=PoseStamped.ros_type,
+        *camera_inputs(eyes, "rgb8 or bgr8, rectified", "its projection P is used"),
+        measured_joints(f"{arm}/measured_js", held, "of the arm that holds the needle"),
+        measured_joints("ECM/measured_js", ecm.JOINT_NAMES, "of the arm that holds the cameras"),
+        signal_out(
+            "kalmanOutput",
+            PoseStamped,
+            "the needle, as the authors' filter publishes it: their RCM_PSM1 is the arm's base",
             frame=base,
-            description="the needle, as the authors' filter publishes it: their RCM_PSM1 is the arm's base",
         ),
-        goes(
-            name="Tcn_hat",
-            type=Float64MultiArray.ros_type,
+        signal_out(
+            "Tcn_hat",
+            Float64MultiArray,
+            "the needle in the frame of the left camera, rows of the matrix, as theirs does",
             size=12,
             shape=(3, 4),
-            description="the needle in the frame of the left camera, rows of the matrix, as theirs does",
         ),
-        goes(
-            name="pose_with_covariance",
-            type=PoseWithCovarianceStamped.ros_type,
-            variability="event",
-            description=f"the needle in {base}, at every step",
-        ),
-        goes(
-            name="covariance",
-            type=Float64MultiArray.ros_type,
+        event_out("pose_with_covariance", PoseWithCovarianceStamped, f"the needle in {base}, at every step"),
+        signal_out(
+            "covariance",
+            Float64MultiArray,
+            "of displacement (m) and rotation (rad) along the axes of the needle's own frame",
             size=36,
             shape=(6, 6),
-            description="of displacement (m) and rotation (rad) along the axes of the needle's own frame",
         ),
-        goes(
-            name="seen_share",
-            type=Float64Message.ros_type,
-            description="of the wire, in its place in the newest picture",
+        signal_out("seen_share", Float64Message, "of the wire, in its place in the newest picture"),
+        signal_out("slips", Float64Message, "how often it was found elsewhere"),
+        event_out(
+            "state",
+            StringMessage,
+            "whenever it changes: blind (no picture), predicting (not seen), tracking",
         ),
-        goes(name="slips", type=Float64Message.ros_type, description="how often it was found elsewhere"),
-        goes(
-            name="state",
-            type=StringMessage.ros_type,
-            variability="event",
-            description="whenever it changes: blind (no picture), predicting (not seen), tracking",
-        ),
-        goes(
-            name="warning",
-            type=StringMessage.ros_type,
-            variability="event",
-            description="a picture that is refused, and a slip",
-        ),
-        *(
-            (
-                goes(
-                    name="overlay/image_raw",
-                    type=Image.ros_type,
-                    variability="event",
-                    frame=CAMERA,
-                    description="the left picture with the region, the seen wire and the estimate",
-                ),
-            )
-            if params.overlay
-            else ()
-        ),
+        event_out("warning", StringMessage, "a picture that is refused, and a slip"),
+        *((_overlay(),) if params.overlay else ()),
     )
+
+
+def _overlay() -> Port:
+    meaning = "the left picture with the region, the seen wire and the estimate"
+    return event_out("overlay/image_raw", Image, meaning, frame=CAMERA)

@@ -10,13 +10,24 @@ from pydantic import Field
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import Arms, MotionParams, SetupJoints
 from controllers.needle_tracker.pose import difference, framed
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, Value, array
+from hub.participant import (
+    Controller,
+    Inputs,
+    Outputs,
+    Params,
+    Record,
+    Setup,
+    Value,
+    array,
+    signal_in,
+    signal_out,
+)
 from robots.dvrk import crtk
 from robots.dvrk.crtk import Mounting
 from robots.dvrk.parameters import ArmName
 from robots.training.needles import DEFAULT, NEEDLES, NeedleName
 from schemas.ports import Port
-from schemas.ros import Float64Message, Float64MultiArray, PoseStamped
+from schemas.ros import Float64Message, PoseStamped
 from schemas.vectors import Vector
 
 __all__ = ["TrackingError", "TrackingErrorParams"]
@@ -73,27 +84,14 @@ class TrackingError(Controller):
     def ports(self) -> tuple[Port, ...]:
         """The true pose, the estimate and its covariance in; the errors out."""
         base = crtk.base_frame(self.params.arm)
-        six = {"causality": "output", "type": Float64MultiArray.ros_type, "size": 6}
         return (
-            Port(name="truth", causality="input", type=PoseStamped.ros_type, frame="world"),
-            Port(name="estimate", causality="input", type=PoseStamped.ros_type, frame=base),
-            Port(
-                name="covariance", causality="input", type=Float64MultiArray.ros_type, size=36, shape=(6, 6)
-            ),
-            Port.model_validate(
-                {"name": "pose_error", "description": "m, rad; along the axes of the estimated frame"} | six
-            ),
-            Port.model_validate(
-                {"name": "pose_deviation", "description": "standard deviations of the same"} | six
-            ),
+            signal_in("truth", PoseStamped, frame="world"),
+            signal_in("estimate", PoseStamped, frame=base),
+            signal_in("covariance", size=36, shape=(6, 6)),
+            signal_out("pose_error", description="m, rad; along the axes of the estimated frame", size=6),
+            signal_out("pose_deviation", description="standard deviations of the same", size=6),
             *(
-                Port(
-                    name=name,
-                    causality="output",
-                    type=Float64Message.ros_type,
-                    unit=unit,
-                    description=meaning,
-                )
+                signal_out(name, Float64Message, meaning, unit=unit)
                 for name, (unit, meaning) in _NUMBERS.items()
             ),
         )

@@ -6,12 +6,13 @@ from collections.abc import Iterator
 
 from controllers.expert.hand import RobotHand
 from controllers.expert.ports import hand_ports
+from controllers.ports import measured_joints
 from controllers.stitching.phase import Phase
+from hub.participant import event_in, event_out, signal_in, signal_out
 from robots.dvrk import crtk
 from schemas.ports import Port
 from schemas.ros import (
     Float64Message,
-    JointState,
     PoseStamped,
     PoseWithCovarianceStamped,
     StringMessage,
@@ -35,43 +36,21 @@ def stitching_ports(hands: tuple[RobotHand, RobotHand], needle: str) -> tuple[Po
     return (
         *(port for hand in hands for port in (*hand_ports(hand.arm), *_sight_ports(hand))),
         *_needle_ports(needle),
-        *(
-            Port(name=name, causality="output", type=Float64Message.ros_type, unit=unit, description=meaning)
-            for name, unit, meaning in _NUMBERS
-        ),
-        Port(
-            name="status",
-            causality="output",
-            type=StringMessage.ros_type,
-            variability="event",
-            description="what begins, and why a stitch is not feasible or has failed",
-        ),
+        *(signal_out(name, Float64Message, meaning, unit=unit) for name, unit, meaning in _NUMBERS),
+        event_out("status", StringMessage, "what begins, and why a stitch is not feasible or has failed"),
     )
 
 
 def _needle_ports(needle: str) -> Iterator[Port]:
-    yield Port(name=f"objects/{needle}/pose", causality="input", type=PoseStamped.ros_type, frame="world")
-    yield Port(
-        name=f"objects/{needle}/held_by",
-        causality="input",
-        type=Float64Message.ros_type,
-        description="number of the PSM that holds it, 0: none",
-    )
+    yield signal_in(f"objects/{needle}/pose", PoseStamped, frame="world")
+    yield signal_in(f"objects/{needle}/held_by", Float64Message, "number of the PSM that holds it, 0: none")
 
 
 def _sight_ports(hand: RobotHand) -> Iterator[Port]:
-    yield Port(
-        name=f"{hand.arm}/measured_js",
-        causality="input",
-        type=JointState.ros_type,
-        names=tuple(joint.name for joint in hand.chain.joints),
-        fields=crtk.MEASURED,
-    )
-    yield Port(
-        name=f"{hand.arm}/seen",
-        causality="input",
-        type=PoseWithCovarianceStamped.ros_type,
-        variability="event",
+    yield measured_joints(f"{hand.arm}/measured_js", tuple(joint.name for joint in hand.chain.joints))
+    yield event_in(
+        f"{hand.arm}/seen",
+        PoseWithCovarianceStamped,
+        "where a tracker sees the tip; without a source, joints are taken at their word",
         frame=crtk.WORLD_FRAME,
-        description="where a tracker sees the tip; without a source, joints are taken at their word",
     )

@@ -15,7 +15,7 @@ from controllers.expert.hand import framed
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import MotionParams
 from controllers.stitching.params import StitchParams
-from hub.participant import Inputs
+from hub.participant import Inputs, signal_in
 from robots.dvrk import crtk
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.ecm import tip
@@ -61,12 +61,7 @@ class SceneFrames:
     def ports(self) -> Iterator[Port]:
         """The measured tips of the other arms."""
         for arm in self.others:
-            yield Port(
-                name=f"{arm}/local/measured_cp",
-                causality="input",
-                type=PoseStamped.ros_type,
-                frame=crtk.base_frame(arm),
-            )
+            yield signal_in(f"{arm}/local/measured_cp", PoseStamped, frame=crtk.base_frame(arm))
 
     def in_world(self, picked: PointStamped, inputs: Inputs) -> Vector:
         """Return a point in the world, shape (3,).

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from controllers.ports import NO_POSE, NO_TWIST, NO_WRENCH, measured_joints
 from controllers.teleoperation.params import TeleoperationParams
+from hub.participant import event_in, event_out, signal_in, signal_out
 from robots.dvrk import crtk
 from schemas.crtk import OperatingState
 from schemas.ports import Port
@@ -31,52 +33,19 @@ def teleoperation_ports(params: TeleoperationParams) -> tuple[Port, ...]:
 
 def _hand(p: TeleoperationParams) -> tuple[Port, ...]:
     clutch = "leads the arm while it is held" if p.engage == "held" else "clutch"
-    still = (0.0,) * 6 if p.law == "pose" else None
+    still = NO_TWIST if p.law == "pose" else None
+    buttons = f"button {p.buttons.clutch}: {clutch}; button {p.buttons.jaw}: closes the jaw"
+    gripper = "of the hand, 0 closed .. 1 open; negative: none, the button leads the jaw"
+    scale = "metres of the tip per metre of the hand, above 0 and up to 1"
+    twist = "of the hand, for `law: velocity`"
     return (
-        Port(
-            name="master",
-            causality="input",
-            type=PoseStamped.ros_type,
-            max_age_ns=p.max_age,
-            description="pose of the hand",
-        ),
-        Port(
-            name="master_twist",
-            causality="input",
-            type=TwistStamped.ros_type,
-            max_age_ns=p.max_age,
-            start=still,
-            description="of the hand, for `law: velocity`",
-        ),
-        Port(
-            name="buttons",
-            causality="input",
-            type=Joy.ros_type,
-            variability="event",
-            description=f"button {p.buttons.clutch}: {clutch}; button {p.buttons.jaw}: closes the jaw",
-        ),
-        Port(
-            name="gripper",
-            causality="input",
-            type=Float64Message.ros_type,
-            start=(NO_GRIPPER,),
-            description="of the hand, 0 closed .. 1 open; negative: none, the button leads the jaw",
-        ),
-        Port(
-            name="scale",
-            causality="input",
-            type=Float64Message.ros_type,
-            start=(p.scale,),
-            description="metres of the tip per metre of the hand, above 0 and up to 1",
-        ),
+        signal_in("master", PoseStamped, "pose of the hand", max_age_ns=p.max_age),
+        signal_in("master_twist", TwistStamped, twist, max_age_ns=p.max_age, start=still),
+        event_in("buttons", Joy, buttons),
+        signal_in("gripper", Float64Message, gripper, start=(NO_GRIPPER,)),
+        signal_in("scale", Float64Message, scale, start=(p.scale,)),
         *(
-            Port(
-                name=f"lock_{what}",
-                causality="input",
-                type=BoolMessage.ros_type,
-                variability="event",
-                description=f"whether the tip keeps its {kept}",
-            )
+            event_in(f"lock_{what}", BoolMessage, f"whether the tip keeps its {kept}")
             for what, kept in (("rotation", "orientation"), ("translation", "position"))
             if p.law == "pose"
         ),
@@ -85,73 +54,32 @@ def _hand(p: TeleoperationParams) -> tuple[Port, ...]:
 
 def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
     base, names = crtk.base_frame(p.arm), tuple(joint.name for joint in p.chain.joints)
-    at_rest = p.start + (0.0,) * (2 * len(names))
     seen = p.view != "base"
-    meaning = (
+    measured = (
         "where the command starts: at the first step, whenever the arm gets ready and, of an arm that"
         " publishes its operating state, whenever the hand takes over; of a motion controller its setpoint_js"
     )
+    state = (
+        "of the arm: it follows while ENABLED and homed; an arm that publishes it may be commanded by others"
+        " while it does not follow"
+    )
+    stand = (
+        "of the arm's base frame in the camera's, unless `view: base`: the motion controller's"
+        " SUJ/<arm>/measured_cp"
+    )
+    frame, start = (crtk.CAMERA_FRAME, None) if seen else ("", NO_POSE)
     return (
-        Port(
-            name="measured_js",
-            causality="input",
-            type=JointState.ros_type,
-            names=names,
-            fields=crtk.MEASURED,
-            start=at_rest,
-            description=meaning,
+        measured_joints("measured_js", names, measured, start=p.start),
+        event_in("operating_state", OperatingState, state),
+        signal_in("base_in_view", PoseStamped, stand, frame=frame, start=start),
+        *(
+            signal_in(
+                name, WrenchStamped, f"of {what} on the instrument, at the tip", frame=base, start=NO_WRENCH
+            )
+            for name, what in (("tip_wrench", "tissue"), ("rigid_wrench", "rigid things"))
         ),
-        Port(
-            name="operating_state",
-            causality="input",
-            type=OperatingState.ros_type,
-            variability="event",
-            description=(
-                "of the arm: it follows while ENABLED and homed; an arm that publishes it may be commanded by"
-                " others while it does not follow"
-            ),
-        ),
-        Port(
-            name="base_in_view",
-            causality="input",
-            type=PoseStamped.ros_type,
-            frame=crtk.CAMERA_FRAME if seen else "",
-            start=None if seen else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-            description=(
-                "of the arm's base frame in the camera's, unless `view: base`: the motion controller's"
-                " SUJ/<arm>/measured_cp"
-            ),
-        ),
-        Port(
-            name="tip_wrench",
-            causality="input",
-            type=WrenchStamped.ros_type,
-            frame=base,
-            start=(0.0,) * 6,
-            description="of tissue on the instrument, at the tip",
-        ),
-        Port(
-            name="rigid_wrench",
-            causality="input",
-            type=WrenchStamped.ros_type,
-            frame=base,
-            start=(0.0,) * 6,
-            description="of rigid things on the instrument, at the tip",
-        ),
-        Port(
-            name="servo_jp",
-            causality="output",
-            type=JointState.ros_type,
-            names=names,
-            description="command to the arm's joint servos",
-        ),
-        Port(
-            name="goal_cp",
-            causality="output",
-            type=PoseStamped.ros_type,
-            frame=base,
-            description="where the tip is commanded to be",
-        ),
+        signal_out("servo_jp", JointState, "command to the arm's joint servos", names=names),
+        signal_out("goal_cp", PoseStamped, "where the tip is commanded to be", frame=base),
     )
 
 
@@ -159,25 +87,10 @@ def _jaw(p: TeleoperationParams) -> tuple[Port, ...]:
     names = tuple(joint.name for joint in p.tool.jaw_joints)
     if not names:
         return ()
-    at_rest = (p.jaw, *(0.0,) * (3 * len(names) - 1))
-    meaning = "where the jaw starts, as measured_js"
+    command = "command to the jaw; its roller stays where it is"
     return (
-        Port(
-            name="jaw/measured_js",
-            causality="input",
-            type=JointState.ros_type,
-            names=names,
-            fields=crtk.MEASURED,
-            start=at_rest,
-            description=meaning,
-        ),
-        Port(
-            name="jaw/servo_jp",
-            causality="output",
-            type=JointState.ros_type,
-            names=names,
-            description="command to the jaw; its roller stays where it is",
-        ),
+        measured_joints("jaw/measured_js", names, "where the jaw starts, as measured_js", start=(p.jaw,)),
+        signal_out("jaw/servo_jp", JointState, command, names=names),
     )
 
 
@@ -187,12 +100,7 @@ def _streams(p: TeleoperationParams) -> tuple[Port, ...]:
         "the command to the arm's motion controller, at every step while it follows; otherwise nothing, so"
         " that others may move the arm"
     )
-    return tuple(
-        Port(
-            name=name, causality="output", type=JointState.ros_type, variability="event", description=meaning
-        )
-        for name in names
-    )
+    return tuple(event_out(name, JointState, meaning) for name in names)
 
 
 def _published(p: TeleoperationParams) -> tuple[Port, ...]:
@@ -201,31 +109,8 @@ def _published(p: TeleoperationParams) -> tuple[Port, ...]:
         "DISABLED, CLUTCHED, ALIGNING or ENABLED: whenever it changes",
     )
     return (
-        Port(
-            name="contact",
-            causality="output",
-            type=ContactModel.ros_type,
-            period_ns=p.contact_period,
-            description=contact,
-        ),
-        Port(
-            name="following",
-            causality="output",
-            type=BoolMessage.ros_type,
-            description="whether the arm follows the hand",
-        ),
-        Port(
-            name="state",
-            causality="output",
-            type=StringMessage.ros_type,
-            variability="event",
-            description=phases,
-        ),
-        Port(
-            name="warning",
-            causality="output",
-            type=StringMessage.ros_type,
-            variability="event",
-            description="why the arm holds, and what to do",
-        ),
+        signal_out("contact", ContactModel, contact, period_ns=p.contact_period),
+        signal_out("following", BoolMessage, "whether the arm follows the hand"),
+        event_out("state", StringMessage, phases),
+        event_out("warning", StringMessage, "why the arm holds, and what to do"),
     )

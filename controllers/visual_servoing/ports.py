@@ -2,105 +2,71 @@
 
 from __future__ import annotations
 
-from functools import partial
-
+from controllers.ports import CAMERA, camera_inputs, measured_joints
 from controllers.visual_servoing.params import ServoingParams
+from hub.participant import event_in, event_out, signal_out
 from robots.dvrk import crtk, ecm
 from schemas.crtk import OperatingState
 from schemas.ports import Port
 from schemas.ros import (
-    CameraInfo,
     Float64Message,
     Float64MultiArray,
-    Image,
     JointState,
     PoseStamped,
     StringMessage,
     TwistStamped,
 )
 
-__all__ = ["CAMERA", "servoing_ports"]
-
-CAMERA = "left_optical"
-"""`frame_id` of what is expressed in the frame of the left camera: x right, y down, z ahead."""
+__all__ = ["servoing_ports"]
 
 
 def servoing_ports(params: ServoingParams) -> tuple[Port, ...]:
     """Return all ports."""
-    names = ecm.JOINT_NAMES
-    came = partial(Port, causality="input", variability="event")
-    goes = partial(Port, causality="output")
-    corners = partial(Port, type=Float64MultiArray.ros_type, size=8, shape=(4, 2))
+    names, command = ecm.JOINT_NAMES, crtk.MEASURED[:2]
     return (
-        came(
-            name="left/image_raw",
-            type=Image.ros_type,
-            description="rgb8 or bgr8; it steers, so it is an input in simulated time",
+        *camera_inputs(
+            ("left",),
+            "rgb8 or bgr8; it steers, so it is an input in simulated time",
+            "of a rectified picture",
         ),
-        came(name="left/camera_info", type=CameraInfo.ros_type, description="of a rectified picture"),
-        came(
-            name="goal",
-            type=Float64MultiArray.ros_type,
-            description="four times x and y, normalised: where the discs should be from now on",
+        event_in(
+            "goal",
+            Float64MultiArray,
+            "four times x and y, normalised: where the discs should be from now on",
         ),
-        came(
-            name="operating_state",
-            type=OperatingState.ros_type,
-            description="of the ECM; unconnected: ready",
+        event_in("operating_state", OperatingState, "of the ECM; unconnected: ready"),
+        measured_joints(
+            "measured_js",
+            names,
+            "of the ECM; read at the start and whenever the arm becomes ready",
+            start=params.start,
         ),
-        Port(
-            name="measured_js",
-            causality="input",
-            type=JointState.ros_type,
-            names=names,
-            fields=crtk.MEASURED,
-            start=params.start + (0.0,) * (2 * len(names)),
-            description="of the ECM; read at the start and whenever the arm becomes ready",
+        signal_out("servo_jp", JointState, "command to the ECM", names=names, fields=command),
+        signal_out(
+            "camera_velocity", TwistStamped, "of the left camera, which the command gives it", frame=CAMERA
         ),
-        goes(
-            name="servo_jp",
-            type=JointState.ros_type,
-            names=names,
-            fields=("position", "velocity"),
-            description="command to the ECM",
-        ),
-        goes(
-            name="camera_velocity",
-            type=TwistStamped.ros_type,
-            frame=CAMERA,
-            description="of the left camera, which the command gives it",
-        ),
-        corners(
-            name="features",
-            causality="output",
+        _corners("features", "where the discs were seen last, in their order: x and y, 0 before"),
+        _corners("features_goal", "where they should be"),
+        signal_out(
+            "feature_error",
+            Float64Message,
+            "largest distance of a disc, as seen last, from its place",
             unit="px",
-            description="where the discs were seen last, in their order: x and y, 0 before",
         ),
-        corners(name="features_goal", causality="output", unit="px", description="where they should be"),
-        goes(
-            name="feature_error",
-            type=Float64Message.ros_type,
-            unit="px",
-            description="largest distance of a disc, as seen last, from its place",
-        ),
-        goes(
-            name="target/measured_cp",
-            type=PoseStamped.ros_type,
+        signal_out(
+            "target/measured_cp",
+            PoseStamped,
+            "pose of the target as seen last; its z axis points away from the camera",
             frame=CAMERA,
-            description="pose of the target as seen last; its z axis points away from the camera",
         ),
-        goes(
-            name="state",
-            type=StringMessage.ros_type,
-            variability="event",
-            description=(
-                "whenever it changes: waiting (for the arm), blind, searching, moving, reached, settled"
-            ),
+        event_out(
+            "state",
+            StringMessage,
+            "whenever it changes: waiting (for the arm), blind, searching, moving, reached, settled",
         ),
-        goes(
-            name="warning",
-            type=StringMessage.ros_type,
-            variability="event",
-            description="an input that is refused, and a goal that cannot be reached",
-        ),
+        event_out("warning", StringMessage, "an input that is refused, and a goal that cannot be reached"),
     )
+
+
+def _corners(name: str, description: str) -> Port:
+    return signal_out(name, Float64MultiArray, description, size=8, shape=(4, 2), unit="px")

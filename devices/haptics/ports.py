@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from devices.samples import clock_of
 from devices.vendor_axes import Quaternion, Vector3
-from hub.participant import Sample, VectorSample
+from hub.participant import Sample, VectorSample, event_out, signal_in, signal_out
 from schemas.ports import Port
 from schemas.ros import Joy, PoseStamped, TwistStamped, WrenchStamped
 from schemas.trocar_msgs import ContactModel
@@ -34,43 +34,15 @@ def stylus_ports(participant: str, stylus: str, *, simulated_time: bool, max_age
     """
     frame, clock = f"{participant}_{stylus}_base", clock_of(simulated_time=simulated_time)
 
-    def output(
-        name: str,
-        kind: str,
-        description: str,
-        max_age_ns: int = 0,
-        variability: Literal["signal", "event"] = "signal",
-    ) -> Port:
-        name = f"{stylus}/{name}"
-        return Port(
-            name=name,
-            causality="output",
-            type=kind,
-            variability=variability,
-            frame=frame,
-            max_age_ns=max_age_ns,
-            clock=clock,
-            description=description,
-        )
-
+    tip = "of the tip; z out of the point, x to the right when it points away from the user"
+    pose, twist, force = f"{stylus}/pose", f"{stylus}/twist", f"{stylus}/force"
+    contact = "contact that is rendered to the hand"
     return StylusPorts(
-        output(
-            "pose",
-            PoseStamped.ros_type,
-            "of the tip; z out of the point, x to the right when it points away from the user",
-            max_age_ns,
-        ),
-        output("twist", TwistStamped.ros_type, "of the tip", max_age_ns),
-        output("buttons", Joy.ros_type, "each press and release", variability="event"),
-        output("force", WrenchStamped.ros_type, "on the hand"),
-        Port(
-            name=f"{stylus}/contact",
-            causality="input",
-            type=ContactModel.ros_type,
-            frame=frame,
-            clock="simulated",
-            description="contact that is rendered to the hand",
-        ),
+        signal_out(pose, PoseStamped, tip, frame=frame, max_age_ns=max_age_ns, clock=clock),
+        signal_out(twist, TwistStamped, "of the tip", frame=frame, max_age_ns=max_age_ns, clock=clock),
+        event_out(f"{stylus}/buttons", Joy, "each press and release", frame=frame, clock=clock),
+        signal_out(force, WrenchStamped, "on the hand", frame=frame, clock=clock),
+        signal_in(f"{stylus}/contact", ContactModel, contact, frame=frame),
     )
 
 

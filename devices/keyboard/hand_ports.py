@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+from hub.participant import event_out, signal_out
 from schemas.ports import Port
 from schemas.ros import Float64Message, Joy, PoseStamped, TwistStamped
 
@@ -29,35 +30,11 @@ class HandPorts(NamedTuple):
 def hand_ports(participant: str, stands_for: StandsFor, max_age_ns: int) -> HandPorts:
     """Return the ports of a virtual hand, in the frame `<participant>_base` (x ahead, y left, z up)."""
     frame = f"{participant}_base"
-    pose, twist = (
-        Port(
-            name=port,
-            causality="output",
-            type=type_,
-            frame=frame,
-            max_age_ns=max_age_ns,
-            clock="wall",
-            description=text,
-        )
-        for port, type_, text in (
-            ("pose", PoseStamped.ros_type, _FRAMES[stands_for]),
-            ("twist", TwistStamped.ros_type, "of the same, along the axes of the base frame"),
-        )
+    pose, axes = _FRAMES[stands_for], "of the same, along the axes of the base frame"
+    presses = "each press and release: 0 the dead-man, 1 the jaw"
+    return HandPorts(
+        signal_out("pose", PoseStamped, pose, frame=frame, max_age_ns=max_age_ns, clock="wall"),
+        signal_out("twist", TwistStamped, axes, frame=frame, max_age_ns=max_age_ns, clock="wall"),
+        event_out("buttons", Joy, presses, frame=frame, clock="wall"),
+        signal_out("gripper", Float64Message, "0 closed, 1 open", clock="wall"),
     )
-    buttons = Port(
-        name="buttons",
-        causality="output",
-        type=Joy.ros_type,
-        variability="event",
-        frame=frame,
-        clock="wall",
-        description="each press and release: 0 the dead-man, 1 the jaw",
-    )
-    gripper = Port(
-        name="gripper",
-        causality="output",
-        type=Float64Message.ros_type,
-        clock="wall",
-        description="0 closed, 1 open",
-    )
-    return HandPorts(pose, twist, buttons, gripper)

@@ -40,7 +40,7 @@ from devices.ros.topics.whole_robot import (
 )
 from devices.ros.transport import Publisher, ServiceHandler, Transport
 from devices.samples import stamp_of
-from hub.participant import Device, Sample, Value
+from hub.participant import Device, Sample, Value, event_out
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import OperatingState
 from schemas.errors import MessageError, did_you_mean
@@ -72,14 +72,8 @@ class Gateway(Device):
         self.use_period_ns = params.publish_period
         self.rows = self.table()
         """All topics and services."""
-        self._status = Port(
-            name="gateway",
-            causality="output",
-            type=GatewayStatus.ros_type,
-            variability="event",
-            clock="wall",
-            description="once a second: who is connected, and the rates of all topics",
-        )
+        meaning = "once a second: who is connected, and the rates of all topics"
+        self._status = event_out("gateway", GatewayStatus, meaning, clock="wall")
         self._ports = (*(row.port for row in self.rows if row.port is not None), self._status)
         self._inputs = {
             row.port.name: row for row in self.rows if row.port is not None and row.way == "publish"

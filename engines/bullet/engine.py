@@ -19,7 +19,7 @@ from engines.bullet.probes.probe import Probe
 from engines.bullet.probes.sub_grid import SubGrid, Surface
 from engines.bullet.warn_once import warn_once
 from engines.bullet.world import connect, disconnect
-from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
+from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, signal_out, state_hash
 from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port
 from schemas.ros import Header, Time
@@ -68,15 +68,10 @@ class BulletEngine(Stepped):
     @property
     def ports(self) -> tuple[Port, ...]:
         """The nodes of every organ; of every probe with fingers, what they hold."""
+        period_ns = self.params.node_period
+        meaning = "positions of the nodes; the surface triangles come with the first"
         nodes = tuple(
-            Port(
-                name=f"{organ}/nodes",
-                causality="output",
-                type=SoftBodyState.ros_type,
-                frame="world",
-                period_ns=self.params.node_period,
-                description="positions of the nodes; the surface triangles come with the first",
-            )
+            signal_out(f"{organ}/nodes", SoftBodyState, meaning, frame="world", period_ns=period_ns)
             for organ in self.params.organs
         )
         return nodes + tuple(

@@ -13,6 +13,7 @@ import numpy as np
 from engines.fmu.model import co_simulation, read_model
 from engines.fmu.start import Start, declared_start, given_start, settable, size_of, unit_of
 from engines.fmu.variables import Variable, number_type, port_name
+from hub.participant import signal_in, signal_out
 from schemas.errors import ScenarioError, did_you_mean
 from schemas.ports import Port
 from schemas.ros import Float64Message, Float64MultiArray
@@ -148,13 +149,9 @@ def _variable(path: Path, row: ModelVariable, major: int, size: int) -> Variable
 
 
 def _port(row: ModelVariable, variable: Variable, start: tuple[float, ...] | None) -> Port:
-    return Port(
-        name=variable.port,
-        causality="input" if row.causality == "input" else "output",
-        type=(Float64MultiArray if row.dimensions else Float64Message).ros_type,
-        size=variable.size,
-        unit=unit_of(row),
-        start=start,
-        description=f"FMU variable '{row.name}' ({row.type})"
-        + (f": {' '.join(row.description.split())}" if row.description else ""),
-    )
+    text = f"FMU variable '{row.name}' ({row.type})"
+    if row.description:
+        text += f": {' '.join(row.description.split())}"
+    type_ = Float64MultiArray if row.dimensions else Float64Message
+    declare = signal_in if row.causality == "input" else signal_out
+    return declare(variable.port, type_, text, size=variable.size, unit=unit_of(row), start=start)

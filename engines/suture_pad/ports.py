@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from engines.suture_pad.channel import Phase
+from hub.participant import event_out, signal_out
 from robots.training.threads import THREAD
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message
@@ -34,41 +35,24 @@ THREAD_NUMBERS = tuple(name for name, _, _ in _OF_THREAD)
 
 def pad_ports(node_period_ns: int, *, thread: bool) -> tuple[Port, ...]:
     """Return all ports but those of the bond."""
-    number = Float64Message.ros_type
+    numbers = _NUMBERS + (_OF_THREAD if thread else ())
+    broken = f"{', '.join(EVENTS)}: with the nearest hole, and the force of the tip just before"
     return (
-        *(
-            Port(name=name, causality="output", type=number, unit=unit, description=meaning)
-            for name, unit, meaning in _NUMBERS + (_OF_THREAD if thread else ())
-        ),
-        *(
-            Port(
-                name=name,
-                causality="output",
-                size=3,
-                unit="m",
-                description=f"where the needle went {way} last, on the skin at rest, in the world",
-            )
-            for name, way in (("entry", "in"), ("exit", "out"))
-        ),
-        Port(
-            name="events",
-            causality="output",
-            type=TaskEvent.ros_type,
-            variability="event",
-            description=f"{', '.join(EVENTS)}: with the nearest hole, and the force of the tip just before",
-        ),
-        *(
-            Port(
-                name=f"{body}/nodes",
-                causality="output",
-                type=SoftBodyState.ros_type,
-                frame="world",
-                period_ns=node_period_ns,
-                description=f"the {body}, to be drawn; its triangles come with the first",
-            )
-            for body in ((SKIN, THREAD) if thread else (SKIN,))
-        ),
+        *(signal_out(name, Float64Message, meaning, unit=unit) for name, unit, meaning in numbers),
+        *(_hole(name, way) for name, way in (("entry", "in"), ("exit", "out"))),
+        event_out("events", TaskEvent, broken),
+        *(_nodes(body, node_period_ns) for body in ((SKIN, THREAD) if thread else (SKIN,))),
     )
+
+
+def _hole(name: str, way: str) -> Port:
+    meaning = f"where the needle went {way} last, on the skin at rest, in the world"
+    return signal_out(name, description=meaning, size=3, unit="m")
+
+
+def _nodes(body: str, period_ns: int) -> Port:
+    meaning = f"the {body}, to be drawn; its triangles come with the first"
+    return signal_out(f"{body}/nodes", SoftBodyState, meaning, frame="world", period_ns=period_ns)
 
 
 def bond_side() -> BondSide:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trocar import Controller, Inputs, Outputs, Params, Port, Setup
+from trocar import Controller, Inputs, Outputs, Params, Setup, signal_in, signal_out
 from trocar.records import Record, array, number
 
 
@@ -26,10 +26,10 @@ class PdControl(Controller):
 
     params_model = PdControlParams
     ports = (
-        Port(name="goal", causality="input", type="std_msgs/msg/Float64", unit="rad", max_age_ns=100_000_000),
-        Port(name="angle", causality="input", unit="rad"),
-        Port(name="rate", causality="input", unit="rad/s"),
-        Port(name="torque", causality="output", unit="N*m"),
+        signal_in("goal", "std_msgs/msg/Float64", unit="rad", max_age_ns=100_000_000),
+        signal_in("angle", unit="rad"),
+        signal_in("rate", unit="rad/s"),
+        signal_out("torque", unit="N*m"),
     )
 
     def __init__(self, name: str, params: PdControlParams) -> None:

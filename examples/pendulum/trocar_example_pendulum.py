@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trocar import Inputs, Outputs, Params, Port, Setup, Stepped, state_hash
+from trocar import Inputs, Outputs, Params, Setup, Stepped, signal_in, signal_out, state_hash
 from trocar.quantities import Angle, Length, Mass
 
 GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
@@ -21,9 +21,9 @@ class Pendulum(Stepped):
 
     params_model = PendulumParams
     ports = (
-        Port(name="torque", causality="input", unit="N*m", start=(0.0,)),
-        Port(name="angle", causality="output", unit="rad"),
-        Port(name="rate", causality="output", unit="rad/s"),
+        signal_in("torque", unit="N*m", start=(0.0,)),
+        signal_out("angle", unit="rad"),
+        signal_out("rate", unit="rad/s"),
     )
 
     def configure(self, setup: Setup) -> Outputs:

@@ -5,7 +5,7 @@ from math import pi, sin
 from pathlib import Path
 from typing import Literal
 
-from trocar import Device, Params, Port, Sample
+from trocar import Device, Params, Port, Sample, signal_out
 from trocar.messages import Float64Message
 from trocar.quantities import Angle, Duration
 
@@ -27,8 +27,7 @@ class Wave(Device):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        value = Port(name="value", causality="output", type=Float64Message.ros_type, unit="rad")
-        return (value.model_copy(update={"clock": self.params.clock}),)
+        return (signal_out("value", Float64Message, unit="rad", clock=self.params.clock),)
 
     def open(self, directory: Path) -> None:
         self.next_ns = 0

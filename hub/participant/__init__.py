@@ -5,7 +5,7 @@ from hub.participant.bond import ForceSide, MotionSide
 from hub.participant.controller import Controller
 from hub.participant.device import Device, Sample, VectorSample
 from hub.participant.inputs import Inputs
-from hub.participant.ports import event_in, event_out, signal_in, signal_out
+from hub.participant.ports import SignalFields, event_in, event_out, signal_in, signal_out
 from hub.participant.state import Record, array, choice, flag, integer, number, restore_arrays, state_hash
 from hub.participant.stepped import BondPlan, Correction, Setup, Stepped
 
@@ -23,6 +23,7 @@ __all__ = [
     "Record",
     "Sample",
     "Setup",
+    "SignalFields",
     "Stepped",
     "Value",
     "VectorSample",

@@ -13,17 +13,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import get_args
+from typing import Unpack, get_args
 
 from devices.ros.params import GatewayParams, Real
 from devices.ros.topics.diagnostics import DIAGNOSTICS_ROW
 from devices.ros.topics.row import Row
+from hub.participant import SignalFields, event_in, event_out, signal_in, signal_out
 from robots.dvrk import arms as dvrk
 from robots.dvrk import crtk
 from robots.dvrk.console_topics import PARTS, PEDALS, TELEOPERATION
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm, joint_names
-from schemas.ports import Port
 from schemas.ros import (
     CameraInfo,
     CompressedImage,
@@ -98,22 +98,20 @@ def _reference(arm: CartArm, params: GatewayParams) -> str:
     return crtk.reference_frame(arm, params.arms.shown, params.mounting, params.reference)
 
 
-def _state(owner: str, name: str, type_: str, **more: object) -> Row:
+def _state(owner: str, name: str, type_: str, **fields: Unpack[SignalFields]) -> Row:
     """Return a row that is published at the gateway's period."""
-    port = Port.model_validate({"name": f"{owner}/{name}", "causality": "input", "type": type_} | more)
+    port = signal_in(f"{owner}/{name}", type_, **fields)
     return Row(f"/{owner}/{name}", type_, "publish", port, periodic=True, owner=owner)
 
 
 def _event(owner: str, name: str, type_: str, *, latched: bool = True) -> Row:
-    port = Port(name=f"{owner}/{name}", causality="input", type=type_, variability="event")
+    port = event_in(f"{owner}/{name}", type_)
     return Row(f"/{owner}/{name}", type_, "publish", port, latched=latched, owner=owner)
 
 
 def _command(owner: str, name: str, type_: str, joints: tuple[str, ...] = ()) -> Row:
     names = joints if type_ == JointState.ros_type else ()
-    port = Port(
-        name=f"{owner}/{name}", causality="output", type=type_, variability="event", names=names, clock="wall"
-    )
+    port = event_out(f"{owner}/{name}", type_, names=names, clock="wall")
     return Row(f"/{owner}/{name}", type_, "subscribe", port, owner=owner)
 
 
@@ -195,18 +193,10 @@ def _stitch() -> Iterator[Row]:
     yield _event("stitch", "markers", MarkerArray.ros_type, latched=False)
 
 
-def _real_state(owner: str, name: str, type_: str, **more: object) -> Row:
+def _real_state(owner: str, name: str, type_: str, **fields: Unpack[SignalFields]) -> Row:
     """Return a row of what a real arm publishes periodically."""
-    port = Port.model_validate(
-        {
-            "name": f"{owner}/{name}",
-            "causality": "output",
-            "type": type_,
-            "clock": "wall",
-            "max_age_ns": _REAL_MAX_AGE_NS,
-        }
-        | more
-    )
+    real: SignalFields = {"clock": "wall", "max_age_ns": _REAL_MAX_AGE_NS, **fields}
+    port = signal_out(f"{owner}/{name}", type_, **real)
     return Row(f"/{owner}/{name}", type_, "subscribe", port, owner=owner)
 
 

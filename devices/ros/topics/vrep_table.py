@@ -9,13 +9,14 @@ addition (65ef3ccd, dvrk_python/src/dvrk_python/robot.py). Joint states have no 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Unpack
 
 from devices.ros.params import GatewayParams
 from devices.ros.topics.diagnostics import DIAGNOSTICS_ROW
 from devices.ros.topics.row import Row
+from hub.participant import SignalFields, event_in, event_out, signal_in
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
-from schemas.ports import Port
 from schemas.ros import (
     BoolMessage,
     CameraInfo,
@@ -55,9 +56,9 @@ def vrep_table(params: GatewayParams) -> tuple[Row, ...]:
         *(row for eye in ("left", "right") for row in _camera(eye)),
         _command("stereo", "markers", MarkerArray.ros_type),
         _event("stereo", "error", _STRING, latched=True),
-        Row("/release_needle", _BOOL, "subscribe", _output("release_needle", _BOOL)),
+        Row("/release_needle", _BOOL, "subscribe", event_out("release_needle", _BOOL, clock="wall")),
         *(_command("suture_planner", name, type_) for name, type_ in _STITCHES.items()),
-        *(Row(f"/{name}", type_, "publish", _input(name, type_)) for name, type_ in _FILTER.items()),
+        *(Row(f"/{name}", type_, "publish", event_in(name, type_)) for name, type_ in _FILTER.items()),
         DIAGNOSTICS_ROW,
     )
 
@@ -79,31 +80,16 @@ def _camera(eye: str) -> Iterator[Row]:
         yield _event("stereo", f"{eye}/{name}", type_)
 
 
-def _state(owner: str, name: str, *, size: int = 1, fields: tuple[str, ...] = ("position",)) -> Row:
-    port = Port.model_validate(
-        {
-            "name": f"{owner}/{name}",
-            "causality": "input",
-            "type": _JOINT_STATE,
-            "size": size,
-            "fields": fields,
-        }
-    )
+def _state(owner: str, name: str, **fields: Unpack[SignalFields]) -> Row:
+    port = signal_in(f"{owner}/{name}", JointState, **fields)
     return Row(f"/{owner}/{name}", _JOINT_STATE, "publish", port, periodic=True, owner=owner)
 
 
 def _event(owner: str, name: str, type_: str, *, latched: bool = False) -> Row:
-    port = _input(f"{owner}/{name}", type_)
+    port = event_in(f"{owner}/{name}", type_)
     return Row(f"/{owner}/{name}", type_, "publish", port, latched=latched, owner=owner)
 
 
 def _command(owner: str, name: str, type_: str) -> Row:
-    return Row(f"/{owner}/{name}", type_, "subscribe", _output(f"{owner}/{name}", type_), owner=owner)
-
-
-def _input(name: str, type_: str) -> Port:
-    return Port(name=name, causality="input", type=type_, variability="event")
-
-
-def _output(name: str, type_: str) -> Port:
-    return Port(name=name, causality="output", type=type_, variability="event", clock="wall")
+    port = event_out(f"{owner}/{name}", type_, clock="wall")
+    return Row(f"/{owner}/{name}", type_, "subscribe", port, owner=owner)

@@ -11,8 +11,8 @@ import numpy as np
 from devices.ros.params import GatewayParams
 from devices.ros.topics.publications import State, WantedSource
 from devices.ros.topics.tf import TF_PERIOD_NS, TransformTree
+from hub.participant import signal_in
 from schemas.errors import DeviceError
-from schemas.ports import Port
 from schemas.ros import JointState
 from schemas.vectors import VectorCodec
 
@@ -91,13 +91,7 @@ class _JointStates:
             self._known = states
             names = tuple(f"{arm}_{joint}" for arm, state, _ in known for joint in state.port.names)
             self._codec = VectorCodec(
-                Port(
-                    name="joint_states",
-                    causality="input",
-                    type=JointState.ros_type,
-                    names=names,
-                    fields=("position", "velocity", "effort"),
-                )
+                signal_in("joint_states", JointState, names=names, fields=("position", "velocity", "effort"))
             )
         rows = [value.reshape(3, -1) for _, _, value in known]  # position, velocity, effort of each arm
         return self._codec.encode(np.concatenate(rows, axis=1).ravel(), stamp_ns)

@@ -19,7 +19,7 @@ from engines.bullet.probes.params import GraspParams
 from engines.bullet.probes.probe import Probe
 from engines.bullet.probes.sub_grid import Surface
 from engines.bullet.warn_once import warn_once
-from hub.participant import Value
+from hub.participant import Value, event_out, signal_out
 from schemas.ports import Port
 from schemas.ros import Float64Message, Header, Time
 from schemas.trocar_msgs import TissueGrasp
@@ -43,34 +43,12 @@ _SQUEEZE_N = 0.1
 def grasp_ports(probe: str) -> tuple[Port, ...]:
     """Return the ports of a probe that may grasp."""
     return (
-        Port(
-            name=f"{probe}/held",
-            causality="output",
-            type=Float64Message.ros_type,
-            description="1 while tissue is held, else 0",
+        signal_out(f"{probe}/held", Float64Message, "1 while tissue is held, else 0"),
+        signal_out(
+            f"{probe}/pull", description="force on the tissue that is held", size=3, unit="N", frame="world"
         ),
-        Port(
-            name=f"{probe}/pull",
-            causality="output",
-            size=3,
-            unit="N",
-            frame="world",
-            description="force on the tissue that is held",
-        ),
-        Port(
-            name=f"{probe}/lift",
-            causality="output",
-            type=Float64Message.ros_type,
-            unit="m",
-            description="mean rise of the nodes held, since time 0",
-        ),
-        Port(
-            name=f"{probe}/events",
-            causality="output",
-            type=TissueGrasp.ros_type,
-            variability="event",
-            description="grasped, released, torn",
-        ),
+        signal_out(f"{probe}/lift", Float64Message, "mean rise of the nodes held, since time 0", unit="m"),
+        event_out(f"{probe}/events", TissueGrasp, "grasped, released, torn"),
     )
 
 
