@@ -30,6 +30,7 @@ check: $(VENV)/.dev
 	pyright
 	lint-imports
 	python docs/tools/decisions.py
+	python docs/tools/addresses.py
 
 format: $(VENV)/.dev
 	ruff check --fix .

@@ -23,7 +23,7 @@ _VERBATIM = re.compile(r"^\s*(\||#|<|!!!|\?\?\?|:::|\[[^\]]+\]:|---$)")
 
 def pages() -> list[Path]:
     """Return every Markdown file that is held to the width."""
-    top = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+    top = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
     return [*top, *sorted((ROOT / "docs").rglob("*.md"))]
 
 
