@@ -1,4 +1,4 @@
-"""The commands `trocar ros` (gateways that run, their clients and rates) and `trocar ros bag`."""
+"""The commands `trocar ros` (running gateways, clients and rates) and `trocar ros bag`."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def bag(
     trust: Trust = False,
     as_json: Json = False,
 ) -> None:
-    """Write what a recorded session exchanged with ROS programs as a bag, for `ros2 bag play`."""
+    """Write the ROS messages of a recorded session as a bag, for `ros2 bag play`."""
     from devices.ros.bags.export import export
     from hub.recording.recording import Recording
 

@@ -1,7 +1,7 @@
 """A gateway to ROS, whatever the middleware: the base of kinds such as `ros2-zenoh`.
 
-It makes publishers, subscribers, services and ports from one table (`devices.ros.topics.dvrk_table`), and
-knows no physics. A gateway for another middleware implements `connect`, which returns another transport.
+A gateway makes publishers, subscribers, services and ports from a table (`devices.ros.topics.dvrk_table`),
+and knows no physics. A gateway for another middleware implements `connect` and returns another transport.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ from schemas.vectors import Vector
 __all__ = ["Gateway"]
 
 _ERRORS_OF_VREP = "stereo/error"
-"""Of the authors' simulator, whose own topics report nothing."""
+"""Error topic for the authors' simulator, which has no topic for errors."""
 _STATUS_NS = 1_000_000_000
 
 
@@ -65,7 +65,7 @@ class Gateway(Device):
     # for errors and the status; a message of a ROS program ends `wait` at once
     read_period_ns = 50_000_000
     kind: ClassVar[str]
-    """As the scenario names it: `ros2-zenoh`."""
+    """Kind in a scenario, such as `ros2-zenoh`."""
 
     def __init__(self, name: str, params: GatewayParams) -> None:
         super().__init__(name, params)
@@ -88,7 +88,7 @@ class Gateway(Device):
         self._counters = StatusCounters(self.kind, self.rows)
         self._states: dict[str, State] = {}
         self._optional: list[tuple[State, Publisher]] = []
-        """States that are used while a program subscribes, and only then, with what publishes them."""
+        """States used only while a program subscribes, with their publishers."""
         self._unused: frozenset[str] = frozenset()
         self._has_changed = True
         """Whether programs have subscribed, or have ceased to."""
@@ -98,7 +98,7 @@ class Gateway(Device):
         self._refused_moves = RefusedMoves(self._publish)
         self._received: deque[Sample] = deque()
         self._is_new = threading.Event()
-        """A message of a program, or its subscription."""
+        """Set by a message or a subscription of a program."""
         self._status_due_ns = 0
         self._publications: Publications | None = None
         self._diagnostics: Diagnostics | None = None
@@ -111,12 +111,12 @@ class Gateway(Device):
     def connect(self, directory: Path) -> Transport:
         """Join the ROS graph.
 
-        Raises MissingExtraError or DeviceError where that fails; relative paths start at `directory`.
+        Relative paths start at `directory`. Raises MissingExtraError or DeviceError on failure.
         """
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """One per topic that is published or subscribed to, named like it, and `gateway`, the status."""
+        """A port per topic, with the name of the topic, and `gateway`, the status."""
         return self._ports
 
     def open(self, directory: Path) -> None:
@@ -141,7 +141,7 @@ class Gateway(Device):
                 transport.serve(row, self._service_handler(row))
 
     def _advertise_all(self, transport: Transport) -> list[PeriodicTopic]:
-        """Advertise all published rows; return those that are published at the gateway's period."""
+        """Advertise all published rows; return the rows published at the gateway's period."""
         rows = [
             (row, transport.advertise(row), self._counters[row]) for row in self.rows if row.way == "publish"
         ]
@@ -187,7 +187,7 @@ class Gateway(Device):
         self._refused_moves.refused(row)
 
     def _service_handler(self, row: Row) -> ServiceHandler:
-        """Return the handler of an arm's service, which counts its calls."""
+        """Return the counting handler of an arm's service."""
         arm, count = self.params.arms.shown[cast("CartArm", row.owner)], self._counters[row]
         handle = kinematics_handler(row, arm.chain, self._states[f"SUJ/{row.owner}/measured_cp"])
 
@@ -198,7 +198,7 @@ class Gateway(Device):
         return counted
 
     def read(self, t: int) -> list[Sample]:
-        """Return what ROS programs have published since the last call, and the status once a second."""
+        """Return the messages of ROS programs since the last call, and the status once a second."""
         if self._publications is not None:
             self._publications.check()
         self._is_new.clear()
@@ -212,11 +212,11 @@ class Gateway(Device):
         return samples
 
     def wait(self, seconds: float) -> bool:
-        """Wait at most so long for a message or a subscription of a ROS program; return whether one came."""
+        """Wait for a message or a subscription of a ROS program; return whether the wait was successful."""
         return self._is_new.wait(seconds)
 
     def unused(self) -> Collection[str]:
-        """Return the states to which no program subscribes, and which the gateway does not read itself."""
+        """Return the states without a subscriber and without use in the gateway itself."""
         return self._unused
 
     def _note_programs(self) -> None:
@@ -248,7 +248,7 @@ class Gateway(Device):
             self._early[port] = value
 
     def _note(self, row: Row, value: Value) -> None:
-        """Note the operating state of a simulated arm, and the simulated time, before they are published."""
+        """Note the operating state of a simulated arm and the simulated time, before their publication."""
         if row.name == "operating_state" and isinstance(value, OperatingState):
             self._arbiters[row.owner].busy = value.is_busy
             self._refused_moves.update(row.owner, value)
@@ -260,7 +260,7 @@ class Gateway(Device):
             event.write(message)
 
     def _publish_text(self, port: str, text: StringMessage) -> None:
-        """Publish a text of the gateway itself, if it has a topic: not all owners have all of them."""
+        """Publish a text of the gateway itself, if the owner has a topic for the text."""
         owner = port.rpartition("/")[0]
         for topic in (port, f"{owner}/warning", f"{owner}/status", _ERRORS_OF_VREP):
             if (event := self._events.get(topic)) is not None:

@@ -1,4 +1,4 @@
-"""What a scenario may say about any gateway to ROS. SI units, radians, quaternions (x, y, z, w)."""
+"""Parameters of gateways to ROS. SI units, radians, quaternions (x, y, z, w)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Real = Literal["PSM1", "PSM2", "PSM3", "ECM", "MTML", "MTMR", "footpedals"]
 
 
 class Arms(Params):
-    """The simulated arms that ROS programs see."""
+    """The simulated arms visible to ROS programs."""
 
     PSM1: MountedPsm | None = None
     PSM2: MountedPsm | None = None
@@ -40,7 +40,7 @@ class Arms(Params):
 
 
 class TopicParams(Params):
-    """Which topics exist: those of simulated arms, real arms and teleoperation components."""
+    """Topics of simulated arms, real arms and teleoperation components."""
 
     profile: Literal["dvrk", "vrep"] = Field(
         default="dvrk",
@@ -80,7 +80,7 @@ class TopicParams(Params):
 
 
 class GatewayParams(TopicParams):
-    """Which part of the dVRK is simulated, which is real, and how it is published."""
+    """Simulated and real parts of the dVRK, and their publication."""
 
     mounting: Mounting = Field(default="free", description="as in the motion controller")
     reference: Reference = Field(default="camera", description="as in the motion controller")

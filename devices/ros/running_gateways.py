@@ -1,4 +1,4 @@
-"""Which gateways run in the sessions of this machine, from the status that each publishes once a second."""
+"""Running gateways of the sessions of this machine, from their status (once a second)."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from schemas.trocar_msgs import GatewayStatus
 __all__ = ["running_gateways"]
 
 _WAIT_S = 1.5
-"""Every gateway publishes its status once a second."""
+"""Wait for the status of a gateway, published once a second."""
 
 
 def running_gateways(endpoints: Iterable[str]) -> Mapping[tuple[str, str], GatewayStatus]:
-    """Return the status of every gateway, by session and name, of the hubs that listen on `endpoints`.
+    """Return the status of every gateway, by session and name, of the hubs listening on `endpoints`.
 
-    An endpoint where something else listens is passed over.
+    Endpoints of other programs are passed over.
     """
     found: dict[tuple[str, str], GatewayStatus] = {}
     lock = Lock()

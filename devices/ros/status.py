@@ -1,4 +1,4 @@
-"""Message counts, rates and clients of a gateway: its status, which `trocar ros` shows."""
+"""Status of a gateway, as shown by `trocar ros`: message counts, rates and clients."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Count", "StatusCounters"]
 
 
 class Count:
-    """Of one row: messages so far, how many of them were refused, and why the last one was."""
+    """Counts of a row: messages, refused messages, and the reason of the last refusal."""
 
     __slots__ = ("messages", "reason", "refused")
 
@@ -23,7 +23,7 @@ class Count:
 
 
 class StatusCounters:
-    """The counts of all rows of one gateway."""
+    """Counts of all rows of a gateway."""
 
     def __init__(self, kind: str, rows: Iterable[Row]) -> None:
         self._kind = kind

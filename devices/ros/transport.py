@@ -1,6 +1,7 @@
-"""What a gateway needs of a middleware: a gateway for another middleware is another transport.
+"""Interface between a gateway and a middleware: another middleware is another transport.
 
-All payloads are CDR, little-endian, with their encapsulation header, whatever the middleware's own wire has.
+All payloads are CDR, little-endian, with their encapsulation header, also where the middleware's own wire
+differs.
 """
 
 from __future__ import annotations
@@ -15,38 +16,38 @@ from devices.ros.topics.row import Row
 __all__ = ["NODE", "Client", "MessageHandler", "Publisher", "ServiceHandler", "Transport"]
 
 NODE = "/dvrk"
-"""Name of the node of ROS 2 that all topics belong to, as on the real system:
+"""Name of the ROS 2 node of all topics, as on the real system:
 jhu-dvrk/sawIntuitiveResearchKit, ros/dvrk_robot/src/dvrk_system.cpp (commit 47bb09f7).
 """
 
 
 class Publisher(Protocol):
-    """Publishes the messages of one topic. For one thread at a time."""
+    """Publishes the messages of a topic. For one thread at a time."""
 
     @property
     def wanted(self) -> bool:
-        """Whether a program subscribes, or may; `Transport.changed` is called when this has changed.
+        """Whether a program subscribes, or may; `Transport.changed` is called after every change.
 
-        True for latched topics, whose last message is for those who come later.
+        True for latched topics: the last message is for later subscribers.
         """
         ...
 
     def __call__(self, message: bytes, /) -> None:
-        """Publish a message (CDR). Never blocks: for a reader that is too slow older ones are dropped."""
+        """Publish a message (CDR). Never blocks: for a slow reader older messages are dropped."""
         ...
 
 
 class MessageHandler(Protocol):
-    """Receives the messages of one topic. Never raises, never blocks; may be called from any thread."""
+    """Receives the messages of a topic. Never raises, never blocks; may be called from any thread."""
 
     def __call__(self, payload: bytes, client: str, /, *, connected_ns: int = 0) -> None:
-        """Receive one message.
+        """Receive a message.
 
         Args:
             payload: the message (CDR).
-            client: name of the program that sent it.
-            connected_ns: wall time at which the client was connected, where this may be an older message that
-                the client has kept; else 0.
+            client: name of the sending program.
+            connected_ns: wall time of the client's connection, if the message may be an older message kept by
+                the client; else 0.
         """
         ...
 
@@ -60,19 +61,19 @@ Raises MessageError if the bytes are no such request: then there is no response.
 
 @dataclass(frozen=True, slots=True)
 class Client:
-    """A program at the other side, as its middleware knows it."""
+    """A program at the far side, as known to the middleware."""
 
     name: str
-    """As a `MessageHandler` gets it: `/console`.
+    """Name as passed to a `MessageHandler`: `/console`.
 
-    One for all publishers of a program, different for two programs.
+    Common to all publishers of a program, different for two programs.
     """
     address: str = ""
-    """Where it runs, or an id of the middleware; empty where that is not known."""
+    """Address of the program, or an id of the middleware; empty: unknown."""
 
 
 class Transport(ABC):
-    """Publishers, subscribers and services of one ROS graph."""
+    """Publishers, subscribers and services of a ROS graph."""
 
     changed: Callable[[], None] = staticmethod(lambda: None)
     """Is called, in any thread, when a publisher has become `wanted` or is so no longer."""
@@ -97,9 +98,9 @@ class Transport(ABC):
 
     @abstractmethod
     def clients(self) -> tuple[Client, ...]:
-        """Return the programs that publish or subscribe to any of our topics now, without ourselves.
+        """Return the programs now publishing or subscribing to any of our topics, without ourselves.
 
-        Called once a second, so it must be cheap.
+        Called once a second: must be cheap.
         """
 
     @abstractmethod

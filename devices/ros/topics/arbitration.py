@@ -1,7 +1,7 @@
-"""Which program may move an arm: one at a time.
+"""Arbitration of an arm between programs: one program at a time.
 
-The real system obeys every program at once, so that two of them drag one arm to and fro. Here the first keeps
-the arm while its move lasts and for a second after its last command. Every program may always stop an arm:
+The real system obeys every program at once, so two programs drag an arm to and fro. Here the first program
+keeps the arm during its move and for a second after its last command. Every program may always stop an arm:
 `hold`, `free` and `state_command` are accepted from all.
 """
 
@@ -13,20 +13,20 @@ from time import monotonic_ns
 __all__ = ["CommandArbiter"]
 
 _KEPT_NS = 1_000_000_000
-"""After the last command; a CRTK client gives a connection up after as long (its connection_timeout)."""
+"""Time until an arm is free after the last command, as long as the connection_timeout of a CRTK client."""
 
 
 class CommandArbiter:
-    """Grants one arm to one program at a time; for use from any thread."""
+    """Grants an arm to one program at a time; for use from any thread."""
 
     def __init__(self) -> None:
         self.busy = False
-        """Whether the arm is moving, by its operating state."""
+        """Whether the arm is moving, from the operating state."""
         self._client, self._until_ns = "", 0
         self._deciding = threading.Lock()
 
     def refusal(self, client: str) -> str | None:
-        """Give the arm to `client` and return None, or return why not while another program commands it."""
+        """Give the arm to `client` and return None, or return why not while another program has the arm."""
         with self._deciding:
             now_ns = monotonic_ns()
             if client != self._client and self._client and (self.busy or now_ns < self._until_ns):

@@ -14,17 +14,17 @@ from schemas.ros import DiagnosticArray, DiagnosticStatus, Header, KeyValue, Tim
 __all__ = ["DIAGNOSTICS_PERIOD_NS", "DIAGNOSTICS_ROW", "Diagnostics"]
 
 DIAGNOSTICS_ROW = Row("/diagnostics", DiagnosticArray.ros_type, "publish", periodic=True)
-"""In no namespace: monitors read one topic of all programs."""
+"""Row of `/diagnostics`, in no namespace: monitors read a common topic of all programs."""
 
 DIAGNOSTICS_PERIOD_NS = 1_000_000_000
-"""As ROS's own diagnostic_updater by default."""
+"""Period of ROS's diagnostic_updater by default."""
 _OLD_NS = 1_000_000_000
-"""Age of the newest snapshot from which it is stale: states that are older are not published."""
+"""Age of a stale snapshot: older states are not published."""
 _OK, _STALE = 0, 3
 
 
 class Diagnostics:
-    """The statuses of one gateway: its simulation, its states and each of its cameras.
+    """The statuses of a gateway: simulation, states and each camera.
 
     Rates are per second of wall time since the last message.
     """
@@ -33,9 +33,9 @@ class Diagnostics:
         """Start to count.
 
         Args:
-            gateway: its name, the first part of every status's name.
-            states: what the simulation sends, by port.
-            published: the rows that are published, with their counts.
+            gateway: name of the gateway, the first part of every status's name.
+            states: states from the simulation, by port.
+            published: the published rows, with their counts.
         """
         self._gateway, self._states = gateway, states
         published = tuple(published)
@@ -44,11 +44,11 @@ class Diagnostics:
         self._last_ns = monotonic_ns()
         self._before: dict[object, int] = {}
         self._simulated: tuple[int, int] | None = None
-        """Stamp of the newest stamped event (ns of simulated time), and when it arrived (ns)."""
+        """Stamp of the newest stamped event (ns of simulated time), and time of arrival (ns)."""
         self._measured: tuple[int, int] | None = None
 
     def note_stamp(self, simulated_ns: int) -> None:
-        """Note the stamp of an event from the simulation: of all it sends, only events carry its time."""
+        """Note the stamp of an event from the simulation: only events carry the simulated time."""
         self._simulated = simulated_ns, monotonic_ns()
 
     def cdr(self, stamp_ns: int) -> bytes | None:

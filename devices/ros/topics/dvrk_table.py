@@ -1,10 +1,10 @@
 """The table of a gateway with `profile: dvrk`: every topic and service of arms, console, pedals and cameras.
 
-Sources: commands and events as robots.dvrk.crtk and robots.dvrk.console_topics have them; periodic states
+Sources: commands and events from robots.dvrk.crtk and robots.dvrk.console_topics; periodic states
 and services from jhu-cisst/cisst-ros (commit 73aca61c, mts_ros_crtk_bridge_provided.cpp) and
 jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68, ros/dvrk_robot/src/system_ROS.cpp and
-core/components/code/mtsIntuitiveResearchKit{Arm,PSM,ECM,MTM,SUJ}.cpp); what programs in Python need in
-addition from jhu-dvrk/dvrk_python (a1b337b3) and crtk_python_client (33b4c387); cameras from
+core/components/code/mtsIntuitiveResearchKit{Arm,PSM,ECM,MTM,SUJ}.cpp); further needs of programs in Python
+from jhu-dvrk/dvrk_python (a1b337b3) and crtk_python_client (33b4c387); cameras from
 jhu-dvrk/dvrk-readthedocs (53699e4d, docs/pages/video/software/ros.rst); `markers` and `error` of a camera are
 ours. All events are latched, as there.
 """
@@ -44,7 +44,7 @@ NOT_SERVED = {
     "actuator_to_joint_position": "a simulated arm has no actuators whose encoders a program could read",
     "setpoint_cv": "the real bridge does not publish it either",
 }
-"""Names of the real system that are left out, and why."""
+"""Names of the real system left out here, each with the reason."""
 
 _FORWARD, _INVERSE = "crtk_msgs/srv/QueryForwardKinematics", "crtk_msgs/srv/QueryInverseKinematics"
 _SERVICES = {
@@ -55,7 +55,7 @@ _SERVICES = {
 _CARTESIAN_STATES = {name: type_ for name, type_ in crtk.CARTESIAN_STATES.items() if name not in NOT_SERVED}
 _PICTURES = {"image_raw": Image.ros_type, "image_raw/compressed": CompressedImage.ros_type}
 _REAL_MAX_AGE_NS = 100_000_000
-"""A state of a real arm that is older is marked stale: ten periods of 10 ms."""
+"""Age of a stale state of a real arm: ten periods of 10 ms."""
 
 
 def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
@@ -91,15 +91,15 @@ def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
 
 
 def _reference(arm: CartArm, params: GatewayParams) -> str:
-    """Return the `frame_id` of Cartesian states that are not `local/`.
+    """Return the `frame_id` of Cartesian states other than `local/`.
 
-    The plan refuses a scenario where the motion controller's differs.
+    The plan refuses a scenario with another frame in the motion controller.
     """
     return crtk.reference_frame(arm, params.arms.shown, params.mounting, params.reference)
 
 
 def _state(owner: str, name: str, type_: str, **fields: Unpack[SignalFields]) -> Row:
-    """Return a row that is published at the gateway's period."""
+    """Return a row published at the gateway's period."""
     port = signal_in(f"{owner}/{name}", type_, **fields)
     return Row(f"/{owner}/{name}", type_, "publish", port, periodic=True, owner=owner)
 
@@ -118,7 +118,7 @@ def _command(owner: str, name: str, type_: str, joints: tuple[str, ...] = ()) ->
 def _events_and_commands(
     owner: str, events: Mapping[str, str], commands: Mapping[str, str], joints: tuple[str, ...] = ()
 ) -> Iterator[Row]:
-    """Yield a row for each event and command; `joints` are those of commands with joint positions."""
+    """Yield a row for each event and command; `joints`: joints of commands with joint positions."""
     yield from (_event(owner, name, type_) for name, type_ in events.items())
     yield from (_command(owner, name, type_, joints) for name, type_ in commands.items())
 
@@ -163,9 +163,9 @@ def _simulated_arm(arm: CartArm, mounted: MountedPsm | MountedEcm, reference: st
 
 
 def _setup_joints(arm: CartArm, reference: str) -> Iterator[Row]:
-    """Yield the rows of the setup joints that carry `arm`.
+    """Yield the rows of the setup joints under `arm`.
 
-    All four sets have rows, with values or not, because programs connect to all of them.
+    All four sets have rows, with values or not, because programs connect to all four.
     """
     owner, names = f"SUJ/{arm}", joint_names(arm)
     yield from _events_and_commands(owner, crtk.SETUP_JOINT_EVENTS, crtk.SETUP_JOINT_COMMANDS, names)
@@ -185,7 +185,7 @@ def _camera(camera: str) -> Iterator[Row]:
 
 
 def _stitch() -> Iterator[Row]:
-    """Yield the rows of a stitch that a person guides: ours, of types that every ROS program has."""
+    """Yield the rows of a stitch guided by a person: our own topics, of types known to every ROS program."""
     yield _command("stitch", "pick", PointStamped.ros_type)
     yield _command("stitch", "command", StringMessage.ros_type)
     yield _event("stitch", "state", StringMessage.ros_type)
@@ -194,7 +194,7 @@ def _stitch() -> Iterator[Row]:
 
 
 def _real_state(owner: str, name: str, type_: str, **fields: Unpack[SignalFields]) -> Row:
-    """Return a row of what a real arm publishes periodically."""
+    """Return the row of a periodic state of a real arm."""
     real: SignalFields = {"clock": "wall", "max_age_ns": _REAL_MAX_AGE_NS, **fields}
     port = signal_out(f"{owner}/{name}", type_, **real)
     return Row(f"/{owner}/{name}", type_, "subscribe", port, owner=owner)

@@ -26,9 +26,9 @@ def kinematics_handler(row: Row, chain: SerialChain, base: State) -> ServiceHand
     """Return the handler of the service `row`.
 
     Args:
-        row: forward or inverse kinematics, in the arm's base (`local/...`) or in its reference frame.
+        row: forward or inverse kinematics, in the arm's base (`local/...`) or in the reference frame.
         chain: the arm's kinematics.
-        base: pose, shape (7,), of the arm's base in its reference frame.
+        base: pose, shape (7,), of the arm's base in the reference frame.
     """
     queries = KinematicsQueries(chain)
 

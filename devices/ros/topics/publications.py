@@ -1,4 +1,4 @@
-"""What the simulation gives ROS programs: the newest value of each state at a period, and events at once."""
+"""Publication to ROS programs: the newest value of each state at a period, and events at once."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ __all__ = [
 ]
 
 _MAX_AGE_NS = 1_000_000_000
-"""An older state is not published any more: a program must see that nothing arrives, as a CRTK client does
-after this time (its connection_timeout).
+"""Age of the oldest published state. A program must notice the silence, as a CRTK client does after this time
+(connection_timeout).
 """
 
 
 class MessageSource(Protocol):
-    """What is published at every period."""
+    """Source of a message at every period."""
 
     def cdr(self, stamp_ns: int) -> bytes | None:
         """Return the present message with this stamp; None if there is nothing to publish."""
@@ -44,7 +44,7 @@ class MessageSource(Protocol):
 
 
 class WantedSource(MessageSource, Protocol):
-    """What is published while a program subscribes."""
+    """Source of messages while a program subscribes."""
 
     @property
     def present(self) -> bool:
@@ -67,11 +67,11 @@ class Arrivals:
 class State:
     """The newest value of a signal from the simulation. Written by one thread, read by another.
 
-    While it is not `used`, values of it need not come, and none is kept: the next one could be long after it.
+    An unused state need not receive values, and keeps none: the next value could be much later.
     """
 
     def __init__(self, port: Port, arrivals: Arrivals | None = None) -> None:
-        """`arrivals`: those of all states of the gateway; None: of this one alone."""
+        """`arrivals`: arrivals of all states of the gateway; None: arrivals of this state alone."""
         self.port = port
         self._codec = VectorCodec(port)
         self._arrivals = arrivals or Arrivals()
@@ -88,14 +88,14 @@ class State:
         self.writes += 1
 
     def use(self, *, used: bool) -> None:
-        """Say whether values of it are used from now on."""
+        """Set whether values are used from now on."""
         if used != self.used:
             self._newest = None
             self.used = used
 
     @property
     def present(self) -> bool:
-        """Whether there is a value not older than a second, or would be, were it used."""
+        """Whether there is a value not older than a second, or the state is unused."""
         return self.value is not None if self.used else bool(self.writes) and self._arrivals.recent
 
     @property
@@ -105,7 +105,7 @@ class State:
 
     @property
     def value(self) -> Vector | None:
-        """The newest value; None if none was written within a second, or it is not used."""
+        """The newest value; None: no value within a second, or the state is unused."""
         newest = self._newest
         if newest is None or not self.used:
             return None
@@ -118,24 +118,24 @@ class State:
 
 
 class PeriodicTopic:
-    """One topic that is published at the gateway's period, or at every n-th of them."""
+    """A topic published at the gateway's period, or at every n-th period."""
 
     def __init__(self, source: MessageSource, publish: Publisher, count: Count, every: int = 1) -> None:
-        """`every`: number of periods from one message to the next."""
+        """`every`: number of periods between two messages."""
         self._source, self._publish, self._count, self._every = source, publish, count, every
         self._stamps = Stamps()
 
     def publish(self, period: int) -> None:
-        """Publish the present message, if it is due in this period and there is one."""
+        """Publish the present message, if due in this period and available."""
         if period % self._every == 0 and (payload := self._source.cdr(self._stamps.next_ns())) is not None:
             self._publish(payload)
             self._count.messages += 1
 
 
 class WantedTopic(PeriodicTopic):
-    """A periodic topic whose messages are made while a program subscribes.
+    """A periodic topic with messages made only while a program subscribes.
 
-    Those without a subscriber are counted, too: what is reported is what a program would get.
+    Messages without a subscriber are counted too: the reported rate is the rate for a subscriber.
     """
 
     def __init__(self, source: WantedSource, publish: Publisher, count: Count, every: int = 1) -> None:
@@ -143,7 +143,7 @@ class WantedTopic(PeriodicTopic):
         self._wanted_source = source
 
     def publish(self, period: int) -> None:
-        """Publish the present message, if it is due, there is one, and it is for anybody."""
+        """Publish the present message, if due, available, and subscribed to."""
         if self._publish.wanted:
             super().publish(period)
         elif period % self._every == 0:
@@ -151,7 +151,7 @@ class WantedTopic(PeriodicTopic):
 
 
 class EventTopic:
-    """One topic of which every message is published at once, in the thread that writes it."""
+    """A topic with immediate publication of every message, in the writing thread."""
 
     def __init__(self, publish: Publisher, count: Count) -> None:
         self._publish, self._count, self._stamps = publish, count, Stamps()
@@ -168,7 +168,7 @@ class EventTopic:
 
 
 class Publications:
-    """The thread that publishes all states at the gateway's period, whatever the simulation's is."""
+    """Thread publishing all states at the gateway's period, independent of the simulation's period."""
 
     def __init__(self, name: str, topics: Sequence[PeriodicTopic], period_ns: int) -> None:
         """Start to publish; `name`: the gateway's."""

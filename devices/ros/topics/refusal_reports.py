@@ -19,23 +19,23 @@ __all__ = ["RefusalReports"]
 log = logging.getLogger(__name__)
 
 _MOST = 8
-"""Different words reported of one topic within that time: a client may have a new error each time."""
+"""Most different texts reported per topic within the period: a client may send a new error each time."""
 
 
 class RefusalReports:
-    """Reports refused messages, and counts those that are not reported; for use from any thread."""
+    """Reports refused messages, and counts unreported refusals; for use from any thread."""
 
     def __init__(self, name: str, publish: Callable[[str, StringMessage], None]) -> None:
-        """`name`: the gateway's; `publish`: publishes a text on a port (`PSM1/warning`), if it exists."""
+        """`name`: the gateway's; `publish`: publishes a text on an existing port (`PSM1/warning`)."""
         self._name, self._publish = name, publish
         self._recent: dict[str, dict[str, Vector]] = {}
-        """By topic and words: the last report of a refusal, as `refusals_to_report` has it."""
+        """Last report of a refusal, in the form of `refusals_to_report`, by topic and words."""
         self._counting = threading.Lock()
 
     def report(self, row: Row, level: str, reason: str) -> None:
         """Report on `<owner>/<level>` why a message on `row` was refused.
 
-        `level`: `error` if the message is invalid, `warning` if it is not allowed now.
+        `level`: `error` for an invalid message, `warning` for a message not allowed now.
         """
         with self._counting:
             count = self._to_report(row, f"{level} {reason}")
@@ -46,7 +46,7 @@ class RefusalReports:
         self._publish(f"{row.owner}/{level}", StringMessage(data=f"{row.owner}: {text}"))
 
     def _to_report(self, row: Row, words: str) -> int:
-        """Return how often the same refusal occurred since its last report; 0 while it is not reported."""
+        """Return the number of equal refusals since the last report; 0: not to be reported now."""
         now_ns, recent = monotonic_ns(), self._recent.setdefault(row.topic, {})
         if words not in recent:
             for old in [one for one, last in recent.items() if not is_recent(last, now_ns)]:

@@ -1,8 +1,7 @@
-"""What a client that waits for a move gets when the gateway itself refuses the move.
+"""Answer to a client waiting for a move refused by the gateway itself.
 
-A CRTK client waits for an operating state that is newer than its command and not busy, and for
-`goal_reached`. The motion controller publishes both for a move that it refuses; of a move that the gateway
-refuses it never hears.
+A CRTK client waits for an operating state newer than its command and not busy, and for `goal_reached`. The
+motion controller publishes both for a refused move, but never hears of a move refused by the gateway.
 """
 
 from __future__ import annotations
@@ -23,18 +22,18 @@ __all__ = ["RefusedMoves"]
 _PENDING_NS = 1_000_000_000
 """For so long after an accepted move the controller's own operating state is awaited."""
 _MOST_PER_S, _BURST = 200, 50
-"""Refused moves that are answered: a program that floods a topic does not make the gateway flood others."""
+"""Limits of answers to refused moves: a program flooding a topic does not make the gateway flood others."""
 
 
 class RefusedMoves:
     """Publishes the newest operating state again, and `goal_reached`; for use from any thread."""
 
     def __init__(self, publish: Callable[[str, Message], None]) -> None:
-        """`publish`: publishes a message on a port (`PSM1/operating_state`), if it exists, stamped now."""
+        """`publish`: publishes a message, stamped now, on an existing port (`PSM1/operating_state`)."""
         self._publish = publish
         self._states: dict[str, OperatingState] = {}
         self._accepted_ns: dict[str, int] = {}
-        """By owner: when a move was accepted to which no operating state has answered."""
+        """Time of the last accepted move without an answering operating state, by owner."""
         self._bucket = TokenBucket(_MOST_PER_S, _BURST)
         self._deciding = threading.Lock()
 
@@ -45,7 +44,7 @@ class RefusedMoves:
             self._accepted_ns.pop(owner, None)
 
     def accepted(self, row: Row) -> None:
-        """Note that a message was accepted: after a move, the controller publishes the operating state."""
+        """Note an accepted message: after a move, the controller publishes the operating state."""
         if is_move(row.name):
             with self._deciding:
                 self._accepted_ns[row.owner] = monotonic_ns()

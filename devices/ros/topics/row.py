@@ -1,4 +1,4 @@
-"""One row of the table from which every gateway makes its publishers, subscribers, services and ports."""
+"""A row of the table of topics, the source of every gateway's publishers, subscribers, services and ports."""
 
 from __future__ import annotations
 
@@ -17,43 +17,43 @@ Way = Literal["publish", "subscribe", "serve"]
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One topic or service, seen from the gateway."""
+    """A topic or service, seen from the gateway."""
 
     topic: str
     """Absolute name: `/PSM1/measured_js`."""
     type: str
     """ROS 2 type: `sensor_msgs/msg/JointState`, `crtk_msgs/srv/QueryForwardKinematics`."""
     way: Way
-    """`publish`: from the simulation; `subscribe`: from ROS programs; `serve`: a service for them."""
+    """`publish`: from the simulation; `subscribe`: from ROS programs; `serve`: a service for programs."""
     port: Port | None = None
-    """The port behind it: an input if published, an output if subscribed to.
+    """Port of the row: an input if published, an output if subscribed to.
 
-    None: the gateway itself publishes or serves it.
+    None: the gateway itself publishes or serves the row.
     """
     latched: bool = False
     """Late joiners get the last message."""
     periodic: bool = False
     """Published at the gateway's period, the newest value each time; otherwise once per message, at once."""
     owner: str = ""
-    """The arm, console part or camera that it belongs to: `PSM1`, `SUJ/PSM1`.
+    """Arm, console part or camera of the row: `PSM1`, `SUJ/PSM1`.
 
-    Its `warning` and `error` report what was refused on this row.
+    The owner's `warning` and `error` report refusals on this row.
     """
 
     is_real: bool = False
-    """Whether it belongs to a real arm or pedal that the gateway subscribes to."""
+    """Whether the owner is a real arm or pedal."""
 
     @property
     def is_picture(self) -> bool:
-        """Whether its messages are pictures, far larger than all others."""
+        """Whether the messages are pictures, far larger than all others."""
         return self.type in _PICTURES
 
     @property
     def name(self) -> str:
-        """The topic without its owner: `measured_js`, `jaw/servo_jp`."""
+        """The topic without the owner: `measured_js`, `jaw/servo_jp`."""
         return self.topic.rpartition(f"/{self.owner}/")[2] if self.owner else self.topic[1:]
 
     @property
     def moves(self) -> bool:
-        """Whether it moves an arm: such commands are accepted from one program at a time."""
+        """Whether the row moves an arm: moves are accepted from a single program at a time."""
         return self.way == "subscribe" and self.name.rpartition("/")[2].startswith(("servo_", "move_"))

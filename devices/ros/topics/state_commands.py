@@ -1,4 +1,4 @@
-"""Latched `state_command`s: which of them a connection has delivered again, and which are new."""
+"""Latched `state_command`s: new commands told from repeated deliveries."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ __all__ = ["RepeatedStateCommands"]
 
 
 class RepeatedStateCommands(RememberedCommands):
-    """Refuses state commands that arrive a second time: latched, they do whenever a client connects again."""
+    """Refuses state commands on their second arrival: latched messages repeat when a client reconnects."""
 
     def refusal(self, stamp_ns: int) -> str | None:
-        """Return why a command with this stamp (ns) is refused; otherwise remember it and return None."""
+        """Return why a command with this stamp (ns) is refused; otherwise remember the stamp."""
         if not self.is_repeated(*divmod(stamp_ns, 1_000_000_000)):
             return None
         return f"accepted before, with the same stamp, {stamp_ns / 1e9:.9f} s: a new command has a new stamp"

@@ -1,4 +1,4 @@
-"""What ROS programs publish, on its way into the simulation: validated, counted, accepted or refused."""
+"""Messages of ROS programs on their way into the simulation: validated, counted, accepted or refused."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from schemas.message import Message
 __all__ = ["Report", "SubscribedTopic"]
 
 Report = Callable[[Row, str, str], None]
-"""Reports on the arm's `error` (the message is invalid) or `warning` (not allowed now) why it was refused."""
+"""Reports a refusal with its reason on the arm's `error` (invalid message) or `warning` (not allowed now)."""
 
 _MOST_PER_S = 1500
-"""Messages per second on one topic: the frequency of a real arm's own loop, which reads no more (dVRK
+"""Most messages per second on a topic: the frequency of a real arm's own loop (dVRK
 docs/pages/development/middleware.rst).
 """
 _BURST = 150
-"""Messages that may arrive at once: those of a tenth of a second."""
+"""Most messages at once: the messages of a tenth of a second."""
 
 
 class SubscribedTopic:
-    """One subscribed row; `receive` decides on every message."""
+    """A subscribed row; `receive` decides on every message."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class SubscribedTopic:
         accept: Callable[[Row, Message], None],
         report: Report,
     ) -> None:
-        """`arbiter`: of the row's arm, None if every program may send; `accept` gets what is not refused."""
+        """`arbiter`: of the row's arm, None: every program may send; `accept`: gets accepted messages."""
         self._row, self._arbiter, self._count, self._accept, self._report = (
             row,
             arbiter,
@@ -55,7 +55,7 @@ class SubscribedTopic:
         self._bucket = TokenBucket(_MOST_PER_S, _BURST)
 
     def receive(self, payload: bytes, client: str, /, *, connected_ns: int = 0) -> None:
-        """Accept a message or refuse it; a `devices.ros.transport.MessageHandler`."""
+        """Accept or refuse a message; a `devices.ros.transport.MessageHandler`."""
         self._count.messages += 1
         if not self._bucket.spend(monotonic_ns()):
             self._refuse(
@@ -75,7 +75,7 @@ class SubscribedTopic:
             self._refuse("warning", reason)
 
     def _refusal(self, message: Message, client: str, connected_ns: int) -> str | None:
-        """Return why a valid message is not accepted now; None if it is."""
+        """Return why a valid message is not accepted now; None: accepted."""
         stamp_ns = stamp_of(message)
         if (stamp_ns or 0) < connected_ns and not self._row.is_real:
             return f"published by {client} before it was connected: if it is still meant, publish it again"
@@ -86,7 +86,7 @@ class SubscribedTopic:
         return self._arbiter.refusal(client) if self._arbiter is not None else None
 
     def _latched(self, stamp_ns: int, client: str) -> str | None:
-        """Return why a state command is an old one that a new connection has delivered; None if it is new."""
+        """Return why a state command counts as a repeated delivery; None: a new command."""
         now_ns = time_ns()
         # by the wall clock of now: it may have been set since then
         if stamp_ns < now_ns - (monotonic_ns() - self._opened_ns):

@@ -21,17 +21,16 @@ from schemas.vectors import Vector
 __all__ = ["TF_PERIOD_NS", "TransformTree"]
 
 TF_PERIOD_NS = 20_000_000
-"""As on the dVRK (docs/pages/development/middleware.rst)."""
+"""Period of `/tf`, as on the dVRK (docs/pages/development/middleware.rst)."""
 _STAMP = Struct("<iI")
 _Edge = tuple[str, str, Callable[[], Vector | None]]
-"""Parent frame, child frame, and a function that returns the pose, shape (7,), of the child in the parent."""
+"""Parent frame, child frame, and a function returning the pose, shape (7,), of the child in the parent."""
 
 
 class TransformTree:
     """The tree of frames, as messages.
 
-    World or cart, `<arm>_base`, `<arm>` (its tip), and under the endoscope's tip the left camera's optical
-    frame.
+    World or cart, `<arm>_base`, `<arm>` (tip), and under the endoscope's tip the left camera's optical frame.
     """
 
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
@@ -55,7 +54,7 @@ class TransformTree:
         return any(newest() is not None for _, _, newest in self._edges)
 
     def cdr(self, stamp_ns: int) -> bytes | None:
-        """Return all transforms that are known now, as a TFMessage; None if there are none."""
+        """Return all known transforms as a TFMessage; None: no transform is known."""
         known = [
             (parent, child, pose) for parent, child, newest in self._edges if (pose := newest()) is not None
         ]
@@ -68,13 +67,13 @@ class TransformTree:
 
 
 class _Template:
-    """The bytes of a TFMessage between given frames, of which only stamps and poses change.
+    """The bytes of a TFMessage between given frames, with variable stamps and poses.
 
-    Filling them in takes 21 us, encoding through the models 540.
+    Filling in stamps and poses takes 21 us, encoding through the models 540.
     """
 
     def __init__(self, edges: tuple[tuple[str, str], ...]) -> None:
-        """Encode once, with numbers that occur nowhere else, to find the offsets of stamps and poses."""
+        """Encode once, with unique numbers, to find the offsets of stamps and poses."""
         self.edges = edges
         marks = np.random.default_rng(0).random((len(edges), 7))
         stamps = [Time(sec=10**9 + index, nanosec=10**8 + index) for index in range(len(edges))]
@@ -98,7 +97,7 @@ class _Template:
 
 
 def _base(name: str, arm: MountedArm, params: GatewayParams, states: Mapping[str, State]) -> _Edge:
-    """Return the edge to an arm's base: its pose is the motion controller's if it can move, else fixed."""
+    """Return the edge to an arm's base: the pose from the motion controller if movable, else fixed."""
     child = f"{name}_base"
     if params.mounting == "cart":
         return "Cart", child, _newest(states[f"SUJ/{name}/local/measured_cp"])

@@ -1,4 +1,4 @@
-"""What a ROS message must satisfy beyond its type and finite numbers before it enters the simulation."""
+"""Checks of a ROS message, beyond type and finite numbers, before entry into the simulation."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from schemas.ros import JointState, PoseStamped, Quaternion
 __all__ = ["as_signal", "validate"]
 
 _QUATERNION_TOLERANCE = 1e-3
-"""Of the norm, as for the values of signals (schemas.vectors)."""
+"""Tolerance of the norm of quaternions, as for values of signals (schemas.vectors)."""
 
 
 def validate(message: Message, row: Row) -> None:
-    """Check the number of joints (those that the row's port names) and the norms of quaternions.
+    """Check the number of joints against the row's port, and the norms of quaternions.
 
     Raises MessageError.
     """
@@ -63,7 +63,7 @@ def _check_quaternion(q: Quaternion) -> None:
 
 
 def as_signal(message: Message, port: Port) -> Message:
-    """Return a real arm's message as the signal `port` has it: our joint names, zeros for missing fields."""
+    """Return a real arm's message as the signal `port`: our joint names, zeros for missing fields."""
     if not isinstance(message, JointState):
         return message
     stated = {field: getattr(message, field) for field in port.fields}

@@ -1,8 +1,8 @@
 """The table of a gateway with `profile: vrep`: the topics of the authors' simulator, in V-REP.
 
-Behind it is a participant of kind `paper`. Names and types as in the scripts of their scenes
-(unina-icaros/dvrk-vrep, 88fe5975, V-REP_scenes), with the topics that their Python client publishes in
-addition (65ef3ccd, dvrk_python/src/dvrk_python/robot.py). Joint states have no names there. Ours are
+The source of values is a participant of kind `paper`. Names and types as in the scripts of the authors'
+scenes (unina-icaros/dvrk-vrep, 88fe5975, V-REP_scenes), with additional topics of the authors' Python client
+(65ef3ccd, dvrk_python/src/dvrk_python/robot.py). Joint states have no names in V-REP. Ours are
 `/stereo/markers` and `/stereo/error`.
 """
 
@@ -42,13 +42,13 @@ _STITCHES = {
     "delete_stitches": _BOOL,
     "state_current": _STRING,
 }
-"""What their suture planner publishes; a participant of kind `vrep-sutures` makes markers of it."""
+"""Topics of the authors' suture planner, made into markers by a participant of kind `vrep-sutures`."""
 _FILTER = {"kalmanOutput": PoseStamped.ros_type, "Tcn_hat": Float64MultiArray.ros_type}
-"""What their filter publishes: here a participant of kind `needle-tracker`."""
+"""Topics of the authors' filter: here a participant of kind `needle-tracker`."""
 
 
 def vrep_table(params: GatewayParams) -> tuple[Row, ...]:
-    """Return every row for the arms that `params` show."""
+    """Return every row for the arms of `params`."""
     return (
         *(row for name, arm in params.arms.shown.items() for row in _arm(name, arm)),
         _state("dvrk/setup_joint", "state_joint_current", size=_SETUP_JOINTS),

@@ -22,7 +22,7 @@ _PARTS = ("", "jaw/", "hand/")
 
 
 def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, WantedSource]:
-    """Return what is published of all arms together, by row name; `states`: by the names of their ports.
+    """Return the sources of topics of all arms together, by row name; `states`: states by port.
 
     The authors' simulator (profile `vrep`) has no such topics.
     """
@@ -32,9 +32,9 @@ def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> M
 
 
 def inputs_of_all(params: GatewayParams) -> frozenset[str]:
-    """Return the ports that the gateway itself reads: for `/tf`, `/joint_states` and kinematics.
+    """Return the ports read by the gateway itself: for `/tf`, `/joint_states` and kinematics.
 
-    By them it knows, too, whether the simulation runs.
+    From these ports the gateway also knows whether the simulation runs.
     """
     poses = ("{}/local/measured_cp", "SUJ/{}/measured_cp", "SUJ/{}/local/measured_cp")
     joints = (f"{{}}/{part}measured_js" for part in _PARTS)
@@ -48,9 +48,9 @@ def periods_between(name: str, period_ns: int) -> int:
 
 
 def robot_description(file: Path) -> str:
-    """Return the URDF in `file`, with its meshes as URIs, because readers do not know its directory.
+    """Return the URDF in `file`, with meshes as URIs, because readers do not know the directory.
 
-    Raises DeviceError if it is no URDF.
+    Raises DeviceError if `file` is no URDF.
     """
     try:
         robot = ElementTree.fromstring(file.read_text("utf-8"))
@@ -66,7 +66,7 @@ def robot_description(file: Path) -> str:
 
 
 class _JointStates:
-    """The joints of all arms and of what they hold, named `<arm>_<joint>` as in the robot's description."""
+    """The joints of all arms and instruments, named `<arm>_<joint>` as in the robot's description."""
 
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
         found = (
@@ -82,7 +82,7 @@ class _JointStates:
         return any(state.present for _, state in self._parts)
 
     def cdr(self, stamp_ns: int) -> bytes | None:
-        """Return the joints that are known now, as a JointState; None if there are none."""
+        """Return all known joints as a JointState; None: no joint is known."""
         known = [(arm, state, value) for arm, state in self._parts if (value := state.value) is not None]
         if not known:
             return None
