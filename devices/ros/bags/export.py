@@ -1,7 +1,7 @@
-"""Writes a session's recording as a bag with ROS names: what its gateway has published and received.
+"""Writes a session's recording as a bag with ROS names: messages published and received by the gateway.
 
 Times are the session's start by the wall clock plus simulated time, in stamps too: a bag plays at the pace of
-the simulation, however fast that ran (docs/decisions/0033-bags.md).
+simulated time, whatever the speed of the session (docs/decisions/0033-bags.md).
 """
 
 from __future__ import annotations
@@ -39,16 +39,17 @@ log = logging.getLogger(__name__)
 
 _KEYS = Keys("any")
 _Routes = Mapping[str, Sequence[tuple[Row, Port]]]
-"""By the topics of a recording: the rows that get its values, each with the port that has written them."""
+"""Receiving rows by topic of a recording, each with the port of the written values."""
 
 
 _LONGEST_GAP_NS = 3_600_000_000_000
-"""Between two messages: states are repeated at each period, so that a wrong time would fill the disk."""
+"""Longest time between two messages: states are repeated at each period, so a wrong time would fill the disk.
+"""
 
 
 @dataclass(frozen=True)
 class ExportSummary:
-    """What was written."""
+    """Summary of an export."""
 
     bag: str
     gateway: str
@@ -60,19 +61,19 @@ class ExportSummary:
 def export(
     recording: Recording, directory: Path, gateway: str | None = None, *, trust: bool = False
 ) -> ExportSummary:
-    """Write what a gateway of a recorded session has published and received to a new `directory`.
+    """Write the messages published and received by a gateway of a recorded session to a new `directory`.
 
     Args:
         recording: the recording of the session.
-        directory: the bag, which must not exist yet.
-        gateway: the gateway's name; by default the session's only one.
-        trust: allow what `require_trust` refuses.
+        directory: the bag, not existing yet.
+        gateway: the gateway's name; by default the session's only gateway.
+        trust: allow requests refused by `require_trust`.
 
     Raises:
         RecordingError: if the session has no such gateway, if the directory exists or cannot be written,
             or if the recording is damaged.
         ScenarioError: if the gateway's kind is not installed.
-        TrustError: if the gateway, or without a name any device, asks for what is not allowed.
+        TrustError: if the gateway, or without a name any device, asks for forbidden files or code.
     """
     plan = recording.plan()
     shown = _gateway(recording, plan, gateway, trust=trust)
@@ -99,7 +100,7 @@ def export(
 
 
 def _gateway(recording: Recording, plan: Plan, name: str | None, *, trust: bool) -> Gateway:
-    """Return the gateway with this name, or the only one, as the scenario declares it."""
+    """Return the gateway with this name, or the only gateway, as declared in the scenario."""
     devices = {key: planned for key, planned in plan.participants.items() if planned.role == "device"}
     classes = {key: planned for key, planned in devices.items() if names_class(planned.kind)}
     there = [
@@ -155,7 +156,7 @@ class _Recorded(State):
     """The newest recorded value of a state."""
 
     def __init__(self, port: Port, source: Port) -> None:
-        """`port` is the gateway's, `source` the one that has written the values."""
+        """`port`: port of the gateway; `source`: port of the written values."""
         super().__init__(port)
         self._reader = PortCodec(port.filled_from(source))
         self.payload: bytes | None = None
@@ -183,7 +184,7 @@ class _RowWriter:
         self.write_cdr(row, time_ns, encode(stamped(message, self.stamp_ns(row, time_ns))))
 
     def write_cdr(self, row: Row, time_ns: int, payload: bytes) -> None:
-        """Write a message that is stamped and encoded already."""
+        """Write a stamped and encoded message."""
         self._bag.write(row.topic, row.type, self._start_ns + time_ns, payload, latched=row.latched)
 
 
@@ -218,7 +219,7 @@ class _Replay:
             log.warning("the bag is without %s: %s", row.topic, error)
 
     def write(self, row: Row, source: Port, time_ns: int, payload: bytes) -> None:
-        """Set a state's newest value, or write an event. Raises MessageError if it is invalid."""
+        """Set a state's newest value, or write an event. Raises MessageError for an invalid payload."""
         if row.topic in self._recorded:
             self._recorded[row.topic].payload = payload
         # a signal's value at time 0 is its initial value, and no message

@@ -1,4 +1,4 @@
-"""What a scenario may say about a bag that is played into a session."""
+"""Parameters of a bag played into a session."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from schemas.quantity import Duration
 __all__ = ["BagParams", "listed"]
 
 _NAMED = 6
-"""Topics that one message names."""
+"""Most topics named in a message."""
 
 
 class BagParams(TopicParams):
-    """Which bag is played, how, and which of its topics."""
+    """The bag to play, the manner of playing, and the topics."""
 
     bag: Path = Field(
         description="rosbag2 directory, .mcap, .db3, or .bag of ROS 1, relative to the scenario"
@@ -71,14 +71,14 @@ class BagParams(TopicParams):
 
     @property
     def subscribed(self) -> Mapping[str, Row]:
-        """The rows that a gateway would subscribe to, by topic."""
+        """Rows subscribed to by a gateway, by topic."""
         shared = {name: getattr(self, name) for name in TopicParams.model_fields}
         params = GatewayParams(**shared)
         rows = dvrk_table(params) if self.profile == "dvrk" else vrep_table(params)
         return {row.topic: row for row in rows if row.way == "subscribe" and row.port is not None}
 
     def played(self, topics: Mapping[str, BagTopic]) -> Mapping[str, Row]:
-        """Return the topics of a bag that are played, each with the row that it is played as."""
+        """Return the played topics of a bag, each with its row."""
         subscribed = self.subscribed
         rows = {
             topic: subscribed.get(self.rename.get(topic, topic))

@@ -1,8 +1,8 @@
 """Plays an operator's commands and a real dVRK's states from a ROS bag: the kind `ros-bag`.
 
-Time 0 is the first message of the bag, whatever its topic, and the times of recording give the pace, as in
-`ros2 bag play`. Ports are named as those of a gateway, and messages are refused by the same rules; stamps
-become the times of playing. docs/decisions/0033-bags.md.
+Time 0 is the first message of the bag on any topic, and the times of recording give the pace, as in `ros2 bag
+play`. Ports have the names of a gateway's ports, and messages are refused by the same rules; stamps become
+the times of playing. docs/decisions/0033-bags.md.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ __all__ = ["BagPlayer"]
 log = logging.getLogger(__name__)
 
 _LATCHED_NS = 1_000_000_000
-"""A state command that is older when it is recorded was delivered, latched, to a late recorder; a CRTK
-client takes a connection for lost after as long.
+"""Age of a state command at its recording, beyond which the command was delivered, latched, to a late
+recorder; a CRTK client considers a connection lost after the same time.
 """
 
 
@@ -50,7 +50,7 @@ class BagPlayer(Device):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """One output for each topic that is in the bag, named as a gateway's."""
+        """An output for each topic in the bag, named as a gateway's."""
         return self._ports
 
     @cached_property
@@ -74,7 +74,7 @@ class BagPlayer(Device):
 
     # the validated parameters have the bag's whole path
     def open(self, directory: Path) -> None:  # noqa: ARG002
-        """Open the bag, and log which topics are not played. Raises RecordingError if it cannot be read."""
+        """Open the bag, and log unplayed topics. Raises RecordingError for an unreadable bag."""
         self.close()
         self._bag = bag = RosBag(self.params.bag)
         played = self.params.played(bag.topics)
@@ -90,7 +90,7 @@ class BagPlayer(Device):
         self._playback = Playback(self._play(bag, played))
 
     def read(self, t: int) -> list[Sample]:
-        """Return the samples up to time `t` that were not returned before, oldest first."""
+        """Return the samples since the last call up to time `t`, oldest first."""
         return self._playback.due(t)
 
     def close(self) -> None:
@@ -101,7 +101,7 @@ class BagPlayer(Device):
         self._bag = None
 
     def _play(self, bag: RosBag, played: Mapping[str, Row]) -> Iterator[tuple[int, Sample]]:
-        """Yield (time in ns, sample) of all that is not refused, in order."""
+        """Yield (time in ns, sample) of all accepted messages, in order."""
         start_ns = bag.start_ns + self.params.start
         filters = {row.topic: _Filter(row) for row in played.values()}
         for topic, recorded_ns, raw in bag.messages(played, start_ns):
@@ -116,14 +116,14 @@ class BagPlayer(Device):
 
 
 class _Filter:
-    """Refuses what a gateway refuses, for one row."""
+    """Refuses messages of a row by a gateway's rules."""
 
     def __init__(self, row: Row) -> None:
         self._row, self._model = row, message_type(row.type)
         self._repeated = RepeatedStateCommands()
 
     def accepted(self, raw: object, recorded_ns: int) -> Message:
-        """Return what was recorded as the row's message. Raises MessageError where it is refused."""
+        """Return a recorded message in the row's type. Raises MessageError for a refused message."""
         if isinstance(raw, Exception):
             raise MessageError(f"no such message ({type(raw).__name__}: {raw})")
         message = validated(self._model, raw)
@@ -138,7 +138,7 @@ class _Filter:
         return as_signal(message, port)
 
     def _check_latched(self, stamp_ns: int, recorded_ns: int) -> None:
-        """Raise MessageError for an old state command that a new connection has delivered."""
+        """Raise MessageError for an old state command delivered by a new connection."""
         ago_ns = recorded_ns - stamp_ns
         if ago_ns > _LATCHED_NS:
             raise MessageError(

@@ -36,7 +36,7 @@ _LAST_OF_EACH = Qos(
 
 
 class Discovery:
-    """Keeps the graph of one participant's domain up to date."""
+    """Keeps the graph of a participant's domain up to date."""
 
     def __init__(
         self, participant: DomainParticipant, waitset: ReaderWaitSet, changed: Callable[[], None]
@@ -77,9 +77,9 @@ class Discovery:
                 log.warning("the node names of a program are ignored: %s", error)
 
     def sender(self, participant: bytes) -> str:
-        """Return the name of the program whose participant has this GUID (16 bytes)."""
+        """Return the name of the program with the participant of this GUID (16 bytes)."""
         return self._graph.sender(participant)
 
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
-        """Return the programs that read or write any of `topics`, which are names of DDS topics."""
+        """Return the programs reading or writing any of the DDS topics `topics`."""
         return self._graph.clients(topics)

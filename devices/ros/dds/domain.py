@@ -1,4 +1,4 @@
-"""The DDS domain of a gateway: where on the network ROS programs are discovered, and who can reach it."""
+"""The DDS domain of a gateway: network range of discovery and of access."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ _SPDP = (
     "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
     "<SPDPInterval>1s</SPDPInterval>"
 )
-"""Participants on one machine that are announced to without multicast, as many as with rmw_fastrtps and
-rmw_cyclonedds, and how often: a program with the default range announces itself by multicast only, and waits
+"""Number of participants per machine announced to without multicast, as with rmw_fastrtps and rmw_cyclonedds,
+and period of announcements: a program with the default range announces itself by multicast only, and waits
 for these announcements.
 """
 
@@ -42,14 +42,14 @@ _NEVER_WAIT = (
     "<Watermarks><WhcHigh>1GB</WhcHigh><WhcHighInit>1GB</WhcHighInit><WhcAdaptive>false</WhcAdaptive></Watermarks>"
     "<WriterLingerDuration>0s</WriterLingerDuration>"
 )
-"""Cyclone DDS blocks a writer while slow readers have not acknowledged too many bytes; ours keep only the
-last messages, which is limit enough. And a writer that is deleted waits for its readers, each writer in
-turn.
+"""Without waits: Cyclone DDS blocks a writer while slow readers leave too many bytes unacknowledged, but our
+writers keep only the last messages, a sufficient limit. And a deleted writer waits for its readers, each
+writer in turn.
 """
 
 
 class _ConfiguredDomain(Domain):
-    """A domain that remembers its configuration."""
+    """A domain with its configuration."""
 
     def __init__(self, number: int, settings: str) -> None:
         super().__init__(number, settings)
@@ -57,13 +57,14 @@ class _ConfiguredDomain(Domain):
 
 
 _domains: WeakValueDictionary[int, _ConfiguredDomain] = WeakValueDictionary()
-"""By number: Cyclone DDS has one of each in a process; it ends with the last gateway that holds it."""
+"""Domains of this process by number: Cyclone DDS has a single domain per number, ended with the last gateway.
+"""
 
 
 def domain(number: int, settings: str) -> Domain:
     """Return the domain of this process with this number.
 
-    Raises DeviceError if it exists with another configuration, or cannot be created.
+    Raises DeviceError if the domain exists with another configuration, or cannot be created.
     """
     found = _domains.get(number)
     if found is not None and found.settings != settings:
@@ -87,13 +88,13 @@ def domain(number: int, settings: str) -> Domain:
 
 
 def configuration(discovery: DiscoveryRange, peers: Sequence[str]) -> str:
-    """Return the XML configuration of Cyclone DDS (its docs/manual/config).
+    """Return the XML configuration of Cyclone DDS (Cyclone's docs/manual/config).
 
     Nothing leaves the loopback interface unless `discovery` or `peers` demand it.
 
     Args:
-        discovery: as ROS_AUTOMATIC_DISCOVERY_RANGE of ROS programs.
-        peers: as ROS_STATIC_PEERS.
+        discovery: ROS_AUTOMATIC_DISCOVERY_RANGE of ROS programs.
+        peers: ROS_STATIC_PEERS of ROS programs.
     """
     general = f"<AllowMulticast>{'true' if discovery == 'subnet' else 'false'}</AllowMulticast>"
     if discovery == "localhost" and not peers:
@@ -108,9 +109,9 @@ def configuration(discovery: DiscoveryRange, peers: Sequence[str]) -> str:
 
 
 def _confine(number: int) -> None:
-    """Bind the domain's sockets to the loopback interface: Cyclone DDS binds them to all, however configured.
+    """Bind the domain's sockets to the loopback interface: Cyclone DDS binds to all, however configured.
 
-    Linux only (SO_BINDTODEVICE); elsewhere a firewall has to do it.
+    Linux only (SO_BINDTODEVICE); elsewhere this is the task of a firewall.
     """
     ports = range(multicast_port(number), multicast_port(number + 1))
     for entry in _OPEN_FILES.iterdir() if _OPEN_FILES.is_dir() else ():

@@ -1,4 +1,4 @@
-"""What the gateway offers on a domain by its own RTPS participant: services and subscriptions."""
+"""Services and subscriptions of the gateway's own RTPS participant."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from devices.ros.transport import ServiceHandler
 __all__ = ["ReceiveSample", "Service", "Subscription"]
 
 ReceiveSample = Callable[[bytes, bytes], None]
-"""Receives a message (CDR) and the GUID of the participant that has published it."""
+"""Receives a message (CDR) and the GUID of the publishing participant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,11 +20,11 @@ class Service:
     request_topic: str
     response_topic: str
     type: str
-    """Of both without `Request_` and `Response_`: `crtk_msgs::srv::dds_::QueryForwardKinematics_`."""
+    """DDS type without `Request_` and `Response_`: `crtk_msgs::srv::dds_::QueryForwardKinematics_`."""
     reader_id: bytes
-    """Of requests."""
+    """EntityId of the reader of requests."""
     writer_id: bytes
-    """Of responses."""
+    """EntityId of the writer of responses."""
     handle: ServiceHandler
 
 

@@ -1,4 +1,4 @@
-"""Samples in fragments, as those are that are larger than a datagram (OMG DDSI-RTPS 2.5, 8.4.14)."""
+"""Samples in fragments: samples larger than a datagram (OMG DDSI-RTPS 2.5, 8.4.14)."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from schemas.errors import MessageError
 __all__ = ["MOST_BYTES", "PartialSample"]
 
 MOST_BYTES = 4 * 2**20
-"""The largest sample that is put together; commands have some hundred bytes, lists of markers more."""
+"""Size of the largest assembled sample; commands have some hundred bytes, lists of markers more."""
 
 
 class PartialSample:
-    """One sample, of which not all fragments have arrived. Fragments are numbered from 1."""
+    """An incomplete sample. Fragments are numbered from 1."""
 
     def __init__(self, part: DataFragments) -> None:
-        """Begin with the first part that has arrived; raises MessageError if the sample is too large."""
+        """Begin with the first arrived part; raises MessageError for too large a sample."""
         if not 0 < part.fragment_size <= part.sample_size <= MOST_BYTES:
             raise MessageError(
                 f"a sample of {part.sample_size} bytes in fragments of {part.fragment_size}; a sample has at"
@@ -29,7 +29,7 @@ class PartialSample:
         self._inline_qos: Mapping[int, bytes] = {}
 
     def add(self, part: DataFragments) -> None:
-        """Add fragments; raises MessageError if they are not of this sample."""
+        """Add fragments; raises MessageError for fragments of another sample."""
         start = (part.first - 1) * self._fragment_size
         end = min(start + part.count * self._fragment_size, self._size)
         if (part.sample_size, part.fragment_size) != (self._size, self._fragment_size) or not (
@@ -44,11 +44,11 @@ class PartialSample:
         self._inline_qos = self._inline_qos or part.inline_qos
 
     def missing(self, last: int | None = None) -> list[int]:
-        """Return the fragments that have not arrived, up to `last`."""
+        """Return the missing fragments, up to `last`."""
         return sorted(number for number in self._missing if last is None or number <= last)
 
     def whole(self, part: DataFragments) -> Data:
-        """Return the sample, whose last fragments to arrive are `part`."""
+        """Return the sample, completed by the fragments `part`."""
         return Data(
             part.writer_id, part.reader_id, part.sequence_number, self._inline_qos, bytes(self._content)
         )

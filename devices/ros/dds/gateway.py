@@ -1,4 +1,4 @@
-"""A gateway to ROS 2 over DDS: programs with rmw_fastrtps or rmw_cyclonedds find it as one more node."""
+"""A gateway to ROS 2 over DDS: a node among others for programs with rmw_fastrtps or rmw_cyclonedds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["DdsGateway", "DdsParams"]
 
 
 class DdsParams(GatewayParams):
-    """Which part of the dVRK is shown, and in which domain."""
+    """Part of the dVRK on show, and the domain."""
 
     domain: int = Field(
         default=0,
@@ -72,7 +72,7 @@ class DdsGateway(Gateway):
 
 
 def _address(peer: str) -> str:
-    """Return the address of another machine. Raises DeviceError if its name cannot be resolved."""
+    """Return the address of another machine. Raises DeviceError if the name cannot be resolved."""
     try:
         return socket.gethostbyname(peer)
     except (OSError, UnicodeError) as error:

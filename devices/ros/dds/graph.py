@@ -1,6 +1,6 @@
 """The ROS graph on DDS: endpoints of participants, and names of their nodes from `ros_discovery_info`.
 
-Source: ros2/rmw_dds_common, its README and msg/ParticipantEntitiesInfo.msg.
+Source: ros2/rmw_dds_common, README and msg/ParticipantEntitiesInfo.msg.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ INFO_TOPIC, INFO_TYPE = "ros_discovery_info", "rmw_dds_common/msg/ParticipantEnt
 _CDR_LE = b"\x00\x01\x00\x00"
 
 _MOST_NAMES = 1000
-"""Senders whose names are kept, those that are gone included."""
+"""Most senders with a kept name, gone senders included."""
 
 
 def entities_info(participant: bytes, node: str, readers: Sequence[bytes], writers: Sequence[bytes]) -> bytes:
-    """Return the message (CDR) that assigns all readers and writers of a participant to one node.
+    """Return the message (CDR) for the assignment of all readers and writers of a participant to a node.
 
-    It is encoded for each of some hundred endpoints, hence not by the codec.
+    Encoded again for each of some hundred endpoints, hence not by the codec.
 
     Args:
-        participant: its GUID, 16 bytes.
+        participant: GUID of the participant, 16 bytes.
         node: name of the node with namespace.
-        readers: GUIDs.
-        writers: GUIDs.
+        readers: GUIDs of the readers.
+        writers: GUIDs of the writers.
     """
     namespace, _, name = node.rpartition("/")
     body = participant + struct.pack("<I", 1)
@@ -48,13 +48,13 @@ def entities_info(participant: bytes, node: str, readers: Sequence[bytes], write
 
 
 class Graph:
-    """The other participants of the domain; for use from any thread.
+    """All participants of the domain but our own; for use from any thread.
 
-    A program is a participant, and has the name of its first node. All GUIDs have 16 bytes.
+    A program is a participant with the name of the participant's first node. All GUIDs have 16 bytes.
     """
 
     def __init__(self, own: bytes) -> None:
-        """`own`: GUID of the participant that is ignored."""
+        """`own`: GUID of our participant, ignored here."""
         self._own = own
         self._changing = threading.Lock()
         self._endpoints: dict[bytes, tuple[bytes, str]] = {}
@@ -62,11 +62,11 @@ class Graph:
         self._reads: dict[bytes, str] = {}
         """DDS topic by endpoint, of readers."""
         self.read_topics: frozenset[str] = frozenset()
-        """The DDS topics that programs read."""
+        """DDS topics read by programs."""
         self._nodes: dict[bytes, str] = {}
         """First node by participant."""
         self._names: dict[bytes, str] = {}
-        """Name of a participant, fixed from its first message on."""
+        """Names of participants, fixed from the first message on."""
 
     def add_endpoint(
         self, endpoint: bytes, participant: bytes, topic: str, *, is_reader: bool = False
@@ -80,9 +80,9 @@ class Graph:
                     self.read_topics |= {topic}
 
     def remove_endpoint(self, endpoint: bytes) -> None:
-        """Remove a reader or a writer, and the nodes of its participant with the last one.
+        """Remove a reader or a writer, and with a participant's last endpoint the participant's nodes.
 
-        Its name is kept: on a busy machine a program counts as gone for a while, and goes on.
+        The participant's name is kept: on a busy machine a program counts as gone for a while, and goes on.
         """
         with self._changing:
             participant, _ = self._endpoints.pop(endpoint, (b"", ""))
@@ -92,9 +92,9 @@ class Graph:
                 self._nodes.pop(participant, None)
 
     def set_nodes(self, info: bytes) -> None:
-        """Set the nodes of a participant from its ParticipantEntitiesInfo (CDR).
+        """Set the nodes of a participant from a ParticipantEntitiesInfo (CDR).
 
-        Raises MessageError if the bytes are no such message.
+        Raises MessageError for other bytes.
         """
         try:
             message: Any = typestore().deserialize_cdr(info, INFO_TYPE)
@@ -109,9 +109,9 @@ class Graph:
                 self._nodes[participant] = f"{first.node_namespace.rstrip('/')}/{first.node_name}"
 
     def sender(self, participant: bytes) -> str:
-        """Return the name of a participant, and keep it from now on.
+        """Return the name of a participant, and keep the name from now on.
 
-        So a program that commands an arm does not become another one when the name of its node is discovered.
+        A program in command of an arm thus stays the same program when the node's name is discovered.
         """
         with self._changing:
             if participant not in self._names:
@@ -121,7 +121,7 @@ class Graph:
             return self._names[participant]
 
     def _name(self, participant: bytes) -> str:
-        """Return the name of its first node, with its id where another participant has the same name."""
+        """Return the name of a participant's first node, with the id if the name is not unique."""
         identity, node = participant[:12].hex(), self._nodes.get(participant)
         if node is None:
             return f"participant {identity}"
@@ -132,7 +132,7 @@ class Graph:
         return {participant for participant, _ in self._endpoints.values()}
 
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
-        """Return the programs that read or write any of `topics`, which are names of DDS topics."""
+        """Return the programs reading or writing any of the DDS topics `topics`."""
         with self._changing:
             found = dict.fromkeys(
                 participant for participant, topic in self._endpoints.values() if topic in topics

@@ -1,6 +1,6 @@
-"""Which endpoints of programs are matched with our services and subscriptions, by SEDP.
+"""Matching of programs' endpoints with our services and subscriptions, by SEDP.
 
-Nothing here locks: all is called by the participant, one call at a time.
+Nothing here locks: the participant makes all calls, one after the other.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ Send = Callable[[bytes, Sequence[tuple[str, int]]], None]
 
 
 class Matching:
-    """Our services and subscriptions, and the programs that they are matched with.
+    """Our services and subscriptions, and the matched programs.
 
     Args:
-        guid_prefix: Of our participant, 12 bytes.
+        guid_prefix: GUID prefix of our participant, 12 bytes.
         send: Sends a datagram.
     """
 
@@ -52,25 +52,25 @@ class Matching:
         """The programs, by GUID prefix."""
 
     def next_key(self) -> bytes:
-        """Return the key of the next endpoint, the first three bytes of its EntityIds."""
+        """Return the key of the next endpoint: the first three bytes of EntityIds."""
         return struct.pack(">I", len(self._services) + len(self._subscriptions) + 1)[1:]
 
     def add_service(self, service: Service) -> None:
-        """Announce a service, and match what is there already."""
+        """Announce a service, and match existing clients."""
         self._services.append(service)
         for proxy in self.proxies.values():
             self._announce_endpoints(proxy, service)
         self._match_publications()
 
     def add_subscription(self, subscription: Subscription) -> None:
-        """Announce a subscription, and match what is there already."""
+        """Announce a subscription, and match existing writers."""
         self._subscriptions.append(subscription)
         for proxy in self.proxies.values():
             self._announce_subscription(proxy, subscription)
         self._match_publications()
 
     def add_program(self, prefix: bytes, proxy: ParticipantProxy) -> None:
-        """Exchange endpoints with a program that is new."""
+        """Exchange endpoints with a new program."""
         self.proxies[prefix] = proxy
         send = self._sender(prefix, proxy.metatraffic)
         proxy.readers[PUBLICATIONS_WRITER] = _matched_reader(
@@ -93,7 +93,7 @@ class Matching:
             self._announce_subscription(proxy, subscription)
 
     def receive(self, prefix: bytes, proxy: ParticipantProxy, part: AckNack | FromWriter) -> None:
-        """Receive a submessage of a program; raises MessageError if it is invalid."""
+        """Receive a submessage of a program; raises MessageError for an invalid submessage."""
         if isinstance(part, AckNack):
             if (writer := proxy.writers.get((part.writer_id, part.reader_id))) is not None:
                 writer.on_acknack(part)
@@ -103,7 +103,7 @@ class Matching:
             self._on_unmatched(prefix, proxy, part)
 
     def matched_topics(self) -> set[str]:
-        """Return the DDS topics of which a writer is matched with one of our readers."""
+        """Return the DDS topics with a writer matched with a reader of ours."""
         ids = {reader.reader_id for proxy in self.proxies.values() for reader in proxy.readers.values()}
         return {subscription.topic for subscription in self._subscriptions if subscription.reader_id in ids}
 
@@ -113,7 +113,7 @@ class Matching:
                 self._match_publication(prefix, writer_id)
 
     def _on_publication(self, prefix: bytes, announcement: Data) -> None:
-        """SEDP: match a client's writer with a reader, or remove that."""
+        """SEDP: match a client's writer with a reader, or remove the match."""
         proxy = self.proxies[prefix]
         if is_disposed(announcement):
             gone = disposed_endpoint_id(announcement)
@@ -127,9 +127,9 @@ class Matching:
         self._match_publication(prefix, writer_id)
 
     def _match_publication(self, prefix: bytes, writer_id: bytes) -> None:
-        """Match a writer with our reader of its topic, if there is one.
+        """Match a writer with our reader of the same topic, if any.
 
-        A writer that is announced again keeps its reader, which knows what has been received.
+        A repeated announcement keeps the reader, with the record of received samples.
         """
         proxy = self.proxies[prefix]
         found = self._reader_of(proxy.publications[writer_id], prefix)
@@ -137,7 +137,7 @@ class Matching:
             self._match(prefix, proxy, writer_id, *found)
 
     def _on_unmatched(self, prefix: bytes, proxy: ParticipantProxy, part: FromWriter) -> None:
-        """Match a writer that is not discovered yet with the reader that it addresses, or discover it now."""
+        """Match an undiscovered writer with the addressed reader, or discover the writer now."""
         if part.writer_id in proxy.gone:
             return
         proxy.unmatched.append(part)
@@ -164,7 +164,7 @@ class Matching:
             reader.receive(part)
 
     def _reader_of(self, topic: bytes, prefix: bytes) -> tuple[bytes, Callable[[Data], None]] | None:
-        """Return EntityId and handler of our reader of a topic, which is as a parameter has it."""
+        """Return EntityId and handler of our reader of a topic (in the form of a parameter)."""
         for service in self._services:
             if topic.startswith(encode_string(service.request_topic)):
                 return service.reader_id, partial(self._on_request, service, prefix)
@@ -174,7 +174,7 @@ class Matching:
         return None
 
     def _on_subscription(self, prefix: bytes, announcement: Data) -> None:
-        """SEDP: match a client's reader of responses with a writer, or remove that."""
+        """SEDP: match a client's reader of responses with a writer, or remove the match."""
         proxy = self.proxies[prefix]
         if is_disposed(announcement):
             gone = disposed_endpoint_id(announcement)
@@ -249,9 +249,9 @@ def _matched_reader(
     writer_id: bytes,
     deliver: Callable[[Data], None],
 ) -> StatefulReader:
-    """Return a reader that is matched with a remote writer.
+    """Return a reader matched with a remote writer.
 
-    Cyclone DDS sends a HEARTBEAT by itself, and takes the request for one as malformed.
+    Cyclone DDS sends HEARTBEATs unasked, and considers a request for a HEARTBEAT malformed.
     """
     reader = StatefulReader(send, reader_id, writer_id, deliver)
     if prefix.startswith(FAST_DDS):

@@ -1,4 +1,4 @@
-"""A program on the domain, as the RTPS participant of services and subscriptions remembers it."""
+"""Record of a program on the domain, kept by the RTPS participant of services and subscriptions."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ __all__ = ["ParticipantProxy", "require_room"]
 
 _MOST_EARLY = 64
 _MOST_ENDPOINTS = 1024
-"""Of each kind: whatever is sent on the domain, memory is limited."""
+"""Most endpoints of each kind: memory is limited, whatever is sent on the domain."""
 
 
 @dataclass(slots=True)
 class ParticipantProxy:
-    """A remote participant, and our endpoints that are matched with its own."""
+    """A remote participant, and our matched endpoints."""
 
     metatraffic: tuple[str, int]
-    """Address where it receives SPDP and SEDP."""
+    """Address for SPDP and SEDP."""
     default: tuple[str, int]
-    """Address where it receives all else."""
+    """Address for all other messages."""
     announced_s: float
-    """When it announced itself last, by the monotonic clock."""
+    """Time of the last announcement, by the monotonic clock."""
     readers: dict[bytes, StatefulReader] = field(default_factory=dict[bytes, StatefulReader])
-    """By EntityId of the remote writer."""
+    """Readers by EntityId of the remote writer."""
     writers: dict[tuple[bytes, bytes], StatefulWriter] = field(
         default_factory=dict[tuple[bytes, bytes], StatefulWriter]
     )
-    """By EntityIds of our writer and the remote reader."""
+    """Writers by EntityIds of our writer and the remote reader."""
     publications: dict[bytes, bytes] = field(default_factory=dict[bytes, bytes])
-    """Topics, as parameters have them, by EntityId of the remote writer."""
+    """Topics, in the form of parameters, by EntityId of the remote writer."""
     gone: deque[bytes] = field(default_factory=lambda: deque[bytes](maxlen=_MOST_ENDPOINTS))
-    """EntityIds of writers that have announced their end."""
+    """EntityIds of writers with an announced end."""
     unmatched: deque[FromWriter] = field(default_factory=lambda: deque["FromWriter"](maxlen=_MOST_EARLY))
-    """What writers have sent that are not discovered yet: they may not send it again."""
+    """Submessages of undiscovered writers, perhaps never sent again."""
     early: deque[tuple[Service, Data]] = field(
         default_factory=lambda: deque["tuple[Service, Data]"](maxlen=_MOST_EARLY)
     )
-    """Requests of clients whose readers of responses are not discovered yet."""
+    """Requests of clients with an undiscovered reader of responses."""
 
 
 def require_room(endpoints: Collection[object]) -> None:

@@ -1,7 +1,7 @@
-"""Whose request it is, and how the response says so: each ROS middleware has a way of its own.
+"""Identification of a request's client in the response, different in each ROS middleware.
 
-rmw_fastrtps names the client in inline QoS, and looks for that in the response; rmw_cyclonedds puts a header
-before the request, and each of its clients looks for its own. Sources: ros2/rmw_fastrtps,
+rmw_fastrtps names the client in inline QoS, in the request and in the response; rmw_cyclonedds puts a header
+before the request, and each client looks for its own header. Sources: ros2/rmw_fastrtps,
 rmw_fastrtps_shared_cpp/src/rmw_request.cpp and rmw_response.cpp; ros2/rmw_cyclonedds,
 rmw_cyclonedds_cpp/src/rmw_node.cpp (cdds_request_header_t).
 """
@@ -20,7 +20,7 @@ _HEADER = slice(4, 20)
 
 
 class ResponseTo:
-    """What the response to a request of the participant with the GUID prefix `prefix` must have."""
+    """Identification in the response to a request of the participant with the GUID prefix `prefix`."""
 
     def __init__(self, request: Data, prefix: bytes) -> None:
         self.request = request.payload
@@ -28,7 +28,7 @@ class ResponseTo:
         self.inline_qos: dict[int, bytes] = {}
         self._header = b""
         self._reader_id: bytes | None = None
-        """Of the client; None: each client of the participant looks for its own header."""
+        """EntityId of the client's reader; None: each client of the participant looks for its own header."""
         if prefix.startswith(FAST_DDS):
             qos = request.inline_qos
             client = qos.get(Pid.RELATED_SAMPLE_IDENTITY) or qos.get(Pid.RELATED_SAMPLE_IDENTITY_EPROSIMA)
@@ -44,9 +44,9 @@ class ResponseTo:
             self.request = request.payload[: _HEADER.start] + request.payload[_HEADER.stop :]
 
     def is_for(self, ids: tuple[bytes, bytes], writer_id: bytes) -> bool:
-        """Return whether the client has the reader of `ids` (our writer, its reader) for `writer_id`."""
+        """Return whether the client has the reader of `ids` (our writer, client's reader) for `writer_id`."""
         return ids[0] == writer_id and self._reader_id in (None, ids[1])
 
     def payload(self, content: bytes) -> bytes:
-        """Return the payload of a response, of which `content` is the CDR."""
+        """Return the payload of a response with the CDR `content`."""
         return content[: _HEADER.start] + self._header + content[_HEADER.start :]

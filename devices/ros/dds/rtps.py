@@ -1,4 +1,4 @@
-"""The RTPS messages that `devices.ros.dds.services` sends and receives, little-endian only.
+"""The RTPS messages of `devices.ros.dds.services`, little-endian only.
 
 Message, submessages (DATA, DATA_FRAG, HEARTBEAT, HEARTBEAT_FRAG, ACKNACK, NACK_FRAG, GAP, INFO_DST) and
 parameter lists. Source: OMG DDSI-RTPS 2.5, 8.3 and 9.4 (submessages), 9.6.2 and 9.6.3 (parameters). INFO_TS
@@ -38,19 +38,19 @@ __all__ = [
 ]
 
 PL_CDR_LE = b"\x00\x03\x00\x00"
-"""Encapsulation header of a parameter list, as discovery data has it."""
+"""Encapsulation header of a parameter list, as in discovery data."""
 _PID_SENTINEL = struct.pack("<HH", 1, 0)
 _LITTLE_ENDIAN, _INLINE_QOS, _FINAL, _DATA_PRESENT, _KEY_PRESENT = 1, 2, 2, 4, 8
 """Flags of submessages: of all; DATA; HEARTBEAT and ACKNACK; DATA; DATA."""
 _ACKNACK, _HEARTBEAT, _GAP, _INFO_DST, _DATA = 0x06, 0x07, 0x08, 0x0E, 0x15
 _NACK_FRAG, _HEARTBEAT_FRAG, _DATA_FRAG = 0x12, 0x13, 0x16
 _MOST_IN_SET = 256
-"""Numbers in one SequenceNumberSet or FragmentNumberSet."""
+"""Most numbers in a SequenceNumberSet or FragmentNumberSet."""
 
 
 @dataclass(frozen=True, slots=True)
 class Data:
-    """DATA: one sample. `writer_id` and `reader_id` are EntityIds, 4 bytes, here and below."""
+    """DATA: a sample. `writer_id` and `reader_id` are EntityIds, 4 bytes, here and below."""
 
     writer_id: bytes
     reader_id: bytes
@@ -58,30 +58,30 @@ class Data:
     inline_qos: Mapping[int, bytes]
     """Parameters beside the payload, by id."""
     payload: bytes
-    """With its encapsulation header; of a disposed instance the key, or nothing."""
+    """Payload with encapsulation header; for a disposed instance the key, or nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class DataFragments:
-    """DATA_FRAG: consecutive fragments of one sample."""
+    """DATA_FRAG: consecutive fragments of a sample."""
 
     writer_id: bytes
     reader_id: bytes
     sequence_number: int
     first: int
-    """The number of the first of them, from 1."""
+    """Number of the first fragment, from 1."""
     count: int
     fragment_size: int
-    """Bytes of each, but for the last one of the sample."""
+    """Bytes of each fragment but the last of the sample."""
     sample_size: int
-    """Bytes of the whole payload, with its encapsulation header."""
+    """Bytes of the whole payload, with encapsulation header."""
     inline_qos: Mapping[int, bytes]
     content: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class HeartbeatFragments:
-    """HEARTBEAT_FRAG: the writer has the fragments of one sample up to `last`."""
+    """HEARTBEAT_FRAG: the writer has the fragments of a sample up to `last`."""
 
     writer_id: bytes
     reader_id: bytes
@@ -91,19 +91,19 @@ class HeartbeatFragments:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """HEARTBEAT: the samples that a writer has, `first` to `last`."""
+    """HEARTBEAT: the samples of a writer, `first` to `last`."""
 
     writer_id: bytes
     reader_id: bytes
     first: int
     last: int
     is_final: bool
-    """A reader that has all samples need not answer."""
+    """Whether a reader with all samples need not answer."""
 
 
 @dataclass(frozen=True, slots=True)
 class AckNack:
-    """ACKNACK: a reader has all samples before `base`, and requests those that are `missing`."""
+    """ACKNACK: a reader has all samples before `base`, and requests `missing`."""
 
     writer_id: bytes
     reader_id: bytes
@@ -113,7 +113,7 @@ class AckNack:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """GAP: samples that are irrelevant to the reader, from `start` until before `base`, and `others`."""
+    """GAP: samples irrelevant to the reader, from `start` until before `base`, and `others`."""
 
     writer_id: bytes
     reader_id: bytes
@@ -123,16 +123,16 @@ class Gap:
 
 
 FromWriter: TypeAlias = Data | DataFragments | Heartbeat | HeartbeatFragments | Gap
-"""What a reader receives from a matched writer."""
+"""Submessages from a matched writer."""
 Submessage: TypeAlias = FromWriter | AckNack
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """The submessages of a datagram that are addressed to one participant."""
+    """The submessages of a datagram for a participant."""
 
     guid_prefix: bytes
-    """Of the sending participant: 12 bytes, of which the first two are its vendor."""
+    """GUID prefix of the sending participant: 12 bytes, the first two for the vendor."""
     submessages: tuple[Submessage, ...]
 
 
@@ -159,7 +159,7 @@ def encode_data(
     payload: bytes,
     inline_qos: Mapping[int, bytes] | None = None,
 ) -> bytes:
-    """Return a DATA submessage; without payload it has inline QoS only, such as a disposal."""
+    """Return a DATA submessage; without payload: inline QoS only, such as a disposal."""
     qos = encode_parameters(inline_qos) if inline_qos else b""
     flags = (_DATA_PRESENT if payload else 0) | (_INLINE_QOS if inline_qos else 0)
     head = struct.pack("<HH", 0, 16) + reader_id + writer_id + encode_sequence_number(sequence_number)
@@ -167,7 +167,7 @@ def encode_data(
 
 
 def encode_heartbeat(writer_id: bytes, reader_id: bytes, first: int, last: int, count: int) -> bytes:
-    """Return a HEARTBEAT submessage that requires an ACKNACK."""
+    """Return a HEARTBEAT submessage with a required ACKNACK."""
     numbers = encode_sequence_number(first) + encode_sequence_number(last)
     return _submessage(_HEARTBEAT, 0, reader_id + writer_id + numbers + struct.pack("<I", count))
 
@@ -175,7 +175,7 @@ def encode_heartbeat(writer_id: bytes, reader_id: bytes, first: int, last: int, 
 def encode_acknack(
     writer_id: bytes, reader_id: bytes, base: int, missing: Iterable[int], count: int
 ) -> bytes:
-    """Return an ACKNACK submessage: all before `base` is there, `missing` (within 256 of it) is requested."""
+    """Return an ACKNACK submessage: has all before `base`, requests `missing` (within 256 of `base`)."""
     numbers = encode_sequence_number(base) + _bitmap(base, missing)
     return _submessage(_ACKNACK, _FINAL, reader_id + writer_id + numbers + struct.pack("<I", count))
 
@@ -190,7 +190,7 @@ def encode_nack_fragments(
 
 
 def _bitmap(base: int, members: Iterable[int]) -> bytes:
-    """Return number of bits and bitmap of a set of numbers, as far as they lie within 256 of `base`."""
+    """Return number of bits and bitmap of a set of numbers, without numbers beyond 256 from `base`."""
     offsets = [number - base for number in members if number - base < _MOST_IN_SET]
     bits = max(offsets, default=-1) + 1
     words = [0] * ((bits + 31) // 32)
@@ -207,9 +207,9 @@ def encode_parameters(values: Mapping[int, bytes]) -> bytes:
 
 
 def parse_parameters(encoded: bytes) -> tuple[dict[int, bytes], int]:
-    """Return a parameter list, the first of each id, and its length in bytes.
+    """Return a parameter list, the first of each id, and the length in bytes.
 
-    Raises MessageError if it has no sentinel.
+    Raises MessageError for a list without sentinel.
     """
     found: dict[int, bytes] = {}
     at = 0
@@ -224,15 +224,15 @@ def parse_parameters(encoded: bytes) -> tuple[dict[int, bytes], int]:
 
 
 def encode_string(value: str) -> bytes:
-    """Return a string as a parameter has it."""
+    """Return a string in the form of a parameter."""
     encoded = value.encode() + b"\0"
     return struct.pack("<I", len(encoded)) + encoded
 
 
 def parse_message(datagram: bytes, own: bytes) -> Message:
-    """Return the part of a datagram that is for the participant with the GUID prefix `own`.
+    """Return the part of a datagram for the participant with the GUID prefix `own`.
 
-    Raises MessageError if it is no RTPS message, or big-endian.
+    Raises MessageError if the datagram is no RTPS message, or big-endian.
     """
     if len(datagram) < 20 or datagram[:4] != b"RTPS":
         raise MessageError(f"{len(datagram)} bytes are no message of RTPS")
@@ -283,7 +283,7 @@ def _data_fragments(content: bytes, flags: int) -> DataFragments:
 
 
 def _inline_qos(content: bytes, flags: int) -> tuple[int, dict[int, bytes]]:
-    """Return where the payload of a DATA or DATA_FRAG begins, and the inline QoS before it."""
+    """Return the offset of the payload of a DATA or DATA_FRAG, and the inline QoS before the payload."""
     (to_qos,) = struct.unpack_from("<H", content, 2)
     at = 4 + to_qos
     if not flags & _INLINE_QOS:
@@ -298,7 +298,7 @@ def _sequence_number(content: bytes, at: int) -> int:
 
 
 def _sequence_number_set(content: bytes, at: int) -> tuple[int, tuple[int, ...]]:
-    """Return the base of a SequenceNumberSet, and the numbers in it."""
+    """Return base and numbers of a SequenceNumberSet."""
     base = _sequence_number(content, at)
     (bits,) = struct.unpack_from("<I", content, at + 8)
     bits = min(bits, _MOST_IN_SET)

@@ -1,4 +1,4 @@
-"""Discovery of RTPS: what participants (SPDP) and endpoints (SEDP) announce, as parameter lists.
+"""Discovery of RTPS: announcements of participants (SPDP) and endpoints (SEDP), as parameter lists.
 
 Source: OMG DDSI-RTPS 2.5, 8.5.3 (SPDP), 8.5.4 (SEDP), 9.3.1 (EntityIds), 9.6.2.3 (ports), table 9.13
 (parameter ids).
@@ -43,10 +43,10 @@ PUBLICATIONS_WRITER, PUBLICATIONS_READER = b"\x00\x00\x03\xc2", b"\x00\x00\x03\x
 SUBSCRIPTIONS_WRITER, SUBSCRIPTIONS_READER = b"\x00\x00\x04\xc2", b"\x00\x00\x04\xc7"
 """EntityIds: of a participant; of built-in endpoints of SPDP, and of SEDP (publications, subscriptions)."""
 WRITER_NO_KEY, READER_NO_KEY = b"\x03", b"\x04"
-"""Entity kinds, the last byte of the EntityId, of user-defined endpoints whose topics have no key."""
+"""Entity kinds (last byte of the EntityId) of user-defined endpoints of topics without key."""
 
 LEASE_S = 20.0
-"""How long a participant that announces nothing counts as alive."""
+"""Time of silence until a participant counts as gone, s."""
 MULTICAST_GROUP = "239.255.0.1"
 """Where participants announce themselves."""
 _PORT_BASE, _DOMAIN_GAIN, _FIRST_UNICAST, _PARTICIPANT_GAIN = 7400, 250, 10, 2
@@ -92,13 +92,13 @@ def multicast_port(domain: int) -> int:
 
 
 def unicast_ports(domain: int) -> range:
-    """Return the UDP ports of a domain where up to 32 participants of one machine receive SPDP by unicast."""
+    """Return the UDP ports for unicast SPDP of up to 32 participants per machine in a domain."""
     first = multicast_port(domain) + _FIRST_UNICAST
     return range(first, first + _PARTICIPANT_GAIN * (_MOST_PARTICIPANTS + 1), _PARTICIPANT_GAIN)
 
 
 def participant_data(guid_prefix: bytes, domain: int, host: str, port: int) -> bytes:
-    """Return the SPDPdiscoveredParticipantData of a participant that receives everything at one address."""
+    """Return the SPDPdiscoveredParticipantData of a participant with a single receiving address."""
     locator = struct.pack("<iI12x4s", 1, port, socket.inet_aton(host))
     return PL_CDR_LE + encode_parameters(
         {
@@ -115,7 +115,7 @@ def participant_data(guid_prefix: bytes, domain: int, host: str, port: int) -> b
 
 
 def participant_disposal(guid_prefix: bytes) -> dict[int, bytes]:
-    """Return the inline QoS of a DATA that announces the end of a participant."""
+    """Return the inline QoS of a DATA announcing the end of a participant."""
     return {Pid.KEY_HASH: guid_prefix + PARTICIPANT, Pid.STATUS_INFO: _DISPOSED_UNREGISTERED}
 
 
@@ -137,14 +137,14 @@ def endpoint_data(
 
 
 def is_disposed(announcement: Data) -> bool:
-    """Return whether a participant or an endpoint announces its end."""
+    """Return whether an announcement is about the end of a participant or an endpoint."""
     return bool(int.from_bytes(announcement.inline_qos.get(Pid.STATUS_INFO, b"")) & _DISPOSED_UNREGISTERED[3])
 
 
 def disposed_endpoint_id(announcement: Data) -> bytes:
-    """Return the EntityId of an endpoint that announces its end.
+    """Return the EntityId of an ending endpoint.
 
-    Fast DDS sends it as a key hash in the inline QoS, Cyclone DDS in the payload.
+    Fast DDS sends the EntityId as a key hash in the inline QoS, Cyclone DDS in the payload.
     """
     guid = announcement.inline_qos.get(Pid.KEY_HASH) or parse_parameters(announcement.payload[4:])[0].get(
         Pid.ENDPOINT_GUID, b""
@@ -155,7 +155,7 @@ def disposed_endpoint_id(announcement: Data) -> bytes:
 def announced_participant(announcement: Data) -> tuple[int, int]:
     """Return the UDP ports of a participant: for metatraffic (SEDP), and for user data.
 
-    Raises MessageError if the announcement has not both, or if one is no port.
+    Raises MessageError for missing or invalid ports.
     """
     found = _announced(announcement, Pid.METATRAFFIC_UNICAST_LOCATOR, Pid.DEFAULT_UNICAST_LOCATOR)
     metatraffic, default = (
@@ -165,7 +165,7 @@ def announced_participant(announcement: Data) -> tuple[int, int]:
 
 
 def _port(locator: bytes) -> int:
-    """Return the port of a locator, which has kind, port (4 bytes each) and address (16 bytes)."""
+    """Return the port of a locator: kind, port (4 bytes each) and address (16 bytes)."""
     port = int.from_bytes(locator[4:8], "little")
     if len(locator) < 8 or not 0 < port < 1 << 16:
         raise MessageError(
@@ -175,7 +175,7 @@ def _port(locator: bytes) -> int:
 
 
 def announced_endpoint(announcement: Data) -> tuple[bytes, bytes]:
-    """Return topic name (as a parameter has it) and EntityId of an announced endpoint.
+    """Return topic name (in the form of a parameter) and EntityId of an announced endpoint.
 
     Raises MessageError if the announcement has not both.
     """

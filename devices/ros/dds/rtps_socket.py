@@ -1,4 +1,4 @@
-"""The socket of an RTPS participant: where it receives, and where it announces itself."""
+"""The socket of an RTPS participant: receiving address, and targets of announcements."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _LARGEST = 65536
 
 
 class RtpsSocket:
-    """Sends and receives the datagrams of one participant in `domain`.
+    """Sends and receives the datagrams of a participant in `domain`.
 
     Args:
-        domain: Its number.
-        multicast: Whether to announce it to the network.
-        hosts: Addresses of machines to announce it to. If that is 127.0.0.1 alone, without multicast, it
+        domain: Number of the domain.
+        multicast: Whether to announce the participant to the network.
+        hosts: Addresses of machines for announcements. With 127.0.0.1 alone, without multicast, the socket
             receives from this machine only.
     """
 
@@ -31,28 +31,28 @@ class RtpsSocket:
         self.targets = [(host, port) for host in hosts for port in unicast_ports(domain)] + (
             [(MULTICAST_GROUP, multicast_port(domain))] if multicast else []
         )
-        """Addresses at which other participants hear of this one."""
+        """Target addresses of announcements."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1" if is_local else "", 0))
         self.host = "127.0.0.1" if is_local else _own_address(domain)
-        """Address of this machine that it announces."""
+        """Announced address of this machine."""
 
     @property
     def port(self) -> int:
-        """Where it receives."""
+        """Receiving port."""
         return int(self._socket.getsockname()[1])
 
     def receive(self, seconds: float) -> tuple[bytes, str]:
-        """Return the next datagram and its sender's address.
+        """Return the next datagram and the sender's address.
 
-        Raises OSError if none comes within `seconds`, or an earlier one of ours did not reach its target.
+        Raises OSError if no datagram comes within `seconds`, or an earlier datagram of ours did not arrive.
         """
         self._socket.settimeout(seconds)
         datagram, address = self._socket.recvfrom(_LARGEST)
         return datagram, str(address[0])
 
     def send(self, datagram: bytes, targets: Sequence[tuple[str, int]]) -> None:
-        """Send a datagram to each of `targets` that can be reached."""
+        """Send a datagram to each reachable target."""
         for target in targets:
             try:
                 self._socket.sendto(datagram, target)
@@ -65,7 +65,7 @@ class RtpsSocket:
 
 
 def _own_address(domain: int) -> str:
-    """Return this machine's address on the network that multicast goes to."""
+    """Return this machine's address on the network of multicast."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect((MULTICAST_GROUP, multicast_port(domain)))  # sends nothing

@@ -1,10 +1,10 @@
-"""Services and subscriptions over DDS: an RTPS participant of our own, with its readers and writers.
+"""Services and subscriptions over DDS: an RTPS participant of our own, with readers and writers.
 
-Programs with rmw_fastrtps tell requests apart by inline QoS, which Cyclone DDS gives no access to; so
-services need a participant of their own, of which programs see the servers and nothing else. It answers
-programs with rmw_cyclonedds, too: of two servers they would use the first that they discover.
-Subscriptions are here because a reader of Cyclone DDS loses what a writer sends before Cyclone DDS has
-matched the two, and a program publishes as soon as its own side is matched (docs/decisions/0030).
+Programs with rmw_fastrtps tell requests apart by inline QoS, and Cyclone DDS gives no access to inline QoS;
+so services need a participant of their own, with the servers as only visible part. The participant answers
+programs with rmw_cyclonedds, too: of two servers a program would use the first discovered. Subscriptions are
+here because a reader of Cyclone DDS loses messages sent before Cyclone DDS has matched reader and writer, and
+a program publishes as soon as its own side is matched (docs/decisions/0030).
 """
 
 from __future__ import annotations
@@ -43,24 +43,24 @@ log = logging.getLogger(__name__)
 _NO_VENDOR = b"\x00\x00"
 """The first two bytes of our GUID prefix."""
 _ANNOUNCE_S, _FORGET_S = 1.0, 3600.0
-"""How often we announce ourselves, and after how long a silent participant is forgotten: one that was
-stopped for longer than its lease, as in a debugger, goes on with the sequence numbers that it knows.
+"""Period of our announcements, and time until a silent participant is forgotten, s: a participant stopped for
+longer than its lease, as in a debugger, goes on with the known sequence numbers.
 """
 _MOST_PARTICIPANTS = 512
-"""Of a domain: whatever is sent on it, memory is limited."""
+"""Most participants of a domain: memory is limited, whatever is sent on the domain."""
 
 
 class ServiceParticipant:
-    """The services and subscriptions of one domain, with a socket and a thread of their own."""
+    """The services and subscriptions of a domain, with a socket and a thread of their own."""
 
     def __init__(self, domain: int, *, multicast: bool, hosts: Sequence[str]) -> None:
         """Start discovery of a domain.
 
         Args:
-            domain: its number.
+            domain: number of the domain.
             multicast: whether to announce ourselves to the network.
-            hosts: addresses of machines to announce ourselves to. If that is 127.0.0.1 alone, without
-                multicast, the socket receives from this machine only.
+            hosts: addresses of machines for announcements. With 127.0.0.1 alone, without multicast, the
+                socket receives from this machine only.
         """
         self._gateway = b""
         self._domain = domain
@@ -73,7 +73,7 @@ class ServiceParticipant:
         self._thread.start()
 
     def ignore(self, guid: bytes) -> None:
-        """Ignore the participant with this GUID: the same gateway's on Cyclone DDS, which has no clients."""
+        """Ignore the participant with this GUID: the same gateway's on Cyclone DDS, without clients."""
         with self._changing:
             self._gateway = guid[:12]
             self._matching.proxies.pop(self._gateway, None)  # it may be discovered already
@@ -106,14 +106,14 @@ class ServiceParticipant:
     def subscribe(self, topic: str, ros_type: str, user_data: str, receive: ReceiveSample) -> bytes:
         """Subscribe to a topic, reliable and volatile.
 
-        Every message of a writer that counts itself matched is received, once and in order, however early it
-        is sent, as far as the writer's history reaches; one in fragments up to `fragments.MOST_BYTES`.
+        Every message of a writer is received once and in order from the match on the writer's side on, within
+        the writer's history; a message in fragments up to `fragments.MOST_BYTES`.
 
         Args:
             topic: name of the ROS topic: `/PSM1/state_command`.
             ros_type: `crtk_msgs/msg/StringStamped`.
-            user_data: is announced with the reader.
-            receive: is called with every message, in the thread of this participant.
+            user_data: user data announced with the reader.
+            receive: called with every message, in the thread of this participant.
 
         Returns:
             GUID (16 bytes) of the reader.
@@ -131,7 +131,7 @@ class ServiceParticipant:
         return self._guid_prefix + subscription.reader_id
 
     def matched_topics(self) -> set[str]:
-        """Return the DDS topics of which a writer is matched with one of our readers."""
+        """Return the DDS topics with a writer matched with a reader of ours."""
         with self._changing:
             return self._matching.matched_topics()
 
@@ -179,7 +179,7 @@ class ServiceParticipant:
                     self._matching.receive(prefix, proxy, part)
 
     def _on_participant(self, prefix: bytes, announcement: Data, host: str) -> None:
-        """SPDP: a participant announces itself, or its end."""
+        """SPDP: the announcement of a participant, or of a participant's end."""
         proxies = self._matching.proxies
         if is_disposed(announcement):
             proxies.pop(prefix, None)

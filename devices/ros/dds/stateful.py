@@ -1,7 +1,6 @@
 """Reliable transfer of RTPS: StatefulWriter and StatefulReader (OMG DDSI-RTPS 2.5, 8.4.9 and 8.4.12).
 
-Each is matched with exactly one remote endpoint, so ReaderProxy and WriterProxy of the standard are part of
-it.
+Each is matched with exactly one remote endpoint, and contains the standard's ReaderProxy or WriterProxy.
 """
 
 from __future__ import annotations
@@ -31,15 +30,15 @@ SendSubmessages = Callable[[Sequence[bytes]], None]
 """Sends submessages to the participant of the matched endpoint."""
 
 _HISTORY = 64
-"""Samples that a writer keeps for retransmission, and that a reader keeps while earlier ones are missing."""
+"""Most samples kept by a writer for retransmission, and by a reader while earlier samples are missing."""
 _MOST_PARTIAL = 4
-"""Samples of one writer that are put together of fragments at a time; the next ones are requested again."""
+"""Most samples of a writer assembled from fragments at a time; further samples are requested again."""
 
 
 class StatefulWriter:
-    """Writes to one remote reader.
+    """Writes to a single remote reader.
 
-    It has sequence numbers of its own: otherwise samples for other readers would be gaps to this one.
+    The writer has sequence numbers of its own: otherwise samples for other readers would be gaps here.
     """
 
     def __init__(self, send: SendSubmessages, writer_id: bytes, reader_id: bytes) -> None:
@@ -79,7 +78,7 @@ class StatefulWriter:
 
 
 class StatefulReader:
-    """Reads from one remote writer, and delivers the samples in order."""
+    """Reads from a single remote writer, and delivers the samples in order."""
 
     def __init__(
         self,
@@ -92,11 +91,11 @@ class StatefulReader:
         self._send, self.reader_id, self._writer_id, self._deliver = send, reader_id, writer_id, deliver
         self._expected, self._acknacks = 1, 0
         self._early: dict[int, Data | None] = {}
-        """Samples that arrived before their turn, by sequence number; None: irrelevant by a GAP."""
+        """Samples arrived before their turn, by sequence number; None: irrelevant by a GAP."""
         self._partial: dict[int, PartialSample] = {}
 
     def request_heartbeat(self) -> None:
-        """Send an ACKNACK of base 0, to which the writer answers with a HEARTBEAT.
+        """Send an ACKNACK of base 0 for a HEARTBEAT of the writer.
 
         Samples may have been sent before this reader existed, and writers send HEARTBEATs only every few
         seconds.
@@ -108,7 +107,7 @@ class StatefulReader:
         self._send([encode_acknack(self._writer_id, self.reader_id, base, missing, self._acknacks)])
 
     def receive(self, part: FromWriter) -> None:
-        """Take what the writer has sent. Raises MessageError if fragments do not fit one another."""
+        """Receive a submessage of the writer. Raises MessageError for contradicting fragments."""
         match part:
             case Data():
                 self._on_data(part)
@@ -122,13 +121,13 @@ class StatefulReader:
                 self._on_gap(part)
 
     def _on_data(self, sample: Data) -> None:
-        """Deliver a sample in its turn."""
+        """Deliver a sample in turn."""
         if self._expected <= sample.sequence_number < self._expected + _HISTORY:
             self._early.setdefault(sample.sequence_number, sample)
         self._deliver_next()
 
     def _on_fragments(self, part: DataFragments) -> None:
-        """Deliver a sample in its turn, when all its fragments have arrived."""
+        """Deliver a sample in turn, after the arrival of all fragments."""
         number = part.sequence_number
         if not self._expected <= number < self._expected + _HISTORY or number in self._early:
             return
@@ -147,7 +146,7 @@ class StatefulReader:
             self._on_data(sample.whole(part))
 
     def _request_fragments(self, number: int, last: int | None = None) -> None:
-        """Request the fragments, up to `last`, that are missing of a sample of which some have arrived."""
+        """Request the missing fragments, up to `last`, of an incomplete sample."""
         missing = self._partial[number].missing(last) if number in self._partial else ()
         if missing:
             self._acknacks += 1
@@ -156,7 +155,7 @@ class StatefulReader:
             )
 
     def _on_heartbeat(self, heartbeat: Heartbeat) -> None:
-        """Request the samples, and fragments of samples, that the writer has and this reader has not."""
+        """Request the samples and fragments of the writer missing here."""
         self._skip_to(heartbeat.first)
         missing = [
             number

@@ -1,4 +1,4 @@
-"""ROS 2 over DDS, on Eclipse Cyclone DDS: the gateway is one more participant, and needs no ROS.
+"""ROS 2 over DDS, on Eclipse Cyclone DDS: the gateway is a participant, and needs no ROS.
 
 Sources: names from ros2/design, articles/140_topic_and_service_name_mapping.md; user data from
 ros2/rmw_dds_common, rmw_dds_common/src/qos.cpp (hash of a type) and ros2/rmw_cyclonedds,
@@ -27,23 +27,23 @@ from schemas.codec import rihs01
 __all__ = ["DdsTransport"]
 
 _ALWAYS = (Policy.Reliability.Reliable(0), Policy.DataRepresentation(use_cdrv0_representation=True))
-"""Reliable, as far as a writer's history reaches; it never blocks for a reader (max_blocking_time 0 ns)."""
+"""Reliable within a writer's history; a writer never blocks for a reader (max_blocking_time 0 ns)."""
 
 VOLATILE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(10))
-"""As ROS programs have it by default: the last ten messages."""
+"""Default of ROS programs: the last ten messages."""
 _LARGE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(60))
-"""Of pictures, a second at 60 Hz.
+"""Quality of pictures: the messages of a second at 60 Hz.
 
-A message larger than a packet is sent in fragments, and a reader of Fast DDS 2.14 that has some of them
-never returns from its next take when a GAP says that the rest is gone (docs/decisions/0030): so the writer
-keeps the rest while a busy machine loses packets.
+A message larger than a packet is sent in fragments. A reader of Fast DDS 2.14 with some fragments never
+returns from the next take when a GAP declares the rest gone (docs/decisions/0030): so the writer keeps the
+rest while a busy machine loses packets.
 """
 _LAST = Policy.DurabilityService(0, Policy.History.KeepLast(1), -1, -1, -1)
 LATCHED = Qos(*_ALWAYS, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), _LAST)
 
 
 class _Publisher:
-    """The writer of one topic; `is_read` returns whether a program reads it, None: it may later."""
+    """The writer of a topic; `is_read`: returns whether a program reads the topic, None: perhaps later."""
 
     def __init__(
         self, writer: DataWriter[Payload], type_: type[Payload], is_read: Callable[[], bool] | None
@@ -59,14 +59,14 @@ class _Publisher:
 
 
 class DdsTransport(Transport):
-    """Publishes, subscribes and serves as one node on one participant.
+    """Publishes, subscribes and serves as a node on a participant.
 
-    Publishing never waits for a reader: each writer keeps its last messages for slow ones. Subscriptions are
-    those of `ServiceParticipant`, in its thread.
+    Publishing never waits for a reader: each writer keeps the last messages for slow readers. Subscriptions
+    are made by `ServiceParticipant`, in the thread of the service participant.
     """
 
     def __init__(self, domain: Domain, number: int, services: ServiceParticipant) -> None:
-        """Join `domain`, whose number is `number`; `services` is a participant of the same domain."""
+        """Join `domain` with the number `number`; `services`: a participant of the same domain."""
         self._domain, self._services = domain, services
         self._participant = DomainParticipant(number, Qos(Policy.Userdata(b"enclave=/;")))
         self._guid = self._participant.guid.bytes
@@ -126,7 +126,7 @@ class DdsTransport(Transport):
         )
 
     def _announce(self) -> None:
-        """Publish to which node our readers and writers belong."""
+        """Publish the node of our readers and writers."""
         readers = [*self._readers, *(reader for reader, _ in self._served)]
         writers = [*(writer.guid.bytes for writer in self._writers), *(writer for _, writer in self._served)]
         self._info.write(self._info.data_type(entities_info(self._guid, NODE, readers, writers)))

@@ -1,7 +1,7 @@
-"""DDS types from ROS types, whose samples are messages in CDR already: nothing is serialised twice.
+"""DDS types from ROS types, with messages in CDR as samples: nothing is serialised twice.
 
-Cyclone DDS announces the type of every topic and accepts only bytes that are such a message, so the whole
-definition is needed; it comes from the type store, where our models are.
+Cyclone DDS announces the type of every topic and accepts only bytes of this type. The whole definition comes
+from the type store of our models.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ _BASES: dict[str, Any] = {
 
 
 class Payload(IdlStruct):
-    """A message as it goes over the wire."""
+    """A message in its form on the wire."""
 
     def __init__(self, cdr: bytes) -> None:
-        """`cdr`: the message with its encapsulation header."""
+        """`cdr`: the message with encapsulation header."""
         self.cdr = cdr
 
     def serialize(
@@ -63,7 +63,7 @@ class Payload(IdlStruct):
 
     @classmethod
     def deserialize_key(cls, data: bytes, has_header: bool = True, use_version_2: bool | None = None) -> Self:  # noqa: ARG003
-        """Return the key of a disposed instance, which has no message."""
+        """Return the key of a disposed instance, without a message."""
         return cls(data)
 
 
@@ -85,7 +85,7 @@ def _fields(ros_type: str) -> dict[str, Any]:
 
 
 def _type(described: Any) -> Any:
-    """Return the type of a field as rosbags describes it; bounds and lengths are 0 if there are none."""
+    """Return the type of a field from the description of rosbags; bounds and lengths are 0 if missing."""
     kind, of = described
     if kind == Nodetype.NAME:
         return _struct(of)

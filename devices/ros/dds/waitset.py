@@ -23,10 +23,10 @@ _LONGEST_WAIT_NS = duration(hours=1)
 
 
 class ReaderWaitSet(WaitSet):
-    """Waits for readers and passes on their samples, those of readers added first before others.
+    """Waits for readers and passes on their samples, in the order of adding the readers.
 
-    Not a listener: that is called in the thread which receives for all readers, and there it would wait for
-    Python's interpreter, which a simulation in the same process holds for milliseconds.
+    Not a listener: a listener is called in the receiving thread of all readers, and would wait there for
+    Python's interpreter, held for milliseconds by a simulation in the same process.
     """
 
     def __init__(self, participant: DomainParticipant, name: str) -> None:
@@ -39,7 +39,7 @@ class ReaderWaitSet(WaitSet):
         self._thread.start()
 
     def add(self, reader: DataReader[Any] | BuiltinDataReader, on_sample: Callable[[Any], None]) -> None:
-        """Call `on_sample`, which must not raise, with every sample of a reader from now on."""
+        """Call `on_sample` (never raising) with every sample of a reader from now on."""
         reader.set_status_mask(DDSStatus.DataAvailable)
 
         def take_all() -> None:

@@ -1,4 +1,4 @@
-"""One TCPROS connection: a header from each side, then frames of four bytes of length and a message.
+"""A TCPROS connection: a header from each side, then frames of four bytes of length and a message.
 
 Source: wiki.ros.org/ROS/TCPROS and wiki.ros.org/ROS/Connection Header.
 """
@@ -25,17 +25,17 @@ Fields = Mapping[str, str]
 """The fields of a connection header: topic, type, md5sum, callerid and more."""
 
 FrameHandler = Callable[[bytes], None]
-"""Receives the message of a frame, without its length."""
+"""Receives the message of a frame, without the length."""
 
 _LENGTH = struct.Struct("<I")
 _READ_BYTES = 1 << 14
-"""At once, of one connection: the others wait no longer than for that."""
+"""Bytes read at once from one connection, a bound on the wait of the others."""
 _MOST_HEADER_BYTES = 1 << 20
 _BACKLOG = 1000
 _KEEPALIVE = {"TCP_KEEPIDLE": 60, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 9}
-"""Seconds of silence until the first probe, seconds between probes, and their number, where the system has
-these options. As in rospy (ros/ros_comm, clients/rospy/src/rospy/impl/tcpros_base.py): a machine that lost
-its power closes no connection.
+"""Seconds of silence until the first probe, seconds between probes, and number of probes, where the system
+has these options. As in rospy (ros/ros_comm, clients/rospy/src/rospy/impl/tcpros_base.py): after a power
+failure a machine closes no connection.
 """
 
 
@@ -47,7 +47,7 @@ def header_frame(fields: Fields) -> bytes:
 
 
 def parse_header(content: bytes) -> Fields:
-    """Return the fields of a connection header. Raises MessageError if it is invalid."""
+    """Return the fields of a connection header. Raises MessageError for an invalid header."""
     fields: dict[str, str] = {}
     at = 0
     try:
@@ -64,10 +64,9 @@ def parse_header(content: bytes) -> Fields:
 
 
 class Connection:
-    """A socket of the event loop, with its buffers.
+    """A socket of the event loop, with buffers.
 
-    Sending never blocks: messages that a program does not read are kept up to a limit, then the oldest is
-    dropped.
+    Sending never blocks: unread messages are kept up to a limit, then the oldest is dropped.
     """
 
     def __init__(
@@ -82,12 +81,12 @@ class Connection:
         """Prepare a connected socket; `start` begins to read.
 
         Args:
-            loop: whose thread reads and writes.
+            loop: event loop of the reading and writing thread.
             sock: the connected socket.
-            on_header: gets the other side's header and returns the handler of the messages that follow;
-                raises MessageError to close the connection.
+            on_header: gets the far side's header and returns the handler of the following messages; raises
+                MessageError to close the connection.
             on_closed: called when the connection has ended.
-            keep: messages that are kept for a slow reader.
+            keep: number of messages kept for a slow reader.
         """
         self._loop, self._socket, self.keep = loop, sock, keep
         self._on_header, self._on_closed = on_header, on_closed
@@ -99,7 +98,7 @@ class Connection:
                 sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
         self.address = str(sock.getpeername()[0])
         self.program = self.address
-        """Name of the program at the other side, once its header has arrived."""
+        """Name of the program at the far side, from the header on."""
         self._on_frame: FrameHandler | None = None
         self._read = bytearray()
         self._queue: deque[memoryview] = deque()
@@ -110,7 +109,7 @@ class Connection:
 
     @property
     def is_established(self) -> bool:
-        """Whether the other side's header has arrived and was accepted."""
+        """Whether the far side's header has been accepted."""
         return self._on_frame is not None
 
     def start(self) -> None:
@@ -122,7 +121,7 @@ class Connection:
             self._loop.watch(self._socket, self, writing=writing)
 
     def send(self, frame: bytes | bytearray) -> None:
-        """Send a frame, or queue it until the socket can be written; from any thread."""
+        """Send a frame, or queue the frame until the socket is writable; from any thread."""
         with self._writing:
             if self._closed:
                 return
@@ -146,7 +145,7 @@ class Connection:
         self._queue.append(frame)
 
     def writable(self) -> None:
-        """Send what is queued."""
+        """Send queued frames."""
         with self._writing:
             try:
                 while self._queue:
@@ -164,7 +163,7 @@ class Connection:
         self._watch(writing=False)
 
     def readable(self) -> None:
-        """Read what has arrived, and handle the complete frames."""
+        """Read arrived bytes, and handle complete frames."""
         try:
             chunk = self._socket.recv(_READ_BYTES)
         except BlockingIOError:

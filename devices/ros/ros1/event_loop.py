@@ -1,4 +1,4 @@
-"""One thread that waits for all sockets of a ROS 1 node: to read, to write, to accept connections."""
+"""A thread waiting for all sockets of a ROS 1 node: to read, to write, to accept connections."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class SocketHandler(Protocol):
     """The owner of a socket."""
 
     def readable(self) -> None:
-        """Read what has arrived, without blocking."""
+        """Read arrived bytes, without blocking."""
         ...
 
     def writable(self) -> None:
-        """Write what is queued, without blocking. Called only after `EventLoop.watch(..., writing=True)`."""
+        """Write queued bytes, without blocking. Called only after `EventLoop.watch(..., writing=True)`."""
         ...
 
     def close(self) -> None:
@@ -33,7 +33,7 @@ class SocketHandler(Protocol):
 
 
 class EventLoop:
-    """Calls the owners of sockets in one thread; other threads schedule calls there."""
+    """Calls the owners of sockets in a single thread; other threads schedule calls there."""
 
     def __init__(self, name: str) -> None:
         """Start the thread `name`."""
@@ -62,7 +62,7 @@ class EventLoop:
             self._selector.register(sock, events, handler)
 
     def forget(self, sock: socket.socket) -> None:
-        """Stop watching a socket, before it is closed; in the loop's thread only."""
+        """Stop watching a socket, before closing the socket; in the loop's thread only."""
         if sock in self._selector.get_map():
             self._selector.unregister(sock)
 
@@ -87,7 +87,7 @@ class EventLoop:
             self._guarded(handler.readable)
 
     def _guarded(self, do: Callable[[], None]) -> None:
-        """Call `do`; an unforeseen error with one program must not end the loop for the others."""
+        """Call `do`; an unforeseen error with a program must not end the loop for all others."""
         try:
             do()
         except Exception:

@@ -23,7 +23,7 @@ _MASTER = "http://127.0.0.1:11311"
 
 
 class Ros1Params(GatewayParams):
-    """Which part of the dVRK is shown, and at which master."""
+    """Part of the dVRK on show, and the ROS master."""
 
     master: Annotated[str, Field(pattern=r"^http://[^/:\s]+:\d+/?$")] | None = Field(
         default=None,
@@ -62,7 +62,7 @@ class Ros1Gateway(Gateway):
         self._master, self._ip = params.master, params.ip
 
     def connect(self, directory: Path) -> Transport:  # noqa: ARG002
-        """Start the node; its master may start later.
+        """Start the node; the master may start later.
 
         Raises DeviceError if there is no route to the master, or if `ip` is not this machine.
         """
@@ -79,9 +79,9 @@ class Ros1Gateway(Gateway):
 
 
 def _address_towards(master: str) -> str:
-    """Return the address of this machine from which a master is reached.
+    """Return the address of this machine on the route to a master.
 
-    Raises DeviceError if there is no route to it.
+    Raises DeviceError if there is no route.
     """
     try:
         address = urlsplit(master)

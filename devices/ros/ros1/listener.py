@@ -16,7 +16,7 @@ __all__ = ["Listener"]
 log = logging.getLogger(__name__)
 
 _BACKLOG = 512
-"""Connections that may arrive at once: a console that subscribes to all topics makes several hundred."""
+"""Most connections at once: a console with subscriptions to all topics makes several hundred."""
 _PAUSE_S = 1.0
 _FILES = 16384
 

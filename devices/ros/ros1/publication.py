@@ -1,4 +1,4 @@
-"""A topic that our ROS 1 node publishes, and its subscribers."""
+"""A topic published by our ROS 1 node, and the subscribers."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from schemas.ros import CameraInfo
 __all__ = ["Publication"]
 
 _STATES_KEPT = 2
-"""States and pictures that are queued for a slow subscriber, beside what the system's buffers hold."""
+"""Number of states and pictures queued for a slow subscriber, beside the system's buffers."""
 _EVENTS_KEPT = 1000
 
 
 class Publication:
-    """Sends each message to all subscribers, and the last one of a latched topic to new subscribers."""
+    """Sends each message to all subscribers, and a latched topic's last message to new subscribers."""
 
     def __init__(self, row: Row, node: str) -> None:
         """`node`: name of our node."""
@@ -48,7 +48,7 @@ class Publication:
         return self._latched or bool(self._subscribers)
 
     def __call__(self, message: bytes, /) -> None:
-        """Send a message (CDR); a slow subscriber gets the newest ones."""
+        """Send a message (CDR); a slow subscriber gets the newest messages."""
         if not self.wanted:
             return
         with self._publishing:
@@ -59,7 +59,7 @@ class Publication:
                 subscriber.send(frame)
 
     def on_header(self, subscriber: Connection, fields: Fields) -> FrameHandler:
-        """Add a subscriber. Raises MessageError if its header has another type."""
+        """Add a subscriber. Raises MessageError for a header with another type."""
         ours, theirs = self._header["md5sum"], fields.get("md5sum", "*")
         if theirs not in (ours, "*"):
             what = f"{self.topic} is {self.type} with MD5 {ours}, not {fields.get('type', '?')} with {theirs}"
@@ -73,6 +73,6 @@ class Publication:
         return lambda _: None  # a subscriber sends nothing after its header
 
     def remove(self, subscriber: Connection) -> None:
-        """Remove a subscriber whose connection has ended."""
+        """Remove a subscriber after the end of the connection."""
         with self._publishing:
             self._subscribers = [other for other in self._subscribers if other is not subscriber]

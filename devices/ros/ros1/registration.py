@@ -1,4 +1,4 @@
-"""Keeps our node registered at its master, also when the master starts later or starts again."""
+"""Keeps our node registered at the master, also when the master starts later or starts again."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ __all__ = ["Entry", "Registration"]
 log = logging.getLogger(__name__)
 
 _CHECK_S = 1.0
-"""How often we check that the master still knows us: a restarted master knows no node, and ROS 1 itself
-registers no node again.
+"""Period of checks of our registration: a restarted master knows no node, and ROS 1 itself registers no node
+again.
 """
 
 _AT_ONCE = 100
-"""Entries registered in one call, so that the master answers within seconds."""
+"""Entries registered per call: the master answers within seconds."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A topic or service that is registered."""
+    """A registered topic or service."""
 
     kind: str
     """`Publisher`, `Subscriber` or `Service`."""
@@ -34,26 +34,26 @@ class Entry:
     details: tuple[str, ...]
     """Arguments between the name and our URI: the type of a topic, the URI of a service."""
     on_registered: Callable[[Any], None] | None = None
-    """Gets the value that the master returns: the URIs of a topic's publishers."""
+    """Gets the value returned by the master: the URIs of a topic's publishers."""
 
     def register_call(self, uri: str) -> tuple[str, Sequence[str]]:
-        """Return method and arguments that register it for the node at `uri`."""
+        """Return method and arguments of the registration for the node at `uri`."""
         return f"register{self.kind}", (self.name, *self.details, uri)
 
     def unregister_call(self, uri: str) -> tuple[str, Sequence[str]]:
-        """Return method and arguments that unregister it."""
+        """Return method and arguments of the end of the registration."""
         return f"unregister{self.kind}", (self.name, self.details[0] if self.kind == "Service" else uri)
 
 
 class Registration:
-    """A thread that registers our node at the master."""
+    """Thread registering our node at the master."""
 
     def __init__(self, master: str, node: str, uri: str) -> None:
         """Start; `master` and `uri`: URIs of the master and of our node."""
         self._master, self._node, self._uri = ApiClient(master, node), node, uri
         self._entries: list[Entry] = []
         self._registered = 0
-        """How many of them are registered."""
+        """Number of registered entries."""
         self._problem = ""
         self._wake = threading.Event()
         self._ending = False
@@ -80,7 +80,7 @@ class Registration:
             self._wake.clear()
 
     def _register(self) -> None:
-        """Register what the master does not know. Raises DeviceError if that fails."""
+        """Register all entries unknown to the master. Raises DeviceError on failure."""
         known = self._master.call("lookupNode", self._node)
         if known.code != 1:
             self._registered = 0
@@ -104,7 +104,7 @@ class Registration:
     def _check_name(self, uri: str) -> None:
         """Raise DeviceError if another node at `uri` runs under our name.
 
-        That keeps its name: a master shuts down the older of two nodes of one name.
+        The other node keeps the name: a master shuts down the older of two nodes of the same name.
         """
         other = ApiClient(uri, self._node)
         try:

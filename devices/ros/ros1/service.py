@@ -33,7 +33,7 @@ class Service:
         }
 
     def on_header(self, client: Connection, fields: Fields) -> FrameHandler:
-        """Accept a client. Raises MessageError if its header has another type."""
+        """Accept a client. Raises MessageError for a header with another type."""
         ours, theirs = self._header["md5sum"], fields.get("md5sum", "*")
         if theirs not in (ours, "*"):
             raise MessageError(

@@ -1,4 +1,4 @@
-"""Topics that our ROS 1 node subscribes to, and connections to their publishers."""
+"""Topics subscribed to by our ROS 1 node, and connections to their publishers."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ _CONNECT_S = 2.0
 _FIRST_RETRY_S, _LAST_RETRY_S = 0.5, 30.0
 """Shortest and longest time until a failed connection is tried again; as in rospy."""
 _LATCHED_S = 0.5
-"""A latched message follows the publisher's header at once: within a few milliseconds, or some tens on a busy
-machine. A message that arrives later than this was published now.
+"""Latest arrival of a latched message after the publisher's header, s: a few milliseconds, some tens on a
+busy machine. A message with a later arrival was published now.
 """
 _UNREACHED = "ROS 1: the program at %s, which publishes %s, cannot be reached: %s%s"
 _ADDRESS_HINT = ". Its ROS_IP or ROS_HOSTNAME must be an address that this machine can resolve"
 _INVALID = b"\xff\xff"
-"""Prefix of bytes that could not be converted to CDR, which cannot begin so."""
+"""Prefix of bytes without a conversion to CDR; CDR cannot begin with this prefix."""
 
 
 class Subscription:
-    """One topic, and the handler of its messages."""
+    """A topic, and the handler of its messages."""
 
     def __init__(self, row: Row, receive: MessageHandler, node: str) -> None:
         """`node`: name of our node."""
@@ -62,7 +62,7 @@ class Subscription:
             )
 
     def on_message(self, message: bytes, program: str, *, connected_ns: int) -> None:
-        """Pass on a message as CDR, or as invalid bytes, which the receiver counts and reports."""
+        """Pass on a message as CDR, or as invalid bytes for the receiver to count and report."""
         try:
             cdr = self._wire.cdr(message)
         except MessageError:
@@ -71,14 +71,14 @@ class Subscription:
 
 
 class _PublisherLink:
-    """Our subscription to a topic at one of its publishers."""
+    """Our subscription to a topic at a single publisher."""
 
     def __init__(self, subscription: Subscription, *, published_before: bool) -> None:
         """`published_before`: a latched message of the publisher is older than the connection."""
         self.subscription, self.published_before = subscription, published_before
         self.connection: Connection | None = None
         self.wanted = True
-        """Whether the program publishes the topic, by what the master reports."""
+        """Whether the program publishes the topic, as reported by the master."""
         self.due, self.delay = 0.0, 0.0
 
     def retry(self) -> None:
@@ -89,7 +89,7 @@ class _PublisherLink:
         self.due = monotonic() + self.delay
 
     def on_header(self, connection: Connection, fields: Fields) -> FrameHandler:
-        """Accept the publisher's header. Raises MessageError if it is not that of our topic."""
+        """Accept the publisher's header. Raises MessageError for a header of another topic."""
         self.subscription.check(fields)
         self.delay = 0.0
         is_first = self.published_before and fields.get("latching") == "1"
@@ -108,8 +108,7 @@ class _PublisherLink:
 class Subscriptions:
     """All subscribed topics.
 
-    For each program that publishes any of them a thread connects to it, so that one that does not answer
-    delays no other.
+    Each publishing program has a connecting thread, so a silent program delays no other.
     """
 
     def __init__(self, loop: EventLoop, node: str) -> None:
@@ -117,9 +116,9 @@ class Subscriptions:
         self._loop, self._node = loop, node
         self._subscriptions: dict[str, Subscription] = {}
         self._listed: set[str] = set()
-        """Topics whose earlier publishers the master has listed, in its answer to our registration."""
+        """Topics with earlier publishers listed in the master's answer to our registration."""
         self._links: dict[str, dict[str, _PublisherLink]] = {}
-        """By URI of the program and topic."""
+        """Links by URI of the program and topic."""
         self._changing = threading.Condition()
         self._closed = False
 
@@ -146,19 +145,19 @@ class Subscriptions:
         ]
 
     def add(self, subscription: Subscription) -> None:
-        """Subscribe to a topic; connections follow when its publishers are known."""
+        """Subscribe to a topic; connections follow when publishers are known."""
         self._subscriptions[subscription.topic] = subscription
 
     def update(self, topic: str, uris: Iterable[str], *, published_before: bool) -> None:
-        """Set the URIs of all programs that publish a topic.
+        """Set the URIs of all programs publishing a topic.
 
-        A connected publisher that is not among them keeps its connection: a restarted master knows no node.
+        A connected publisher missing in `uris` keeps its connection: a restarted master knows no node.
 
         Args:
-            topic: its name.
-            uris: of its publishers' Slave APIs.
-            published_before: whether this is the master's answer to our registration, so that they published
-                before we subscribed. Of updates before that answer it is unknown, and assumed.
+            topic: name of the topic.
+            uris: URIs of the publishers' Slave APIs.
+            published_before: whether the URIs are the master's answer to our registration, and the publishers
+                therefore older than our subscription. Assumed for updates before the answer.
         """
         subscription, publishing = self._subscriptions.get(topic), set(uris)
         if subscription is None:
@@ -182,9 +181,9 @@ class Subscriptions:
             self._changing.notify_all()
 
     def _connect_all(self, uri: str) -> None:
-        """Keep the links to one program connected, as long as it has any.
+        """Keep the links to a program connected, as long as the program has links.
 
-        A failure is logged when it lasts: a program that ends is unknown to the master a moment later.
+        Only a lasting failure is logged: an ended program is unknown to the master a moment later.
         """
         client, links, has_warned = ApiClient(uri, self._node), self._links[uri], False
         try:
@@ -204,7 +203,7 @@ class Subscriptions:
             client.close()
 
     def _due(self, uri: str, links: dict[str, _PublisherLink]) -> _PublisherLink | None:
-        """Wait for a link that is due to be connected; None when the program has no links any more."""
+        """Wait for a link due to be connected; None: the program has no links any more."""
         with self._changing:
             while not self._closed:
                 for topic in [
@@ -224,7 +223,7 @@ class Subscriptions:
     def _connect(self, client: ApiClient, link: _PublisherLink) -> None:
         """Connect to a topic of a program.
 
-        Raises OSError or DeviceError if that fails, ValueError if the host's name is invalid.
+        Raises OSError or DeviceError on failure, ValueError for an invalid host name.
         """
         result = client.call("requestTopic", link.subscription.topic, [["TCPROS"]])
         match result:
@@ -266,13 +265,13 @@ class Subscriptions:
 
 
 def _has_ended(error: Exception) -> bool:
-    """Return whether a program has ended, or is about to: it accepts no connection, or closes it.
+    """Return whether a program has ended or is about to end: connections are refused or closed.
 
-    It may do so without unregistering at the master.
+    A program may end without unregistering at the master.
     """
     return isinstance(error.__cause__ or error, ConnectionError | HTTPException)
 
 
 def _hint(error: Exception) -> str:
-    """Return what to do where an address leads nowhere; empty if the program answers, but wrongly."""
+    """Return the remedy for an address leading nowhere; empty: the program answers, but wrongly."""
     return _ADDRESS_HINT if isinstance(error.__cause__ or error, OSError | ValueError) else ""

@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 class Ros1Transport(Transport):
-    """Publishes, subscribes and serves as one node, which registers at its master as soon as that answers."""
+    """Publishes, subscribes and serves as one node, registered as soon as the master answers."""
 
     def __init__(self, master: str, node: str, host: str) -> None:
         """Start the node.
@@ -39,13 +39,13 @@ class Ros1Transport(Transport):
         Args:
             master: URI of the master, `http://host:port`.
             node: name of the node.
-            host: address of this machine at which programs reach the node.
+            host: address of this machine for programs.
         """
         self._node, self._host, self._master = node, host, master
         self._publications: dict[str, Publication] = {}
         self._services: dict[str, Service] = {}
         self._connections: dict[Connection, Publication | None] = {}
-        """Connections of other programs to us whose headers have arrived; None: of a service."""
+        """Connections of programs to us after the header, with their publication; None: a service."""
         self._closed = False
         self._server = ApiServer(host, self._methods())
         self._loop = EventLoop(f"ROS 1 {node}")
@@ -131,7 +131,7 @@ class Ros1Transport(Transport):
         }
 
     def _bus(self) -> list[list[Any]]:
-        """Return our connections as `rosnode info` shows them."""
+        """Return our connections in the form of `rosnode info`."""
         readers = [
             (reader.program, "o", publication.topic)
             for reader, publication in self._connections.copy().items()
@@ -165,7 +165,7 @@ class Ros1Transport(Transport):
 
 
 def _getter(value: Callable[[], object]) -> Callable[[str], ApiResult]:
-    """Return a method without arguments that returns a value."""
+    """Return a method without arguments returning `value()`."""
 
     def get(_caller: str) -> ApiResult:
         return success(value())

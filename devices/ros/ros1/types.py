@@ -1,9 +1,9 @@
 """Messages and services of ROS 1: names, definitions, MD5 sums, and conversion to and from CDR.
 
-ROS 1 aligns nothing, ends no string with a zero, and has a counter in every header. rosbags converts, and
-has the definitions of Noetic, in which some fields have other names than in ROS 2 (`CameraInfo`); types that
-it lacks (CRTK, tf2) are the same in both and come from our models. Where a type of ROS 2 has fields more than
-Noetic's (markers), they are left out on the way there, and empty on the way back.
+ROS 1 aligns nothing, ends no string with a zero, and has a counter in every header. rosbags converts, with
+the definitions of Noetic, where some fields have other names than in ROS 2 (`CameraInfo`); types missing in
+rosbags (CRTK, tf2) are the same in both and come from our models. Fields of ROS 2 unknown to Noetic (markers)
+are left out on the way to ROS 1, and empty on the way back.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def ros1_name(type_: str) -> str:
 
 
 def definition(type_: str) -> str:
-    """Return the definition of a message and of its fields' types, as connection headers and bags have it."""
+    """Return the definition of a message and of all field types, as in connection headers and bags."""
     return _noetic().generate_msgdef(type_, ros_version=1)[0]
 
 
@@ -55,14 +55,14 @@ def checksum(type_: str) -> str:
 
 
 def service_checksum(type_: str) -> str:
-    """Return the MD5 sum of a service: of the texts of its request and response (genmsg, gentools.py)."""
+    """Return the MD5 sum of a service: over the texts of request and response (genmsg, gentools.py)."""
     return md5(
         (_summed(f"{type_}_Request") + _summed(f"{type_}_Response")).encode(), usedforsecurity=False
     ).hexdigest()
 
 
 def _summed(type_: str) -> str:
-    """Return the text that is summed: the definition, with sums in place of message types."""
+    """Return the text for the sum: the definition, with sums in place of message types."""
     lines = definition(type_).partition("=" * 80)[0].strip().splitlines()
     return "\n".join(_summed_line(*line.split(" ", 1)) for line in lines)
 
@@ -73,19 +73,19 @@ def _summed_line(kind: str, name: str) -> str:
 
 
 class Wire:
-    """Converts messages of one type to frames of ROS 1 (length in four bytes, message), and back."""
+    """Converts messages of a type to frames of ROS 1 (length in four bytes, message), and back."""
 
     def __init__(self, type_: str) -> None:
-        """`type_`: as our models have it, `sensor_msgs/msg/JointState`."""
+        """`type_`: type as in our models, `sensor_msgs/msg/JointState`."""
         self._type, self._store = type_, typestore()
         fields = self._store.fielddefs[type_][1]
         self._counted = bool(fields) and fields[0][1][1] == _HEADER
         self._is_same = is_same_wireformat(_noetic(), self._store, type_, type_)
         self._defaults: dict[str, object] = {}
-        """By type: what rosbags puts in for fields that one side lacks."""
+        """Defaults of rosbags for fields missing on a side, by type."""
 
     def frame(self, cdr: bytes, count: int) -> bytearray:
-        """Return the frame of a message; `count` is the sequence number of its header, if it has one."""
+        """Return the frame of a message; `count`: sequence number for the header, if any."""
         message = (
             self._store.cdr_to_ros1(memoryview(cdr), self._type)
             if self._is_same
@@ -100,9 +100,9 @@ class Wire:
         return frame
 
     def cdr(self, message: bytes) -> bytes:
-        """Return a message of ROS 1, without its length, as CDR.
+        """Return a message of ROS 1, without the length, as CDR.
 
-        Raises MessageError if the bytes are no such message.
+        Raises MessageError for other bytes.
         """
         try:
             if not self._is_same:
@@ -115,7 +115,7 @@ class Wire:
             ) from error
 
     def _migrated(self, message: bytes, *, to_ros2: bool) -> memoryview:
-        """Return a message in the layout of the other side, field by field: far slower than as bytes."""
+        """Return a message in the layout of the far side, field by field: far slower than as bytes."""
         source, target = (_noetic(), self._store) if to_ros2 else (self._store, _noetic())
         return migrate_bytes(
             source,

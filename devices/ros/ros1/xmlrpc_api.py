@@ -1,4 +1,4 @@
-"""The Master API and Slave API of ROS 1: XML-RPC calls that return code, status message and value.
+"""The Master API and Slave API of ROS 1: XML-RPC calls returning code, status message and value.
 
 Source: wiki.ros.org/ROS/Master_API and wiki.ros.org/ROS/Slave_API.
 """
@@ -22,7 +22,7 @@ __all__ = ["ApiClient", "ApiResult", "ApiServer", "success"]
 log = logging.getLogger(__name__)
 
 _TIMEOUT_S = 2.0
-"""For a program that exists and does not answer, such as a stopped one."""
+"""Time-out of calls to an existing but silent program, such as a stopped program."""
 
 
 class ApiResult(NamedTuple):
@@ -50,7 +50,7 @@ class ApiClient:
     """Calls a master or another node; for one thread at a time."""
 
     def __init__(self, uri: str, caller_id: str) -> None:
-        """`uri`: of the other side, `http://host:port`; `caller_id`: name of our node."""
+        """`uri`: URI of the far side, `http://host:port`; `caller_id`: name of our node."""
         self.uri, self._caller_id = uri, caller_id
         self._proxy: xmlrpc.client.ServerProxy | None = None
 
@@ -59,7 +59,7 @@ class ApiClient:
         return self._result(self._call(method, self._caller_id, *arguments))
 
     def call_all(self, calls: Sequence[tuple[str, Sequence[Any]]]) -> list[ApiResult]:
-        """Call methods of a master, all in one request. Raises DeviceError if there is no result."""
+        """Call methods of a master in a single request. Raises DeviceError if there is no result."""
         requests = [
             {"methodName": method, "params": [self._caller_id, *arguments]} for method, arguments in calls
         ]

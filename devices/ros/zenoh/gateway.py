@@ -18,7 +18,7 @@ __all__ = ["ZenohGateway", "ZenohParams"]
 
 
 class ZenohParams(GatewayParams):
-    """Which part of the dVRK is shown, and in which domain."""
+    """Part of the dVRK on show, and the domain."""
 
     domain: int = Field(
         default=0,
@@ -45,7 +45,7 @@ class ZenohGateway(Gateway):
         return f"{self._domain}/**", f"{self._domain}/**/@adv/**", graph_key(self._domain)
 
     def learn_hub(self, connect: Callable[[], zenoh.Session]) -> None:
-        """Receive the function that opens a Zenoh session with the hub."""
+        """Receive the opener of Zenoh sessions with the hub."""
         self._connect = connect
 
     def connect(self, directory: Path) -> Transport:  # noqa: ARG002

@@ -14,24 +14,24 @@ __all__ = ["Graph", "gid_of"]
 
 
 def gid_of(key: str) -> bytes:
-    """Return the gid that rmw_zenoh makes of a token's key: XXH3 with 128 bits, the low half first."""
+    """Return rmw_zenoh's gid for a token's key: XXH3 with 128 bits, the low half first."""
     return xxh3_128_digest(key.encode())[::-1]
 
 
 class Graph:
-    """The other programs of the graph; for use from any thread.
+    """All programs of the graph but our own; for use from any thread.
 
-    A program is a Zenoh session, and has the name of its first node.
+    A program is a Zenoh session with the name of the session's first node.
     """
 
     def __init__(self, own_session: str) -> None:
-        """`own_session`: id of the session whose tokens are ignored."""
+        """`own_session`: id of our session, with ignored tokens."""
         self._own = own_session
         self._changing = threading.Lock()
         self._tokens: dict[str, GraphToken] = {}
-        """By key."""
+        """Tokens by key."""
         self._names: dict[str, str] = {}
-        """Of programs, by session."""
+        """Names of programs by session."""
         self._senders: dict[bytes, str] = {}
         """Key of the token by gid of the publisher, also where the gid is not a hash of the key."""
 
@@ -57,11 +57,11 @@ class Graph:
                 del self._names[token.session]
 
     def sender(self, topic: str, gid: bytes) -> str:
-        """Return the name of the program that sent a message on `topic` as the publisher `gid`.
+        """Return the name of the program sending on `topic` as the publisher `gid`.
 
-        A publisher whose gid is not the hash of its token's key, as with other clients than rmw_zenoh, is
-        identified as the only unidentified one of its topic; where two such share a topic from the beginning,
-        each is named by its gid.
+        A publisher with a gid other than the hash of its token's key (clients other than rmw_zenoh) is
+        identified as the only unidentified publisher of the topic; two such publishers on a topic from the
+        beginning are named by their gids.
         """
         with self._changing:
             key = self._senders.get(gid)

@@ -1,6 +1,6 @@
 """The layout of ROS 2 on Zenoh: keys of topics and services, liveliness tokens, and attachments of messages.
 
-As rmw_zenoh has them in Jazzy. Source: ros2/rmw_zenoh, docs/design.md, and for what that leaves open
+The layout of rmw_zenoh in Jazzy. Source: ros2/rmw_zenoh, docs/design.md, and for open questions
 rmw_zenoh_cpp/src/detail/liveliness_utils.cpp (commit 3411fdec), attachment_helpers.cpp and
 rmw_publisher_data.cpp (commit 3e19ec73).
 """
@@ -35,7 +35,7 @@ _ATTACHMENT = struct.Struct("<qqB16s")
 _GID_BYTES = 16
 
 VOLATILE = "::,10:,:,:,,"
-"""Quality of service, encoded by its differences from the default: the last ten messages."""
+"""Quality of service, encoded by the differences from the default: the last ten messages."""
 
 LATCHED = ":1:,1:,:,:,,"
 """Transient local, the last message."""
@@ -77,7 +77,7 @@ class GraphToken:
     session: str
     """Zenoh's id of the program's session."""
     number: int
-    """Of the entity within its session."""
+    """Number of the entity within the session."""
     kind: EntityKind
     node: str
     """Name of the node with namespace: `/dvrk`."""
@@ -107,7 +107,7 @@ class GraphToken:
 
     @classmethod
     def parsed(cls, key: str) -> GraphToken | None:
-        """Return the token with this key; None if the key is not one of the known forms."""
+        """Return the token with this key; None: a key of unknown form."""
         parts = key.split("/")
         if (
             len(parts) not in (9, 13)
@@ -131,19 +131,19 @@ class GraphToken:
 
 
 def packed_attachment(sequence: int, stamp_ns: int, gid: bytes) -> bytes:
-    """Return the 33 bytes of an `Attachment`, without making one."""
+    """Return the 33 bytes of an `Attachment`, without making the object."""
     return _ATTACHMENT.pack(sequence, stamp_ns, _GID_BYTES, gid)
 
 
 @dataclass(frozen=True, slots=True)
 class Attachment:
-    """Sent with every message and request; a response returns that of its request."""
+    """Attachment of every message and request; a response returns the attachment of the request."""
 
     sequence: int
     stamp_ns: int
     """Time of sending, by the wall clock of the sender."""
     gid: bytes
-    """Id of the publisher or client that sent it, 16 bytes."""
+    """Id of the sending publisher or client, 16 bytes."""
 
     def pack(self) -> bytes:
         """Return the attachment as 33 bytes."""

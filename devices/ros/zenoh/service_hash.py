@@ -1,4 +1,4 @@
-"""Type hashes of services (REP-2016), which `rosbags` computes for messages only."""
+"""Type hashes of services (REP-2016): `rosbags` computes hashes of messages only."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 _EVENT_INFO_TEXT = (
     "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\nint64 sequence_number"
 )
-"""As ROS 2 Jazzy hashes it: a `char` of a .msg file is a uint8 in the type description."""
+"""Text of the event info as hashed by ROS 2 Jazzy: a `char` of a .msg file is a uint8 in the type
+description.
+"""
 
 
 def service_hash(name: str, request: str, response: str) -> str:
     """Return the hash of a service, `RIHS01_...`.
 
-    A service is described as a type of three fields: request, response, and an event that holds at most one
-    of each (rosidl_parser's definition of a service; `tests/devices/ros/zenoh` compares the result with the
-    type description that std_srvs of Jazzy ships).
+    A service is described as a type of three fields: request, response, and an event with at most one of each
+    (rosidl_parser's definition of a service; `tests/devices/ros/zenoh` compares the result with the type
+    description shipped in std_srvs of Jazzy).
 
     Args:
         name: `std_srvs/srv/Trigger`.
@@ -47,7 +49,7 @@ def service_hash(name: str, request: str, response: str) -> str:
 
 
 def _renamed(definition: Any) -> Any:
-    """Return a definition of rosbags with ROS's names of a service's types: rosbags puts `msg` into them."""
+    """Return a definition of rosbags with ROS's names of a service's types: rosbags inserts `msg`."""
     if isinstance(definition, str):
         return definition.replace("/srv/msg/", "/srv/")
     if isinstance(definition, list | tuple):

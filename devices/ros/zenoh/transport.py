@@ -31,14 +31,14 @@ __all__ = ["ZenohTransport"]
 log = logging.getLogger(__name__)
 
 _HEARTBEAT_S = 0.5
-"""How often a latched publisher repeats the number of its last message, by which a subscriber detects a loss:
-rmw_zenoh's period. rmw_zenoh sends it once per message and blocks until every reader has it; we send it
-periodically, because a program that has stopped reading must not block the others.
+"""Period of a latched publisher's repetition of the last message's number, for subscribers to detect a loss:
+rmw_zenoh's period. rmw_zenoh sends the number once per message and blocks until every reader has received the
+number; we send periodically, because a program no longer reading must not block the others.
 """
 
 
 class _Publisher:
-    """Numbers the messages of one topic."""
+    """Numbers the messages of a topic."""
 
     def __init__(self, publisher: zenoh.Publisher | ext.AdvancedPublisher, gid: bytes) -> None:
         self._put, self._gid, self._sequence = publisher.put, gid, 0
@@ -52,14 +52,14 @@ class _Publisher:
 class ZenohTransport(Transport):
     """Publishes, listens and answers under rmw_zenoh's keys, as one node.
 
-    Publishing never waits for a reader: messages that a program does not read are dropped for it, and it
-    queries the last message of a latched topic again. States and events have separate queues, and pictures
-    a session of their own: where one program does not read them, the router tries for 50 ms before it drops
-    the rest of a picture, and meanwhile reads nothing else of that session.
+    Publishing never waits for a reader: messages unread by a program are dropped for this program, and the
+    program queries the last message of a latched topic again. States and events have separate queues, and
+    pictures a session of their own: for a program not reading, the router tries for 50 ms before dropping the
+    rest of a picture, and reads nothing else of the session meanwhile.
     """
 
     def __init__(self, connect: Callable[[], zenoh.Session], domain: int) -> None:
-        """Join the graph of `domain` with sessions that `connect` opens."""
+        """Join the graph of `domain` with sessions opened by `connect`."""
         self._session, self._pictures = connect(), connect()
         self._domain, self._id = domain, str(self._session.zid())
         self._graph = Graph(self._id)
@@ -172,7 +172,7 @@ class ZenohTransport(Transport):
             self._pictures.close()
 
     def _announce(self, kind: EntityKind, row: Row, quality: str) -> str:
-        """Declare the liveliness token of a publisher, subscriber or server; return its key."""
+        """Declare the liveliness token of a publisher, subscriber or server; return the token's key."""
         self._number += 1
         self._topics.add(row.topic)
         token = GraphToken(
