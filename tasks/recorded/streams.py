@@ -41,7 +41,7 @@ class Scored(NamedTuple):
 def score(task: Task, streams: Mapping[str, Stream], period_ns: int) -> Scored:
     """Step `task` through the recorded values of its inputs, as it was or would have been in the session.
 
-    Begins once every input has a value that needs one; ends with the last value.
+    Begins once every signal without a start value has a value; ends with the last value.
     """
     inputs_of = [port for port in task.ports if port.causality == "input"]
     values: dict[str, Any] = {
@@ -51,7 +51,8 @@ def score(task: Task, streams: Mapping[str, Stream], period_ns: int) -> Scored:
     }
     names = [port.name for port in inputs_of if port.name in streams and len(streams[port.name].times_ns)]
     known = {name: streams[name] for name in names}
-    begin_ns = max((int(stream.times_ns[0]) for stream in known.values()), default=0)
+    needed = [port.name for port in inputs_of if port.variability != "event" and port.start is None]
+    begin_ns = max((int(known[name].times_ns[0]) for name in needed if name in known), default=0)
     begin_ns = begin_ns // period_ns * period_ns
     end_ns = max((int(stream.times_ns[-1]) for stream in known.values()), default=0)
     queues = {port.name for port in inputs_of if port.variability == "event"}
