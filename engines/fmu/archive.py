@@ -68,7 +68,7 @@ def _problem(entries: Iterable[zipfile.ZipInfo]) -> str:
         problem = _name_problem(name) or _kind_problem(entry)
         if problem:
             return f"its archive holds {name!r}, {problem}"
-        if name in seen:
+        if name in seen and not name.endswith("/"):  # a directory may stand there again: it holds nothing
             return f"its archive holds {name!r} twice"
         seen.add(name)
         total += entry.file_size

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+import signal
+from collections.abc import Generator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from schemas.errors import MissingExtraError
+from schemas.errors import MissingExtraError, RecordingError
 
 if TYPE_CHECKING:
     from learning.datasets.episode import Wanted
@@ -88,20 +91,47 @@ def _pixels(size: str) -> tuple[int, int]:
     return width, height
 
 
+@contextmanager
+def _terminable() -> Generator[None]:
+    """Let SIGTERM and the end of the terminal interrupt the main thread, as Ctrl-C does."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before: dict[int, Any] = {
+        number: signal.signal(number, interrupt) for number in (getattr(signal, name) for name in names)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def _run(recordings: list[Path], output: Path, wanted: Wanted) -> None:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from learning.datasets.conversion import Conversion
+    from learning.own_directory import NewDirectory
 
     console = Console(stderr=True, highlight=False)
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with Conversion(output, wanted) as made, Progress(*columns, console=console) as bar:
-        counted = bar.add_task("recordings", total=len(recordings))
-        for path in recordings:
-            if note := made.add(path):
-                bar.console.print(note, markup=False, soft_wrap=True)
-            bar.update(counted, advance=1)
-    console.print(made.summary(), markup=False, soft_wrap=True)
-    if made.left_out:
+    with NewDirectory(output, "data set") as new:
+        conversion = Conversion(new.path, wanted)
+        try:
+            with _terminable(), conversion as made, Progress(*columns, console=console) as bar:
+                counted = bar.add_task("recordings", total=len(recordings))
+                for path in recordings:
+                    if note := made.add(path):
+                        bar.console.print(note, markup=False, soft_wrap=True)
+                    bar.update(counted, advance=1)
+        except OSError as error:
+            raise RecordingError(f"'{output}' cannot be written, and is not made: {error}") from error
+        finally:
+            if conversion.is_whole:
+                new.publish()
+        console.print(f"{conversion.summary()}: {output}", markup=False, soft_wrap=True)
+    if conversion.left_out:
         raise typer.Exit(1)

@@ -20,12 +20,14 @@ class Conversion:
     """A data set in the making."""
 
     def __init__(self, directory: Path, wanted: Wanted) -> None:
-        """Begin with what is `wanted` of each recording; `directory` is new, or empty."""
+        """Begin with what is `wanted` of each recording; `directory` holds no data set."""
         self._directory, self._wanted = directory, wanted
         self._writer: Writer | None = None
         self._size = wanted.size
         self.left_out = 0
         """Recordings that could not be used."""
+        self.is_whole = False
+        """Whether the files are finished, with an episode at least."""
 
     def __enter__(self) -> Self:
         return self
@@ -33,9 +35,13 @@ class Conversion:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Finish the files, whatever ended the conversion: the episodes so far are a whole data set."""
-        if self._writer is not None:
+        """Finish the files, whatever ended the conversion: the episodes so far are a whole data set.
+
+        But for a full disk: files cannot be finished there.
+        """
+        if self._writer is not None and not isinstance(error, OSError):
             self._writer.close()
+            self.is_whole = self._writer.episodes > 0
 
     def add(self, path: Path) -> str:
         """Append the recording at `path`; return what is to be said about it, or nothing.
@@ -44,7 +50,10 @@ class Conversion:
         """
         try:
             with TemporaryDirectory() as scratch:
-                recording, cut_short = opened(path, Path(scratch))
+                try:
+                    recording, cut_short = opened(path, Path(scratch))
+                except OSError as error:
+                    raise RecordingError(f"'{path}' cannot be opened: {error}") from error
                 seconds = self._add(path, recording)
         except (RecordingError, SessionError) as error:  # the latter of soft bodies that do not fit
             self.left_out += 1
@@ -75,7 +84,4 @@ class Conversion:
         if self._writer is None or not self._writer.episodes:
             raise RecordingError("no recording could be used, so there is no data set")
         count, left_out = self._writer.episodes, f", {self.left_out} left out" if self.left_out else ""
-        return (
-            f"{count} episode{'s' if count != 1 else ''}, {self._writer.frames} frames{left_out}:"
-            f" {self._directory}"
-        )
+        return f"{count} episode{'s' if count != 1 else ''}, {self._writer.frames} frames{left_out}"

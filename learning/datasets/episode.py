@@ -48,9 +48,10 @@ class Episode:
 
     @classmethod
     def of(cls, recording: Recording, wanted: Wanted) -> Episode:
-        """Take the numbers of `recording`, from when all are known until one of the state ends.
+        """Return the numbers of `recording`, from when all are known until one of the state ends.
 
-        Raises RecordingError if it does not have them, or lasts for less than two frames.
+        Each frame has its action, a frame later. Raises RecordingError if the recording lacks numbers, or
+        lasts for less than a frame.
         """
         state = chosen(recording, wanted.state) if wanted.state else measured(recording)
         action = chosen(recording, wanted.action) if wanted.action else commanded(recording)
@@ -59,10 +60,10 @@ class Episode:
                 raise RecordingError(f"'{recording.file}': nothing is recorded of '{one.port}'")
         first = max(int(one.times_ns[0]) for one in (*state, *action))
         last = min(int(one.times_ns[-1]) for one in state)
-        count = (last - first) * wanted.fps // 1_000_000_000 + 1
-        if count < 2:
+        count = (last - first) * wanted.fps // 1_000_000_000
+        if count < 1:
             raise RecordingError(
-                f"'{recording.file}' lasts for less than two frames: {max(0, last - first) * 1e-9:g} s at"
+                f"'{recording.file}' lasts for less than a frame: {max(0, last - first) * 1e-9:g} s at"
                 f" {wanted.fps} frames a second"
             )
         times_ns = first + np.arange(count + 1) * 1_000_000_000 // wanted.fps

@@ -71,6 +71,7 @@ def sweep(
     for package, extra in needed.items():
         if find_spec(package) is None:
             raise MissingExtraError("'trocar sweep'", extra, package)
+    from learning.own_directory import claimed
     from learning.sweeps.sweep import Sweep
     from learning.sweeps.variation import parse
 
@@ -84,8 +85,9 @@ def sweep(
         recorded=record,
     )
     made.check()
-    made.open()
-    _run(made, jobs or os.cpu_count() or 1, ray)
+    with claimed(output, "sweep"):
+        made.open()
+        _run(made, jobs or os.cpu_count() or 1, ray)
 
 
 def _run(sweep: Sweep, jobs: int, ray: str | None) -> None:

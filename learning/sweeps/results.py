@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from learning.own_directory import whole_file
 from learning.sweeps.variation import Variation, number_and_unit
 
 __all__ = ["flat", "write_plots", "write_table"]
@@ -18,6 +19,8 @@ _ABOUT_THE_RUN = {
 }  # fmt: skip
 """Columns that are not plotted: they say how a trial went, not what came out."""
 _MOST_PLOTS = 12
+_LARGEST = 1e300
+"""Absolute value of a number that is drawn; a damaged row may hold any."""
 
 
 def flat(row: Mapping[str, Any], variations: Sequence[Variation]) -> dict[str, Any]:
@@ -47,13 +50,15 @@ def write_table(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variatio
         values = [row.get(name) for row in made]
         if len({str if isinstance(value, str) else float for value in values if value is not None}) > 1:
             values = [None if value is None else str(value) for value in values]
-        column = pa.array(values)
+        try:
+            column = pa.array(values)
+        except (pa.ArrowException, OverflowError):  # of several types, or a number beyond 64 bits
+            column = pa.array([None if value is None else str(value) for value in values])
         metadata = {"unit": unit} if (unit := units.get(name)) else None
         fields.append(pa.field(name, column.type, metadata=metadata))
         columns.append(column)
-    part = file.with_suffix(".part")
-    pq.write_table(pa.Table.from_arrays(columns, schema=pa.schema(fields)), part)
-    part.replace(file)
+    with whole_file(file) as part:
+        pq.write_table(pa.Table.from_arrays(columns, schema=pa.schema(fields)), part)
 
 
 def write_plots(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variation], file: Path) -> bool:
@@ -79,7 +84,8 @@ def write_plots(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variatio
     for line, measure in zip(axes, measures, strict=True):
         for axis, variation in zip(line, varied, strict=True):
             _draw(axis, made, variation, measure)
-    figure.savefig(file, dpi=120)
+    with whole_file(file) as part:
+        figure.savefig(part, dpi=120, format="png")
     plt.close(figure)
     return True
 
@@ -87,13 +93,17 @@ def write_plots(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variatio
 def _is_measure(name: str, rows: Sequence[Mapping[str, Any]], varied: Sequence[Variation]) -> bool:
     if name in _ABOUT_THE_RUN or name in {variation.path for variation in varied}:
         return False
-    values = [row.get(name) for row in rows]
-    return any(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+    return any(_is_number(row.get(name)) for row in rows)
+
+
+def _is_number(value: Any) -> bool:
+    """Return whether a value can be drawn."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LARGEST
 
 
 def _draw(axis: Any, rows: Sequence[Mapping[str, Any]], variation: Variation, measure: str) -> None:
     """Draw all trials as points, and the mean of those with the same value as a line."""
-    points = [(row[variation.path], row[measure]) for row in rows if row.get(measure) is not None]
+    points = [(row[variation.path], row[measure]) for row in rows if _is_number(row.get(measure))]
     if variation.unit is None:
         points = [(str(x), y) for x, y in points]
     means = {x: [y for at, y in points if at == x] for x, _ in points}

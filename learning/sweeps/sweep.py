@@ -1,5 +1,6 @@
 """A sweep and its directory: which trials are done, and what they gave.
 
+    DIR/.trocar                 marks a sweep's directory; locked while the sweep runs
     DIR/sweep.json              what is swept
     DIR/trials/00007.json       the row of a trial that is done
     DIR/trials/00007/           its recording
@@ -17,9 +18,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import trocar
+from learning.own_directory import MARKER, whole_file
 from learning.sweeps.trial import Trial, planned, run_trial
 from learning.sweeps.variation import Variation
 from schemas.errors import ScenarioError
@@ -75,13 +77,13 @@ class Sweep:
         return hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()
 
     def open(self) -> None:
-        """Create the directory, or go on with the sweep in it.
+        """Begin in the directory, or go on with the sweep in it; the caller has claimed it.
 
         Raises ScenarioError if it holds another sweep or something else, or if the scenario has changed.
         """
         file, described = self.directory / "sweep.json", self._described()
         if file.exists():
-            now, there = described.pop("scenario_hash"), json.loads(_read(file))
+            now, there = described.pop("scenario_hash"), _read(file)
             if there.pop("scenario_hash", now) != now and there == described:
                 raise ScenarioError(
                     f"the scenario '{self.scenario}' has changed since the sweep in '{self.directory}' began,"
@@ -93,19 +95,22 @@ class Sweep:
                     " the command that began it"
                 )
             return
-        if self.directory.exists() and (not self.directory.is_dir() or any(self.directory.iterdir())):
+        (self.directory / "trials").mkdir(parents=True, exist_ok=True)
+        if any(path.name not in (MARKER, "trials") for path in self.directory.iterdir()):
             raise ScenarioError(f"'{self.directory}' holds something else than a sweep; name a new directory")
-        (self.directory / "trials").mkdir(parents=True)
         _write(file, json.dumps(described, indent=2) + "\n")
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return the rows of all trials that are done, in order."""
-        return [
-            {"trial": trial.number, "repetition": trial.repetition, **trial.settings}
-            | json.loads(_read(file))
-            for trial in self.trials
-            if (file := self._row(trial)).exists()
-        ]
+        """Return the rows of all trials that are done, in order; raises ScenarioError for a damaged row."""
+        rows: list[dict[str, Any]] = []
+        for trial in self.trials:
+            if (file := self._row(trial)).exists():
+                row = _read(file)
+                if not isinstance(row.get("error", 0), str | None):
+                    raise ScenarioError(f"'{file}' is no row of a sweep: delete it, and its trial runs again")
+                about = {"trial": trial.number, "repetition": trial.repetition, **trial.settings}
+                rows.append(about | row | about)
+        return rows
 
     def pending(self) -> list[Trial]:
         """Return the trials that are not done yet."""
@@ -186,12 +191,20 @@ def _texts(settings: Mapping[str, Any]) -> dict[str, str]:
     return {path: json.dumps(value) for path, value in settings.items()}
 
 
-def _read(file: Path) -> str:
-    return file.read_text(encoding="utf-8")
+def _read(file: Path) -> dict[str, Any]:
+    """Return the JSON object in a file of a sweep. Raises ScenarioError if there is none."""
+    try:
+        found: Any = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ScenarioError(
+            f"'{file}' cannot be read ({error}): delete it; what it held is made again"
+        ) from error
+    if not isinstance(found, dict):
+        raise ScenarioError(f"'{file}' holds no JSON object: delete it; what it held is made again")
+    return cast("dict[str, Any]", found)
 
 
 def _write(file: Path, text: str) -> None:
     """Write a file in one piece."""
-    part = file.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(file)
+    with whole_file(file) as part:
+        part.write_text(text, encoding="utf-8")

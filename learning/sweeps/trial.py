@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
 import shutil
 import subprocess
@@ -60,18 +61,29 @@ def run_trial(scenario: str, overrides: Sequence[str], recording: str | None) ->
         overrides: what its `--set` is given.
         recording: the directory of its recording; whatever stands there is removed first.
     """
-    command = [sys.executable, "-P", "-m", "trocar", "run", scenario, "--pace", "fast", "--json"]
+    command = [sys.executable, "-P", "-m", "hub.command_line.child", str(os.getpid())]
+    command += ["run", scenario, "--pace", "fast", "--json"]
     command += [part for override in overrides for part in ("--set", override)]
     command += ["--record", recording] if recording else []
     row: dict[str, Any] = {}
     for attempt in range(1, _ATTEMPTS + 1):
         if recording:
             shutil.rmtree(recording, ignore_errors=True)
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = _run_child(command)
         row = {"attempts": attempt, "node": platform.node(), "recording": recording} | _ending(done)
         if row["error"] is None:
             break
     return row
+
+
+def _run_child(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    """Run a command that ends with this process: where the kernel does not end it, its input does."""
+    reading, writing = os.pipe()
+    try:
+        return subprocess.run(command, stdin=reading, capture_output=True, text=True, check=False)
+    finally:
+        os.close(reading)
+        os.close(writing)
 
 
 def _ending(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:

@@ -33,6 +33,7 @@ def compare(name, directory, **changes):
     return summary
 
 
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("name", list(task_scenarios()))
 def test_the_beginning_of_a_scenario(name, tmp_path):
     compare(name, tmp_path, duration=LONGER.get(name, "1 s"))

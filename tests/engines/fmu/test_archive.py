@@ -99,6 +99,14 @@ def test_two_files_of_one_name(fmu: Path, tmp_path: Path, monkeypatch: pytest.Mo
     assert "twice" in refusal(fmu, tmp_path, monkeypatch)
 
 
+def test_a_directory_that_stands_there_twice(fmu: Path, tmp_path: Path) -> None:
+    add(fmu, "extra/")
+    with pytest.warns(UserWarning, match="Duplicate name"):
+        add(fmu, "extra/")
+    archive.unpack(fmu, tmp_path / "out")
+    assert (tmp_path / "out" / "extra").is_dir()
+
+
 def test_an_encrypted_file(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     add(fmu, "resources/secret")
     content = bytearray(fmu.read_bytes())

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import shutil
+import signal
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -17,6 +21,9 @@ import trocar
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.recorded_scene import RecordedScene
 from learning.datasets.command_line import app
+from learning.datasets.writer import Writer
+from learning.own_directory import claimed
+from schemas.errors import TrocarError
 from trocar import Recording
 
 pytestmark = pytest.mark.xdist_group("data sets")  # its sessions are recorded once, in one process
@@ -150,7 +157,7 @@ def test_a_session_without_camera_and_without_endoscope_is_drawn(recordings: Pat
     done = run(recordings / "unseen", "-o", tmp_path / "set", "--size", "64x64", "--fps", "20")
     assert done.exit_code == 0, done.output
     about = info(tmp_path / "set")
-    assert (about["total_frames"], about["features"]["observation.images.right"]["shape"]) == (7, [64, 64, 3])
+    assert (about["total_frames"], about["features"]["observation.images.right"]["shape"]) == (6, [64, 64, 3])
     (source,) = json.loads((tmp_path / "set/meta/recordings.json").read_text())
     assert source["pictures"] == "drawn"
     statistics = json.loads((tmp_path / "set/meta/stats.json").read_text())
@@ -205,3 +212,69 @@ def test_a_directory_that_is_in_use_is_left_alone(recordings: Path, tmp_path: Pa
     done = run(recordings / "unseen", "-o", tmp_path)
     assert done.exit_code == 2
     assert "exists already" in " ".join(done.stderr.replace("│", " ").split())
+
+
+def test_each_frame_has_its_action(recordings: Path, tmp_path: Path) -> None:
+    done = run(recordings / "unseen", "-o", tmp_path / "set", "--size", "64x64")
+    assert done.exit_code == 0, done.output
+    setpoints = Recording(recordings / "unseen")["robot.PSM1/setpoint_js"]
+    actions = rows(tmp_path / "set")["action"].to_pylist()
+    assert len(actions) == 8, "320 ms at 25 frames a second"
+    np.testing.assert_allclose(actions[-1][:6], setpoints["position"][-1], rtol=1e-6)
+
+
+def test_of_two_into_one_directory_the_second_is_refused(recordings: Path, tmp_path: Path) -> None:
+    with claimed(tmp_path / "set.part", "data set"):
+        done = run(recordings / "unseen", "-o", tmp_path / "set", "--size", "64x64")
+    assert (done.exit_code, str(done.exception)[:22]) == (1, "another process uses '")
+    assert not (tmp_path / "set").exists()
+
+
+def test_what_a_killed_one_has_left_is_replaced(recordings: Path, tmp_path: Path) -> None:
+    with claimed(tmp_path / "set.part", "data set"):
+        (tmp_path / "set.part/meta").mkdir()
+        (tmp_path / "set.part/left").touch()
+    done = run(recordings / "unseen", "-o", tmp_path / "set", "--size", "64x64")
+    assert done.exit_code == 0, done.output
+    assert sorted(path.name for path in (tmp_path / "set").iterdir()) == ["data", "meta", "videos"]
+    assert not (tmp_path / "set.part").exists()
+
+
+def test_one_that_is_terminated_leaves_the_episodes_so_far(
+    recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add = Writer.add
+
+    def add_and_terminate(writer: Writer, *words: Any) -> None:
+        add(writer, *words)
+        if writer.episodes == 2:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr(Writer, "add", add_and_terminate)
+    done = run(*[recordings / "unseen"] * 4, "-o", tmp_path / "set", "--size", "64x64")
+    assert done.exit_code != 0
+    assert info(tmp_path / "set")["total_episodes"] == 2
+    assert rows(tmp_path / "set").num_rows == 16
+    assert not (tmp_path / "set.part").exists()
+
+
+def test_a_full_disk_leaves_nothing_but_a_sentence(
+    recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", fail)
+    done = run(recordings / "unseen", "-o", tmp_path / "set", "--size", "64x64")
+    assert isinstance(done.exception, TrocarError)
+    assert "set' cannot be written, and is not made: [Errno 28] No space left" in str(done.exception)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_that_cannot_be_opened_is_left_out(recordings: Path, tmp_path: Path) -> None:
+    (tmp_path / "gone").mkdir()
+    (tmp_path / "gone/gone_0.mcap").symlink_to(tmp_path / "nowhere")
+    done = run(tmp_path / "gone", recordings / "unseen", "-o", tmp_path / "set", "--size", "64x64")
+    assert done.exit_code == 1
+    assert "left out: '" in done.stderr
+    assert info(tmp_path / "set")["total_episodes"] == 1

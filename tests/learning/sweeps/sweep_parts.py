@@ -3,6 +3,7 @@
 import os
 import signal
 from pathlib import Path
+from time import sleep
 
 import numpy as np
 
@@ -16,6 +17,8 @@ class KilledParams(Params):
     until: float = 1.0
     """Killed only where `value` is not below."""
     value: float = 0.0
+    forever: bool = False
+    """Whether a step never ends."""
 
 
 class Killed(Stepped):
@@ -28,6 +31,8 @@ class Killed(Stepped):
         return {"value": np.array([self.params.value])}
 
     def step(self, t, h, inputs):
+        while self.params.forever:
+            sleep(1.0)
         if self.params.value >= self.params.until and not (
             self.params.mark and Path(self.params.mark).exists()
         ):

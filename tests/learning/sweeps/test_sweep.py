@@ -1,12 +1,19 @@
 import json
+import os
+import select
+import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
+from time import sleep
 
 import pyarrow.parquet as pq
 import pytest
 
 from hub.command_line.app import main
+from learning.own_directory import MARKER, claimed
+from learning.sweeps import sweep as sweep_module
 from learning.sweeps.sweep import Sweep
 from learning.sweeps.variation import parse
 from schemas.errors import ScenarioError
@@ -126,3 +133,128 @@ def test_an_edited_scenario_is_noticed(scenario, tmp_path):
     scenario.write_text(text.replace("3 ms", "4 ms"))
     with pytest.raises(ScenarioError, match="has changed since the sweep in"):
         sweep().open()
+
+
+@pytest.fixture
+def command(monkeypatch, capsys):
+    """Run `trocar sweep` in this process; return its exit code and what it printed to stderr."""
+
+    def run(*words):
+        monkeypatch.setattr(sys, "argv", ["trocar", "sweep", *map(str, words)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        return left.value.code, " ".join(capsys.readouterr().err.split())
+
+    return run
+
+
+@pytest.fixture
+def begun(scenario, tmp_path, monkeypatch):
+    """A sweep of two trials whose processes are not started: its words, and its directory."""
+
+    def run_trial(scenario, overrides, recording):
+        return {"attempts": 1, "state": "done", "error": None, "value": 1.0, "recording": recording}
+
+    monkeypatch.setattr(sweep_module, "run_trial", run_trial)
+    directory = tmp_path / "results"
+    return (scenario, "--vary", "part.value=0,0.5", "-o", directory), directory
+
+
+def test_no_link_is_followed_or_removed_through(begun, command, tmp_path):
+    words, directory = begun
+    assert command(*words)[0] == 0
+    (directory / "trials/00001.json").unlink()
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/letter.txt").write_text("dear")
+    for place in ("trials/00001.part", "results.part", "results.png", "trials/00001"):
+        (directory / place).unlink(missing_ok=True)
+        (directory / place).symlink_to(tmp_path / "mine/letter.txt")
+        assert command(*words) == (
+            2,
+            f"error: '{directory / place}' is a link, which we have not made: remove it",
+        )
+        (directory / place).unlink()
+    shutil.move(directory / "trials", tmp_path / "trials")
+    (directory / "trials").symlink_to(tmp_path / "trials")
+    assert command(*words)[0] == 2
+    assert (tmp_path / "mine/letter.txt").read_text() == "dear"
+
+
+def test_a_directory_without_the_mark_is_left_alone(begun, command):
+    words, directory = begun
+    assert command(*words)[0] == 0
+    (directory / MARKER).unlink()
+    code, said = command(*words)
+    assert (code, "has no file '.trocar' that says so" in said) == (2, True)
+
+
+def test_of_two_sweeps_in_one_directory_the_second_is_refused(begun, command):
+    words, directory = begun
+    with claimed(directory, "sweep"):
+        code, said = command(*words)
+    assert (code, "another process uses" in said) == (2, True)
+    assert command(*words)[0] == 0
+
+
+@pytest.mark.parametrize(
+    "row",
+    ["", '{"error"', "[1]", "7", '{"error": 1}', "[" * 100_000, "\ud800", '{"value": 1}' + "x" * 10],
+    ids=["empty", "cut", "list", "number", "odd", "deep", "bytes", "more"],
+)
+def test_a_damaged_row_is_named(begun, command, row):
+    words, directory = begun
+    assert command(*words)[0] == 0
+    (directory / "trials/00001.json").write_bytes(row.encode("utf-8", "surrogatepass"))
+    code, said = command(*words)
+    assert (code, "00001.json'" in said, "delete it" in said) == (2, True, True)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"value": 10**400},
+        {"value": "much"},
+        {"value": True, "other": {"x": 1}},
+        {"value": [1, {"a": 2}], "other": 3},
+        {"part.value": {"a": {"b": 1}}, "trial": "x"},
+        {"value": float("nan"), "more": float("inf")},
+    ],
+    ids=str,
+)
+def test_odd_numbers_in_a_row_end_as_text(begun, command, values):
+    words, directory = begun
+    assert command(*words)[0] == 0
+    (directory / "trials/00001.json").write_text(json.dumps({"error": None, **values}))
+    assert command(*words)[0] == 0
+    rows = _rows(directory)
+    assert [row["part.value"] for row in rows] == [0.0, 0.5]
+    assert [row["trial"] for row in rows] == [0, 1]
+
+
+PARENT = """
+import sys
+from learning.sweeps.trial import run_trial
+
+run_trial(sys.argv[1], ["part.value=0", "part.forever=true"], None)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the input of the trial ends")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+def test_a_trial_ends_with_its_sweep(scenario, number):
+    with subprocess.Popen([sys.executable, "-c", PARENT, scenario]) as parent:
+        while not (children := _children(parent.pid)):
+            assert parent.poll() is None
+            sleep(0.01)
+        (child,) = children
+        handle = os.pidfd_open(child)
+        parent.send_signal(number)
+        parent.wait()
+    try:
+        assert select.select([handle], [], [], 100.0)[0], "the trial runs on"
+    finally:
+        os.close(handle)
+
+
+def _children(number):
+    return [int(each) for each in Path(f"/proc/{number}/task/{number}/children").read_text().split()]
