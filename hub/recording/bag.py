@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections import Counter
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -14,13 +16,14 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Chunk, ChunkIndex
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Schema
+from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from hub.recording.unfinished import Unfinished
+from hub.recording.unpacking import MAX_CHUNK_BYTES, most_unpacked, unpack
 from schemas import ros
 from schemas.codec import decode, message_type
 from schemas.errors import CutShortError, MessageError, RecordingError, did_you_mean
@@ -34,6 +37,7 @@ __all__ = [
     "BagMessage",
     "bag_file",
     "chunk_records",
+    "declarations",
     "default_output",
     "located_messages",
     "locating",
@@ -43,6 +47,11 @@ __all__ = [
 
 MAX_RECORD_BYTES = 64 * 2**20
 """A longer MCAP record is not read: chunks have 192 KiB and a step, or one image."""
+
+_MAX_RECORDS = 2**18
+"""Records of a chunk: ours have some thousands; the smallest take 9 bytes, and each costs a reader 200."""
+_MAX_TOPIC_RATIO, _FREE_TOPIC_BYTES = 32, 2**29
+"""Bytes of one topic in memory at once: a multiple of those of the file, or the second number if greater."""
 
 _RECORD = struct.Struct("<BQ")
 """Opcode and length of a record."""
@@ -148,7 +157,18 @@ class Bag:
             self._unfinished = Unfinished(self.file)
             self._summary = self._unfinished.summary
             self.grow()
+        self._require_bounded()
         self._read_topics()
+
+    def _require_bounded(self) -> None:
+        """Raise RecordingError for a bomb: a file whose chunks state that they unpack to far more."""
+        size = self.file.stat().st_size
+        stated = sum(index.uncompressed_size for index in self._summary.chunk_indexes)
+        if stated > (most := most_unpacked(size)):
+            raise RecordingError(
+                f"'{self.file}' has {size} bytes and would unpack to {stated}; at most {most} are unpacked:"
+                " it is damaged, or made to fill memory"
+            )
 
     @property
     def finished(self) -> bool:
@@ -230,9 +250,14 @@ class Bag:
         """Return the times (ns), shape (n,), and the payloads of one topic, in the order of `messages`."""
         times: list[int] = []
         payloads: list[bytes] = []
-        for records, found in self._located(
-            {c.id for c in self._summary.channels.values() if c.topic == topic}
-        ):
+        left = max(_FREE_TOPIC_BYTES, _MAX_TOPIC_RATIO * self.file.stat().st_size)
+        for records, found in self._located(self._ids(topic)):
+            left -= sum(m.end - m.offset for m in found)
+            if left < 0:
+                raise RecordingError(
+                    f"'{self.file}': topic '{topic}' is too large to be read at once, or a bomb: it has more"
+                    f" than {_MAX_TOPIC_RATIO} times the bytes of the file"
+                )
             times += [m.time_ns for m in found]
             payloads += [records[m.offset + MESSAGE_HEADER_BYTES : m.end] for m in found]
         return np.array(times, np.int64), payloads
@@ -354,28 +379,51 @@ def _message_at(records: bytes, offset: int, channels: set[int]) -> LocatedMessa
 
 
 def chunk_records(chunk: Chunk) -> bytes:
-    """Return the uncompressed records of `chunk`, checked against its checksum.
+    """Return the uncompressed records of `chunk`, checked against its size and checksum.
 
-    Raises whatever the decompressors raise.
+    Raises ValueError if it is not what it states or too large, and what the decompressors raise.
     """
-    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-    return stream.read(length)
+    size = chunk.uncompressed_size
+    if size > MAX_CHUNK_BYTES:
+        raise ValueError(f"a chunk states {size} bytes; at most {MAX_CHUNK_BYTES} are unpacked")
+    records = unpack(chunk.compression, chunk.data, size)
+    if len(records) != size:
+        raise ValueError(f"a chunk has {len(records)} bytes instead of {size}")
+    if chunk.uncompressed_crc and zlib.crc32(records) != chunk.uncompressed_crc:
+        raise ValueError("a chunk has another checksum than the stated one")
+    return records
 
 
 def located_messages(records: bytes) -> Iterator[LocatedMessage]:
     """Find the messages in the records of a chunk.
 
-    Raises ValueError or struct.error if records do not end where they say.
+    Raises ValueError or struct.error if records do not end where they say, or if there are too many.
     """
-    at = 0
-    while at < len(records):
-        opcode, length = _RECORD.unpack_from(records, at)
-        end = at + _RECORD.size + length
-        if end > len(records):
-            raise ValueError(f"a record of {length} bytes at {at} passes the end of its chunk")
+    for opcode, at, end in _heads(records):
         if opcode == Opcode.MESSAGE:
             _, _, channel, _, time_ns, _ = _MESSAGE.unpack_from(records, at)
             yield LocatedMessage(channel, time_ns, at, end)
+
+
+def declarations(records: bytes) -> Iterator[Schema | Channel]:
+    """Yield the schemas and channels in the records of a chunk; raises what `located_messages` raises."""
+    for opcode, at, end in _heads(records):
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            stream = ReadDataStream(BytesIO(records[at + _RECORD.size : end]))
+            yield Schema.read(stream) if opcode == Opcode.SCHEMA else Channel.read(stream)
+
+
+def _heads(records: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield opcode, start and end of each record of a chunk."""
+    at = count = 0
+    while at < len(records):
+        opcode, length = _RECORD.unpack_from(records, at)
+        end, count = at + _RECORD.size + length, count + 1
+        if end > len(records):
+            raise ValueError(f"a record of {length} bytes at {at} passes the end of its chunk")
+        if count > _MAX_RECORDS:
+            raise ValueError(f"a chunk has more than {_MAX_RECORDS} records")
+        yield opcode, at, end
         at = end
 
 

@@ -19,7 +19,7 @@ from schemas.errors import RecordingError, did_you_mean
 
 __all__ = ["Moments"]
 
-_CHUNKS_KEPT = 64
+_BYTES_KEPT = 64 * 2**20
 """Chunks that stay uncompressed, 64 KiB or one picture each: neighbouring instants read the same ones."""
 _INDEXES_KEPT = 1024
 
@@ -42,6 +42,8 @@ class Moments:
         self._lock = Lock()
         self._chunks: dict[str, _Chunks] = {}
         self._records: OrderedDict[int, bytes] = OrderedDict()
+        self._kept = 0
+        """Bytes in `_records`."""
         self._times: OrderedDict[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]]] = OrderedDict()
 
     @property
@@ -112,7 +114,8 @@ class Moments:
         key = chunk.chunk_start_offset
         if key not in self._records:
             self._records[key] = self._bag.chunk(chunk)
-            if len(self._records) > _CHUNKS_KEPT:
-                self._records.popitem(last=False)
+            self._kept += len(self._records[key])
+            while self._kept > _BYTES_KEPT and len(self._records) > 1:
+                self._kept -= len(self._records.popitem(last=False)[1])
         self._records.move_to_end(key)
         return self._records[key]

@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
 from hub.recording.bag import (
     MAX_RECORD_BYTES,
     bag_file,
     chunk_records,
+    declarations,
     default_output,
     located_messages,
     reading,
@@ -127,7 +128,7 @@ class _Copy:
         try:
             records = chunk_records(chunk)
             table = np.array([m[:3] for m in located_messages(records)], np.int64).reshape(-1, 3)
-            others = [record for record in breakup_chunk(chunk) if not isinstance(record, Message)]
+            others = list(declarations(records))
         except Exception:  # noqa: BLE001 - wrong bytes make zstd, lz4, struct and mcap raise what they please; counted, and reported
             self.damaged += 1
             return

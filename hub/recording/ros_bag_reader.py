@@ -13,9 +13,13 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 import zstandard
+from mcap.writer import MCAP0_MAGIC
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
 
+from hub.recording.bounded_rosbags import bound_rosbags
+from hub.recording.unfinished import Unfinished
+from hub.recording.unpacking import most_unpacked
 from schemas.codec import typestore
 from schemas.errors import RecordingError
 
@@ -23,6 +27,8 @@ __all__ = ["BagTopic", "RosBag"]
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
 """How a file compressed by Zstandard begins (RFC 8878, 3.1.1)."""
+_SKIPPABLE, _SKIPPABLE_FIRST = b"\x2a\x4d\x18", 5
+"""How a frame that is skipped begins, in front of others: 0x50 to 0x5F, then these (RFC 8878, 3.1.2)."""
 _PIECE = 2**20
 _SHARE = 0.5
 """Of the free space for temporary files: `rosbags` unpacks a bag of compressed files there."""
@@ -46,7 +52,8 @@ class RosBag:
         """Open a bag. Raises RecordingError if it cannot be read."""
         self.path = path
         with _reading(path):
-            _require_space(path)
+            bound_rosbags()
+            _require_bounded(path)
             self._reader = AnyReader([path], default_typestore=typestore())
             self._reader.open()
         self.topics: dict[str, BagTopic] = {}
@@ -91,24 +98,47 @@ class RosBag:
         self.close()
 
 
-def _require_space(bag: Path) -> None:
-    """Raise RecordingError if the compressed files of a bag, which may be a bomb, do not fit on the disk."""
-    space = shutil.disk_usage(tempfile.gettempdir()).free * _SHARE
-    for file in sorted(bag.iterdir()) if bag.is_dir() else ():
-        if not file.is_file():
+def _require_bounded(bag: Path) -> None:
+    """Raise RecordingError if a file of a bag is none, or if it is a bomb or does not fit on the disk."""
+    space = int(shutil.disk_usage(tempfile.gettempdir()).free * _SHARE)
+    for file in sorted(bag.iterdir()) if bag.is_dir() else (bag,):
+        if file.is_dir():
             continue
+        if not file.is_file():
+            raise RecordingError(f"'{file}' is no regular file: it may be a pipe that never ends")
+        most = most_unpacked(file.stat().st_size)
         with file.open("rb") as packed:
-            if packed.read(len(_ZSTD)) != _ZSTD:
-                continue
-            packed.seek(0)
-            with zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True) as unpacked:
-                while space >= 0 and (piece := unpacked.read(_PIECE)):
-                    space -= len(piece)
+            begin = packed.read(len(_ZSTD))
+        if begin == _ZSTD or (begin[1:] == _SKIPPABLE and begin[0] >> 4 == _SKIPPABLE_FIRST):
+            size = _unpacked_size(file, min(space, most))
+            space -= size
+        elif begin == MCAP0_MAGIC[: len(_ZSTD)]:
+            chunks = Unfinished(file)
+            chunks.grow()
+            size = sum(index.uncompressed_size for index in chunks.summary.chunk_indexes)
+        else:
+            continue
+        if size > most:
+            raise RecordingError(
+                f"'{file}' would unpack to more than {most} bytes: it is damaged, or made to fill memory"
+            )
         if space < 0:
             raise RecordingError(
                 f"the bag '{bag}' is not unpacked: its compressed files need more than half of what is free"
                 f" in {tempfile.gettempdir()}. Set TMPDIR to a larger disk, or use compression by message"
             )
+
+
+def _unpacked_size(file: Path, most: int) -> int:
+    """Return the unpacked size of a file, or a size above `most` as soon as it is known to be larger."""
+    size = 0
+    with (
+        file.open("rb") as packed,
+        zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True) as unpacked,
+    ):
+        while size <= most and (piece := unpacked.read(_PIECE)):
+            size += len(piece)
+    return size
 
 
 @contextmanager

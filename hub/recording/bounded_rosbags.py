@@ -1,0 +1,30 @@
+"""Bounds for `rosbags`, which unpacks chunks, messages and files of a bag whole, whatever comes out of them.
+
+Its tables of decompressors are replaced when this module is imported; ours refuse what is too large.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from types import SimpleNamespace
+
+import rosbags.rosbag1.reader as ros1
+import rosbags.rosbag2.reader as ros2
+import rosbags.rosbag2.storage_mcap as mcap
+
+from hub.recording.unpacking import MAX_CHUNK_BYTES, unpack
+
+__all__ = ["bound_rosbags"]
+
+
+def bound_rosbags() -> None:
+    """Replace the decompressors of `rosbags`. May be called again."""
+    for name in ("lz4", "bz2"):
+        ros1.decompressors[name] = partial(unpack, name)
+    for name in ("lz4", "zstd"):
+        mcap.DECOMPRESSORS[name] = partial(_unpack_stated, name)
+    ros2.zstd = SimpleNamespace(open=ros2.zstd.open, decompress=partial(unpack, "zstd"))
+
+
+def _unpack_stated(compression: str, packed: bytes, size: int) -> bytes:
+    return unpack(compression, packed, min(size, MAX_CHUNK_BYTES))
