@@ -94,7 +94,7 @@ def _write_load(place: Path) -> None:
 
     fed = Fed()
     fed.close()
-    parts = Stage(fed.scenario, fed.outlets).scenes["robot"].parts
+    parts = Stage(fed.scenario, fed.outlets, fed.params).scenes["robot"].parts
     nodes, triangles = ring()
     load: dict[str, Any] = {"bodies": len(parts), "nodes": nodes, "triangles": triangles}
     for index, part in enumerate(parts):

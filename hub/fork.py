@@ -13,14 +13,16 @@ from hub.planning.plan import Plan, PlannedConnection, PlannedParticipant
 from hub.planning.renewal import Renewal
 from hub.planning.scenario_file import ScenarioFile, validated
 from hub.planning.scenario_source import Source
-from hub.recording.fork_origin import ForkOrigin, fork_origin
+from hub.planning.session_parameters import SessionParameters
+from hub.recording.fork_origin import ForkOrigin
 from hub.recording.recording import Recording
-from hub.recording.trust import require_trust
+from hub.recording.trust import trusted_parameters
 from hub.session.launch import Continuation, in_one_host, launch, plan_of
 from hub.session.past import Past
 from hub.session.session import Session
 from hub.transport.loopback_port import LoopbackPort
 from schemas.errors import RecordingError, ScenarioError, SessionError
+from schemas.files import Files
 from schemas.scenario import ParticipantSpec, Scenario
 from schemas.trocar_msgs import GrantMessage, InletSample
 
@@ -41,7 +43,7 @@ class Fork:
         overrides: What is to be changed, `a.b.c=value`: parameters of engines and controllers that can save
             their state, devices, hosts, pace, duration, measures. More tasks and cameras may be added.
         record: The directory of the fork's own recording.
-        trust: Allow what `require_trust` refuses.
+        trust: Allow what `trusted_parameters` refuses.
         directory: Where relative paths of the scenario start, by default where they did.
         one_host: Run every participant in this process.
         endpoint: Where the hub listens on loopback.
@@ -49,7 +51,7 @@ class Fork:
         certificates: By default this user's directory.
 
     Raises RecordingError if there is no such instant in the recording, ScenarioError if a change is not
-    possible in a running session, and what `require_trust` and `launch` raise.
+    possible in a running session, and what `trusted_parameters` and `launch` raise.
     """
 
     def __init__(
@@ -68,9 +70,12 @@ class Fork:
     ) -> None:
         parent = recording.plan()
         directory = directory or recording.directory()
-        require_trust(recording, parent.participants, directory, trust=trust)
+        recorded = recording.scenario()
+        names = dict.fromkeys([*parent.participants, *recorded.participants])
+        parameters = trusted_parameters(recording, names, directory, trust=trust)
         step = at_ns // parent.step_ns
-        before, past_renewals = _at(recording, step)
+        past = parameters.at(step)
+        before = _with_parameters(recorded, past)
         file = _changed(before, directory, overrides)
         scenario = in_one_host(file.scenario) if one_host else file.scenario
         plan = _going_on(parent, plan_of(scenario, file.params)[0])
@@ -79,7 +84,7 @@ class Fork:
                 f"the session ends at {scenario.duration / 1e9:g} s, before it is forked at"
                 f" {step * plan.step_ns / 1e9:g} s: set a longer one with --set duration=..."
             )
-        renewals = *past_renewals, *_renewals(before, scenario, plan, step)
+        renewals = *past.renewals, *_renewals(before, scenario, plan, step)
         grants = _Grants(recording, parent, plan, step)
         self.origin = ForkOrigin(
             parent=str(recording.file),
@@ -99,7 +104,12 @@ class Fork:
             one_host=one_host,
             continuation=Continuation(
                 plan,
-                Past(iter(grants), step, renewals, _new_devices(before, scenario, plan)),
+                Past(
+                    iter(grants),
+                    SessionParameters.of_scenario(scenario, Files(directory), renewals),
+                    step,
+                    _new_devices(before, scenario, plan),
+                ),
                 self.origin,
                 self._comparison.take,
             ),
@@ -121,16 +131,13 @@ class Fork:
         return summary
 
 
-def _at(recording: Recording, step: int) -> tuple[Scenario, list[Renewal]]:
-    """Return a recorded scenario with the parameters of a step, and the renewals before it."""
-    scenario, origin = recording.scenario(), fork_origin(recording)
-    renewals = [] if origin is None else sorted(origin.renewals, key=lambda one: one.step)
-    specs = dict(scenario.participants)
-    for one in reversed(renewals):
-        for name in one.before if one.step >= step else ():
-            kept = specs[name].model_dump(mode="json", include=set(ParticipantSpec.RESERVED))
-            specs[name] = ParticipantSpec.model_validate({**kept, **one.before[name]})
-    return scenario.model_copy(update={"participants": specs}), [one for one in renewals if one.step < step]
+def _with_parameters(scenario: Scenario, parameters: SessionParameters) -> Scenario:
+    """Return a recorded scenario with these parameters."""
+    specs: dict[str, ParticipantSpec] = {}
+    for name, spec in scenario.participants.items():
+        kept = spec.model_dump(mode="json", include=set(ParticipantSpec.RESERVED))
+        specs[name] = ParticipantSpec.model_validate({**parameters.last[name], **kept})
+    return scenario.model_copy(update={"participants": specs})
 
 
 def _changed(before: Scenario, directory: Path, overrides: Sequence[str]) -> ScenarioFile:

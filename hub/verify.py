@@ -9,10 +9,8 @@ from pathlib import Path
 from hub.hash_comparison import HashComparison
 from hub.observation.summary import Progress
 from hub.planning.plan import Plan
-from hub.planning.renewal import made
-from hub.recording.fork_origin import fork_origin
 from hub.recording.recording import Recording
-from hub.recording.trust import require_trust
+from hub.recording.trust import trusted_parameters
 from hub.session.clock import most_steps
 from hub.session.past import Past
 from hub.session.session import Session
@@ -53,25 +51,19 @@ def verify(
 
     Args:
         recording: The recording, which may be a stranger's.
-        trust: Allow what `require_trust` refuses.
+        trust: Allow what `trusted_parameters` refuses.
         directory: Where relative paths of the scenario start, by default where they did.
         endpoint: Where the hub listens on loopback; by default at a free port.
         progress: Is called several times a second of wall time.
 
-    Raises RecordingError if the recording is not of a session, and what `require_trust` and `Session.run`
-    raise.
+    Raises RecordingError if the recording is not of a session, and what `trusted_parameters` and
+    `Session.run` raise.
     """
     scenario = recording.scenario().model_copy(update={"pace": "fast", "measure": {}})
     plan, directory = _plan(recording), directory or recording.directory()
     stepped = {name: planned for name, planned in plan.participants.items() if planned.in_step}
-    require_trust(recording, stepped, directory, trust=trust)
-    origin = fork_origin(recording)
-    renewals = () if origin is None else origin.renewals
-    here = {
-        name: made(planned.kind, name, scenario.participants[name].params, renewals, directory)
-        for name, planned in stepped.items()
-        if planned.host == "hub"
-    }
+    parameters = trusted_parameters(recording, stepped, directory, trust=trust)
+    here = {name: parameters.make(name) for name, planned in stepped.items() if planned.host == "hub"}
     comparison = HashComparison(recording, plan)
     session = Session(
         scenario,
@@ -79,7 +71,7 @@ def verify(
         {name: first for name, (first, _) in here.items()},
         directory,
         endpoint=endpoint,
-        past=Past(_grants(recording, plan, most_steps(plan, scenario.window)), renewals=renewals),
+        past=Past(_grants(recording, plan, most_steps(plan, scenario.window)), parameters),
         successors={name: later for name, (_, later) in here.items()},
         on_ack=comparison.take,
     )

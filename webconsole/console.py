@@ -54,7 +54,9 @@ class Console:
             if scenario is None:
                 return None
             if generation != self._generation:
-                self._stage = await asyncio.to_thread(Stage, scenario, self.source.outlets)
+                self._stage = await asyncio.to_thread(
+                    Stage, scenario, self.source.outlets, self.source.params
+                )
                 await asyncio.to_thread(lambda: self._stage and self._stage.packed)
                 self._generation, self._made = generation, {}
                 await asyncio.to_thread(self.drawable)

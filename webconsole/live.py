@@ -21,7 +21,9 @@ from zenoh.handlers import Callback
 
 from hub.devices.network_link import in_words
 from hub.devices.network_link_control import NetworkLinkReply, NetworkLinkRequest
+from hub.participant import Params
 from hub.planning.plan import Plan
+from hub.planning.session_parameters import SessionParameters
 from hub.remote.hub_connection import reach
 from hub.remote.live_sessions import live_sessions
 from hub.security.credentials import OBSERVER
@@ -32,7 +34,8 @@ from hub.transport.endpoints import is_loopback
 from hub.transport.envelope import Tag
 from hub.transport.hub_files import running_hubs
 from schemas.codec import decode
-from schemas.errors import ConnectError, MessageError
+from schemas.errors import ConnectError, MessageError, ScenarioError
+from schemas.files import Files
 from schemas.keys import Keys, topic
 from schemas.network_link import NetworkLinkSpec
 from schemas.scenario import Scenario
@@ -242,6 +245,12 @@ class Live:
                     self._drop()
                 alive.undeclare()
                 status.undeclare()
+
+    def params(self, participant: str) -> Params:
+        """Return the validated parameters of a participant. Raises ScenarioError if they are invalid here."""
+        if self.scenario is None:
+            raise ScenarioError("there is no session")
+        return SessionParameters.of_scenario(self.scenario, Files(Path.cwd())).validated(participant)
 
     def _found(self) -> tuple[str, str]:
         for endpoint in self._endpoints():

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from hub.participant import Params
 from hub.recording.bag import output_port
 from hub.recording.moments import Moments
 from hub.recording.recording import Recording
 from hub.recording.series import Series
+from hub.recording.trust import trusted_parameters
 from schemas.errors import RecordingError
 from schemas.ports import Port
 from schemas.scenario import Scenario
@@ -89,6 +91,10 @@ class Recorded:
             "dropped": 0 if last is None else last.dropped_messages,
             "detail": "" if last is None else last.detail,
         }
+
+    def params(self, participant: str) -> Params:
+        """Return the validated parameters of a participant; raises what `trusted_parameters` raises."""
+        return trusted_parameters(self.recording, [participant]).validated(participant)
 
     def want(self, names: frozenset[str]) -> None:
         """Nothing has to be asked for."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
+from hub.participant import Params
 from schemas.ports import Port
 from schemas.scenario import Scenario
 
@@ -45,6 +46,13 @@ class Source(Protocol):
     @property
     def scenario(self) -> Scenario | None:
         """The scenario; None while there is no session."""
+        ...
+
+    def params(self, participant: str) -> Params:
+        """Return the validated parameters of a participant.
+
+        Raises TrocarError if they are not valid, or not to be trusted.
+        """
         ...
 
     @property

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hub.participant import Params
 from hub.participant.view import Rgb, Scene
 from schemas.codec import decode
 from schemas.ros import CompressedImage
@@ -45,14 +46,17 @@ class Stage:
     A scene that cannot be made is left out, and `notes` says why: plots and pictures work without it.
     """
 
-    def __init__(self, scenario: Scenario, outlets: Sequence[Outlet]) -> None:
+    def __init__(
+        self, scenario: Scenario, outlets: Sequence[Outlet], params: Callable[[str], Params]
+    ) -> None:
+        """`params` returns the validated parameters of a participant, or raises what is noted."""
         self.notes: list[str] = []
         self.scenes: dict[str, Scene] = {}
         """By participant, those with something to draw."""
         self._outlets = {one.name: one for one in outlets}
         colours: dict[str, Rgb] = {}
         for participant, spec in scenario.participants.items():
-            scene = self._scene(participant, spec.kind, spec.params)
+            scene = self._scene(participant, spec.kind, params)
             if scene is not None:
                 colours |= {f"{participant}.{port}": rgb for port, rgb in scene.surfaces.items()}
                 if scene.bodies:
@@ -84,11 +88,11 @@ class Stage:
         self.shown = frozenset((*self._codecs, *self.surfaces, *self.markers, *of_arrows, *of_hands))
         """The outlets that the scene itself needs."""
 
-    def _scene(self, participant: str, kind: str, params: Mapping[str, Any]) -> Scene | None:
+    def _scene(self, participant: str, kind: str, params: Callable[[str], Params]) -> Scene | None:
         for entry in entry_points(group=GROUP, name=kind):
             try:
-                make: Callable[[Mapping[str, Any]], Scene] = entry.load()
-                return make(params)
+                make: Callable[[Params], Scene] = entry.load()
+                return make(params(participant))
             except Exception as error:  # noqa: BLE001  # a plug-in may raise anything; the page says what
                 self.notes.append(
                     f"'{participant}' (kind {kind}) cannot be drawn: {type(error).__name__}:"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -12,6 +12,7 @@ from hub.participant import Params
 from robots.dvrk.crtk import Mounting, Reference
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
+from schemas.files import find_file
 from schemas.quantity import Duration
 
 __all__ = ["Arms", "GatewayParams", "Real", "TopicParams"]
@@ -106,8 +107,7 @@ class GatewayParams(TopicParams):
     def _find(cls, file: Path | None, info: ValidationInfo) -> Path | None:
         if file is None:
             return None
-        context: dict[str, Any] = info.context or {}
-        path = Path(context.get("directory", Path.cwd())) / file
+        path = find_file(file, info)
         if not path.is_file():
             raise ValueError(f"no file '{path}'; `trocar model export` writes one")
-        return path.resolve()
+        return path

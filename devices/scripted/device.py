@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -18,6 +18,7 @@ from hub.participant import Device, Params, Sample, VectorSample
 from hub.recording.bag import Bag, BagMessage, output_port
 from schemas.codec import decode, message_type
 from schemas.errors import MessageError, RecordingError
+from schemas.files import find_file
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.quantity import Duration
@@ -57,13 +58,12 @@ class ScriptedParams(Params):
     @field_validator("samples")
     @classmethod
     def _find(cls, samples: Path, info: ValidationInfo) -> Path:
-        context: dict[str, Any] = info.context or {}
-        path = Path(context.get("directory", Path.cwd())) / samples
+        path = find_file(samples, info)
         try:
             _ports(Bag(path), simulated_time=True, max_age_ns=0)
         except (RecordingError, MessageError) as error:
             raise ValueError(str(error)) from error
-        return path.resolve()
+        return path
 
 
 class ScriptedDevice(Device):

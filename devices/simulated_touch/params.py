@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInfo, field_validator
 
@@ -14,6 +14,7 @@ from hub.participant import Params
 from hub.recording.bag import bag_file
 from robots.dvrk.parameters import UnitQuaternion
 from schemas.errors import RecordingError, ScenarioError
+from schemas.files import find_file
 from schemas.quantity import Damping, Duration, Length, Mass, Stiffness
 
 __all__ = ["LEVEL", "HandParams", "SimulatedStylusParams", "SimulatedTouchParams", "Waypoint"]
@@ -79,8 +80,7 @@ class SimulatedStylusParams(Params):
     def _sound(cls, path: tuple[Waypoint, ...] | Path, info: ValidationInfo) -> tuple[Waypoint, ...] | Path:
         """Check the order of the times, and find the recording."""
         if isinstance(path, Path):
-            context: dict[str, Any] = info.context or {}
-            file = (Path(context.get("directory", Path.cwd())) / path).resolve()
+            file = find_file(path, info)
             try:
                 bag_file(file)
             except RecordingError as error:

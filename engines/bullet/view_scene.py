@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +33,10 @@ class ViewScene:
     cameras: tuple[Camera, ...] = ()
     inputs: tuple[str, ...] = ()
 
-    def __init__(self, params: Mapping[str, Any]) -> None:
-        """Find the organs; raises pydantic's ValidationError if the parameters are not valid."""
-        organs = BulletParams.model_validate(params).organs
+    def __init__(self, params: BulletParams) -> None:
         self.surfaces: dict[str, Rgb] = {
             f"{name}/nodes": _COLOURS.get(next(filter(name.endswith, _COLOURS), ""), _TISSUE)
-            for name in organs
+            for name in params.organs
         }
 
     def poses(self, values: Mapping[str, Vector]) -> NDArray[np.float32]:  # noqa: ARG002

@@ -23,6 +23,7 @@ from engines.fmu.fmi3 import Fmi3Instance
 from engines.fmu.instance import Instance
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from schemas.errors import ScenarioError, SessionError, StateError
+from schemas.files import find_file
 from schemas.ports import Port
 from schemas.quantity import Duration
 from schemas.vectors import Vector
@@ -64,8 +65,7 @@ class FmuParams(Params):
     @field_validator("path")
     @classmethod
     def _from_scenario(cls, path: Path, info: ValidationInfo) -> Path:
-        directory: Path = info.context["directory"] if info.context else Path.cwd()
-        return (directory / path).resolve()
+        return find_file(path, info) if info.context else path  # nothing is opened before the ports are read
 
 
 class FmuEngine(Stepped):

@@ -21,6 +21,7 @@ from robots import command_line as kinematics
 from robots.dvrk.arms import ARMS, DEFAULT_INSTRUMENT
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MissingExtraError, MotionError, did_you_mean
+from schemas.files import Files
 
 if TYPE_CHECKING:
     from engines.mujoco.model.dynamics import JointDynamics
@@ -271,7 +272,8 @@ def _scene(arms: list[CartArm], instruments: list[str], own: list[str], mounting
             param_hint="--mounting",
         )
     with _refusing():
-        return SceneParams.model_validate({"arms": tools, "mounting": mounting})
+        stated = {"arms": tools, "mounting": mounting}
+        return SceneParams.model_validate(stated, context=Files(Path.cwd()).context)
 
 
 def _of_arm(text: str, arms: list[CartArm], option: str, example: str) -> tuple[CartArm, str]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engines.suture_pad.ports import SKIN
+from hub.participant import Params
 from hub.participant.view import Camera, Frame, Part, Rgb
 from robots.training.threads import THREAD
 from schemas.vectors import Vector
@@ -29,7 +29,7 @@ class ViewScene:
         f"{THREAD}/nodes": (0.35, 0.1, 0.55),
     }
 
-    def __init__(self, params: Mapping[str, Any]) -> None:
+    def __init__(self, params: Params) -> None:
         """Every pad looks the same."""
 
     def poses(self, values: Mapping[str, Vector]) -> NDArray[np.float32]:  # noqa: ARG002

@@ -19,7 +19,7 @@ from hub.hosting.host_layout import HostLayout, Listeners
 from hub.hosting.hosted_participant import HostedParticipant
 from hub.participant import Outputs, Setup, Stepped
 from hub.planning.plan import Plan, PlannedParticipant
-from hub.planning.renewal import Successors
+from hub.planning.session_parameters import Successors
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.host_link import IDLE

@@ -22,7 +22,7 @@ from hub.hosting.low_priority import lower_priority
 from hub.hosting.observing import Observing
 from hub.participant import Device, Stepped
 from hub.planning.plan import PlannedParticipant
-from hub.planning.renewal import made
+from hub.planning.session_parameters import SessionParameters
 from hub.transport.control_client import ask, ask_as_child
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.host_link import HostLink
@@ -32,6 +32,7 @@ from hub.transport.wire import Wire
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError
+from schemas.files import Files
 from schemas.keys import Keys
 from schemas.lockstep import Ack, Grant, unpack_grant
 from schemas.ros import StringMessage
@@ -64,10 +65,13 @@ class HostRun:
         self._ended: set[str] = set()
         plan, host, keys = reply.plan, request.host, self._keys
         mine = {name: planned for name, planned in plan.participants.items() if planned.host == host}
-        ready = {
-            name: made(planned.kind, name, reply.params[name], reply.renewals, directory)
-            for name, planned in mine.items()
-        }
+        parameters = SessionParameters(
+            {name: planned.kind for name, planned in mine.items()},
+            reply.params,
+            tuple(reply.renewals),
+            Files(directory),
+        )
+        ready = {name: parameters.make(name) for name in mine}
         participants = {name: first for name, (first, _) in ready.items()}
         first = next(iter(mine.values()))
         refused = session.declare_publisher(

@@ -1,7 +1,7 @@
 """What a page draws of a participant: bodies with meshes, moved by its outputs, and soft surfaces.
 
 A kind offers it by an entry point of the group `trocar.scenes`, which names a function or class that takes
-the participant's parameters (a mapping, as the scenario states them) and returns a `Scene`.
+the participant's validated parameters (its `Params`) and returns a `Scene`.
 """
 
 from __future__ import annotations

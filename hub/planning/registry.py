@@ -6,16 +6,14 @@ A package adds its own kinds with entry points in the groups `trocar.engines`, `
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, PackageNotFoundError, distribution, entry_points
 from inspect import isabstract
-from pathlib import Path
 from typing import Any, Literal
 
 from packaging.requirements import Requirement
-from pydantic import ValidationError
 
 from hub.participant import Device, Params, Stepped
 from hub.planning.limits import MAX_KIND, shown
@@ -33,7 +31,6 @@ __all__ = [
     "installed_packages",
     "kinds",
     "load",
-    "make",
     "missing_packages",
     "require_extra",
 ]
@@ -141,19 +138,6 @@ def _import(kind: Kind) -> Any:
             f"{kind.role} '{kind.name}' of '{kind.distribution}' cannot be loaded from {kind.entry.value}:"
             f" {type(error).__name__}: {error}"
         ) from error
-
-
-def make(name: str, participant: str, params: Mapping[str, Any], directory: Path) -> Stepped | Device:
-    """Return a participant of kind `name`; relative paths in its parameters start at `directory`.
-
-    Raises ScenarioError if the kind cannot be loaded or the parameters are invalid.
-    """
-    kind = load(name)
-    try:
-        checked = kind.params_model.model_validate(params, context={"directory": directory})
-    except ValidationError as error:
-        raise ScenarioError(f"participant '{participant}' of kind '{name}': {error}") from error
-    return kind(participant, checked)
 
 
 def broken() -> dict[str, str]:

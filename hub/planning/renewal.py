@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterable
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from hub.participant import Device, Stepped
-from hub.planning import registry
+from schemas.scenario import ParticipantSpec
 
-__all__ = ["Renewal", "Successors", "made", "stages"]
-
-Successors = Mapping[str, Sequence[tuple[int, Stepped]]]
-"""By participant: who takes over its state, and before which step, the earliest first."""
+__all__ = ["Renewal"]
 
 
 class Renewal(BaseModel):
@@ -26,31 +21,15 @@ class Renewal(BaseModel):
     before: dict[str, dict[str, Any]]
     """The parameters that they had until then, by name."""
 
+    @field_validator("before")
+    @classmethod
+    def _has_parameters_alone(cls, before: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        """A kind or a host among them would take the place of the participant's own."""
+        for name, params in before.items():
+            if other := sorted(params.keys() & set(ParticipantSpec.RESERVED)):
+                raise ValueError(f"participant '{name}': {', '.join(other)} is no parameter of a kind")
+        return before
+
     def of(self, names: Iterable[str]) -> Renewal:
         """Return the part that concerns the participants `names`."""
         return Renewal(step=self.step, before={n: self.before[n] for n in names if n in self.before})
-
-
-def stages(
-    name: str, params: Mapping[str, Any], renewals: Iterable[Renewal]
-) -> list[tuple[int, Mapping[str, Any]]]:
-    """Return the parameters of participant `name` over a session, each with its first step.
-
-    `params` are the last ones.
-    """
-    mine = sorted((one for one in renewals if name in one.before), key=lambda one: one.step)
-    starts = [0, *(one.step for one in mine)]
-    return list(zip(starts, [*(one.before[name] for one in mine), params], strict=True))
-
-
-def made(
-    kind: str, name: str, params: Mapping[str, Any], renewals: Iterable[Renewal], directory: Path
-) -> tuple[Stepped | Device, list[tuple[int, Stepped]]]:
-    """Return a participant as it starts, and those that take over from it.
-
-    Raises ScenarioError if the kind cannot be loaded or parameters are invalid.
-    """
-    first, *later = (
-        (step, registry.make(kind, name, given, directory)) for step, given in stages(name, params, renewals)
-    )
-    return first[1], [(step, one) for step, one in later if isinstance(one, Stepped)]

@@ -22,6 +22,7 @@ from hub.planning.scenario_source import Location, Source, read
 from hub.planning.scene import spread_scene
 from hub.planning.validation_errors import problems
 from schemas.errors import ScenarioError, did_you_mean
+from schemas.files import Files
 from schemas.scenario import ParticipantSpec, Scenario
 
 __all__ = ["ScenarioFile", "installed_scenarios", "load", "located", "validated"]
@@ -170,7 +171,7 @@ def _params(at: Location, spec: dict[str, Any], source: Source, present: set[str
         raise ScenarioError(str(error), path=(*at, "kind")) from error
     given = {key: value for key, value in spec.items() if key not in ParticipantSpec.RESERVED}
     try:
-        return model.model_validate(given, context={"directory": source.directory})
+        return model.model_validate(given, context=Files(source.directory).context)
     except ValidationError as error:
         found = problems(error, model, at, source, other_keys=ParticipantSpec.RESERVED)
         raise ScenarioError("\n".join(found)) from error

@@ -1,13 +1,13 @@
 """What a recording may ask for: by itself, installed kinds and files with the recorded contents.
 
-Anyone may have made a recording. Its scenario and its plan can name any class, library, FMU or file of this
-machine, and to build a participant from them would run or read it.
+Anyone may have made a recording. Its scenario, its plan and the renewals of a fork can name any class,
+library, FMU or file of this machine, and to build a participant from them would run or read it.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,64 +16,95 @@ from hub.planning.foreign_code import names_class
 from hub.planning.limits import MAX_PROBLEMS, shown
 from hub.planning.parameter_paths import parameter_paths
 from hub.planning.plan import PlannedParticipant
-from hub.recording.file_hashes import has_contents
+from hub.planning.session_parameters import SessionParameters
+from hub.recording.fork_origin import fork_origin
 from hub.recording.recording import Recording
 from schemas.errors import RecordingError, TrustError
+from schemas.files import Files, has_contents
 
-__all__ = ["require_trust"]
+__all__ = ["recorded_files", "trusted_parameters"]
 
 log = logging.getLogger(__name__)
 
 
-def require_trust(
-    recording: Recording, participants: Mapping[str, PlannedParticipant], directory: Path, *, trust: bool
-) -> None:
-    """Check what these participants of a recording ask for, before anything of them is imported or read.
+def trusted_parameters(
+    recording: Recording, names: Iterable[str], directory: Path | None = None, *, trust: bool = False
+) -> SessionParameters:
+    """Return kinds and parameters of participants, checked before anything of them is imported or read.
 
     Args:
-        recording: The recording; its plan and its scenario need not fit together.
-        participants: Those of its plan that are to be made, by name.
-        directory: Where relative paths start.
+        recording: The recording; its plan, its scenario and its renewals need not fit together.
+        names: The participants that are to be made or drawn.
+        directory: Where relative paths start, by default where they did.
         trust: Allow classes that are not installed, native code and files with other contents. A file with
             other contents is then logged.
 
-    Raises TrustError with the list of what they ask for, RecordingError if plan and scenario contradict each
-    other or the installed kinds, and ScenarioError if a kind cannot be loaded.
+    Raises TrustError with the list of what they ask for, RecordingError if plan, scenario and renewals
+    contradict each other or the installed kinds, and ScenarioError if a kind cannot be loaded.
     """
-    scenario, recorded = recording.scenario(), set(recording.files().values())
+    files = recorded_files(recording, directory, trust=trust)
+    directory, recorded = files.directory, set(recording.files().values())
+    origin = fork_origin(recording)
+    specs, planned = recording.scenario().participants, recording.plan().participants
+    parameters = SessionParameters(
+        kinds={name: spec.kind for name, spec in specs.items()},
+        last={name: spec.params for name, spec in specs.items()},
+        renewals=() if origin is None else origin.renewals,
+        files=files,
+    )
     asked: list[str] = []
-    for name, planned in participants.items():
-        if name not in scenario.participants:
-            raise RecordingError(f"'{recording.file}': its scenario has no participant '{shown(name)}'")
-        params = scenario.participants[name].params
-        if trust:
-            _check_role(recording, name, planned)
-            _log_other_files(planned.kind, params, directory, recorded)
+    for name in names:
+        if name not in specs or name not in planned:
+            lacks = "scenario" if name not in specs else "plan"
+            raise RecordingError(f"'{recording.file}': its {lacks} has no participant '{shown(name)}'")
+        kind, stages = specs[name].kind, list(parameters.stages(name))
+        if not trust and (found := [what for params in stages for what in _unseen(kind, params, directory)]):
+            asked += _of(name, found)
             continue
-        found = list(_unseen(planned.kind, params, directory))
-        if not found:
-            _check_role(recording, name, planned)
-            found = list(_asked(planned.kind, params, directory, recorded))
-        asked += [f"{what} (participant '{shown(name)}')" for what in found]
-    if asked:
+        _check_kind(recording, planned[name], kind)
+        for params in stages:
+            if trust:
+                _log_other_files(kind, params, directory, recorded)
+            else:
+                asked += _of(name, _asked(kind, params, directory, recorded))
+    if asked := list(dict.fromkeys(asked)):
         more = f"; and {len(asked) - MAX_PROBLEMS} more" if len(asked) > MAX_PROBLEMS else ""
         raise TrustError(
             f"'{recording.file}' asks for more than installed kinds and the files it was recorded with:"
             f" {'; '.join(asked[:MAX_PROBLEMS])}{more}. Code runs with all your rights. If you trust this"
             " recording, allow it with --trust (in Python: trust=True)."
         )
+    return parameters
 
 
-def _check_role(recording: Recording, name: str, planned: PlannedParticipant) -> None:
-    """Raise RecordingError if the plan has a participant in a role that its kind has not.
+def recorded_files(recording: Recording, directory: Path | None = None, *, trust: bool = False) -> Files:
+    """Return the files that a recording may name: with the recorded contents, or with `trust` any.
+
+    `directory` is where relative paths start, by default where they did.
+    """
+    hashes = None if trust else frozenset(recording.files().values())
+    return Files(directory or recording.directory(), hashes)
+
+
+def _of(name: str, found: Iterable[str]) -> Iterator[str]:
+    return (f"{what} (participant '{shown(name)}')" for what in found)
+
+
+def _check_kind(recording: Recording, planned: PlannedParticipant, kind: str) -> None:
+    """Raise RecordingError if the plan has a participant of another kind, or in a role that its kind has not.
 
     A device that is planned as an engine would be opened.
     """
-    role = registry.find(planned.kind).role
+    if planned.kind != kind:
+        raise RecordingError(
+            f"'{recording.file}': participant '{shown(planned.name)}' is of kind '{shown(planned.kind)}' in"
+            f" its plan and of kind '{shown(kind)}' in its scenario"
+        )
+    role = registry.find(kind).role
     if role != planned.role:
         raise RecordingError(
-            f"'{recording.file}': its plan has participant '{shown(name)}' as {planned.role}, but kind"
-            f" '{planned.kind}' is one of a {role}"
+            f"'{recording.file}': its plan has participant '{shown(planned.name)}' as {planned.role}, but"
+            f" kind '{kind}' is one of a {role}"
         )
 
 

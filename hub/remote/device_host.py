@@ -18,13 +18,14 @@ from hub.devices.device_thread import DeviceThread
 from hub.devices.run_info import RunInfo
 from hub.devices.uplink import DeviceUplink
 from hub.participant import Device
-from hub.planning.registry import make
+from hub.planning.session_parameters import SessionParameters
 from hub.transport.control_client import ask, join_session
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
 from schemas.codec import encode
 from schemas.errors import ConnectError, MessageError, ParticipantError
+from schemas.files import Files
 from schemas.keys import Keys
 from schemas.ros import StringMessage
 
@@ -149,7 +150,8 @@ class DeviceHost:
             if self._loop is not None:
                 self._loop.close()
             directory = self._directory or Path(reply.directory)
-            device = make(planned.kind, self._name, params, directory)
+            kinds, last = {self._name: planned.kind}, {self._name: params}
+            device, _ = SessionParameters(kinds, last, (), Files(directory)).make(self._name)
             if not isinstance(device, Device):
                 raise ParticipantError(self._name, -1, f"kind '{planned.kind}' is no device on this machine")
             if isinstance(device, RouterClient):

@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 
 from hub.planning.plan import Plan
-from hub.planning.renewal import Renewal
+from hub.planning.session_parameters import SessionParameters
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.zenoh_session import LEASE_MS
 from schemas.errors import MessageError
@@ -24,7 +23,7 @@ class JoinedHosts:
     Args:
         scenario: The scenario.
         plan: Its wiring.
-        directory: Where relative paths of the scenario start.
+        parameters: The kinds and parameters of all participants.
         run: The number of the run.
         watched: Outputs of which the hub needs every value.
         failed: Is called with participant and cause when a host reports a failure.
@@ -32,7 +31,6 @@ class JoinedHosts:
         ack_keys: By host, the key with which it signs its acks.
         programs_endpoint: Where programs outside Trocar connect, on this machine.
         profile: The hosts of this machine keep a profile.
-        renewals: Where participants take other parameters.
         live_from_ns: Simulated time before which the run repeats a recorded one.
     """
 
@@ -40,7 +38,7 @@ class JoinedHosts:
         self,
         scenario: Scenario,
         plan: Plan,
-        directory: Path,
+        parameters: SessionParameters,
         run: int,
         watched: Sequence[tuple[str, str]],
         failed: Callable[[str, str], None],
@@ -49,17 +47,16 @@ class JoinedHosts:
         ack_keys: Mapping[str, bytes],
         programs_endpoint: str = "",
         profile: bool = False,
-        renewals: Sequence[Renewal] = (),
         live_from_ns: int = 0,
     ) -> None:
         self._profile = profile
-        self._renewals, self._live_from_ns = renewals, live_from_ns
+        self._live_from_ns = live_from_ns
         self._ack_keys = ack_keys
         self._programs_endpoint = programs_endpoint
         self._watched = list(watched)
         self._scenario = scenario
         self._plan = plan
-        self._directory = directory
+        self._parameters = parameters
         self._run = run
         self._failed = failed
         self._ended = ended
@@ -102,19 +99,19 @@ class JoinedHosts:
             self._ended(participant, cause)
         if request.ready or request.failed or request.ended:
             return Empty()
-        params = {name: self._scenario.participants[name].params for name in names}
+        params, renewals = self._parameters.of(names)
         return JoinReply(
             session=self._scenario.name,
             run=self._run,
             admission=self._admissions,
             plan=self._plan if request.is_local else self._plan.seen_from(request.host),
             params=params,
-            directory=str(self._directory),
+            directory=str(self._parameters.files.directory),
             watched=[output for output in self._watched if output[0] in names],
             ack_key=self._ack_keys[request.host].hex(),
             programs_endpoint=self._programs_endpoint if request.is_local else "",
             profile=self._profile and request.is_local,
-            renewals=[one.of(names) for one in self._renewals],
+            renewals=renewals,
             live_from_ns=self._live_from_ns,
         )
 

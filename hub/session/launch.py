@@ -14,7 +14,6 @@ from typing import Any
 from hub.participant import Device, Params, Stepped
 from hub.planning import registry
 from hub.planning.plan import Plan
-from hub.planning.renewal import made
 from hub.planning.scenario_file import ScenarioFile
 from hub.planning.wiring import make_plan
 from hub.recording.file_hashes import file_hashes
@@ -89,8 +88,7 @@ def launch(
     if continuation is not None:
         plan = continuation.plan
         for name in here:
-            spec, renewals = scenario.participants[name], continuation.past.renewals
-            here[name], successors[name] = made(spec.kind, name, spec.params, renewals, directory)
+            here[name], successors[name] = continuation.past.parameters.make(name)
     attachments = {} if record is None else attachments_of(scenario, plan, loaded)
     if continuation is not None:
         attachments[ATTACHMENT] = continuation.origin.model_dump_json(indent=2).encode()

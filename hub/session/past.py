@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from hub.planning.renewal import Renewal
+from hub.planning.session_parameters import SessionParameters
 from schemas.trocar_msgs import GrantMessage
 
 __all__ = ["Past"]
@@ -17,9 +17,9 @@ class Past:
 
     grants: Iterator[GrantMessage]
     """They are given again, instead of what devices say."""
+    parameters: SessionParameters
+    """Those of the run, which the trust check of the recording has made."""
     live_from: int | None = None
     """The step from which on the run is live; None: it ends with the grants."""
-    renewals: tuple[Renewal, ...] = ()
-    """Where participants take other parameters."""
     new_devices: frozenset[str] = frozenset()
     """Those that are not in the recording as they are: what they lead is stale until they speak."""

@@ -22,7 +22,7 @@ from hub.observation.measures import Measures
 from hub.observation.monitor import Monitor
 from hub.participant import Device, Stepped
 from hub.planning.plan import Plan
-from hub.planning.renewal import Successors
+from hub.planning.session_parameters import SessionParameters, Successors
 from hub.recording.recorder import Recorder
 from hub.security.gate import Gate
 from hub.session.ack_receiver import AckReceiver
@@ -43,6 +43,7 @@ from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
 from hub.transport.wire import Wire
 from hub.transport.zenoh_session import open_session
+from schemas.files import Files
 from schemas.keys import Keys
 from schemas.scenario import Scenario
 
@@ -82,6 +83,13 @@ class SessionSpec:
     def live_from(self) -> int | None:
         """The step from which on devices lead; None: they never do."""
         return 0 if self.past is None else self.past.live_from
+
+    @property
+    def parameters(self) -> SessionParameters:
+        """The kinds and parameters of all participants; those of a recording have passed its trust check."""
+        if self.past is not None:
+            return self.past.parameters
+        return SessionParameters.of_scenario(self.scenario, Files(self.directory))
 
     @property
     def stepped(self) -> dict[str, Stepped]:
@@ -149,7 +157,7 @@ class Run:
         self.joined_hosts = JoinedHosts(
             scenario,
             plan,
-            spec.directory,
+            spec.parameters,
             self.number,
             list(self.monitor.away.values()),
             self.fail,
@@ -157,7 +165,6 @@ class Run:
             ack_keys=ack_keys,
             programs_endpoint=spec.programs_endpoint,
             profile=spec.profiled,
-            renewals=() if spec.past is None else spec.past.renewals,
             live_from_ns=self.live_from_ns,
         )
         self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.monitor)

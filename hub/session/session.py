@@ -11,7 +11,7 @@ from hub.hosting.interrupt import Interrupt
 from hub.observation.summary import Progress, Summary
 from hub.participant import Device, Stepped
 from hub.planning.plan import Plan
-from hub.planning.renewal import Successors
+from hub.planning.session_parameters import Successors
 from hub.recording.recorder import Recorder
 from hub.security.gate import Gate
 from hub.security.outer_router import OuterRouter

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -10,6 +11,7 @@ from hub.participant import Device, Stepped
 from hub.transport.port_codec import PortCodec
 from schemas.codec import encode
 from schemas.errors import MessageError
+from schemas.files import Files
 from schemas.message import Message
 from schemas.ports import Port
 
@@ -39,7 +41,9 @@ def check_declarations(participant: Stepped | Device) -> None:
             )
     params = participant.params
     try:
-        again = type(participant).params_model.model_validate_json(params.model_dump_json())
+        again = type(participant).params_model.model_validate_json(
+            params.model_dump_json(), context=Files(Path.cwd()).context
+        )
     except ValidationError as error:
         raise AssertionError(
             f"the contract of hub.participant: parameters survive JSON, but {params!r} do not: {error}"

@@ -9,7 +9,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from pydantic import (
     BaseModel,
@@ -39,6 +39,7 @@ from robots.dvrk.parameters import (
 )
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
+from schemas.files import find_file
 from schemas.quantity import Angle, Length
 
 __all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedArms", "MountedEcm", "MountedPsm", "PsmTool"]
@@ -84,8 +85,7 @@ class MountedArm(BaseModel):
     @field_validator("dynamics")
     @classmethod
     def _find(cls, file: Path | None, info: ValidationInfo) -> Path | None:
-        context: dict[str, Any] = info.context or {}
-        return None if file is None else (Path(context.get("directory", Path.cwd())) / file).resolve()
+        return None if file is None else find_file(file, info)
 
     @model_validator(mode="after")
     def _has_these_dynamics(self) -> Self:

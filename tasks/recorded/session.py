@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 
 from hub.planning import registry
 from hub.planning.plan import Plan
+from hub.planning.session_parameters import SessionParameters
 from hub.recording.recording import Recording
+from hub.recording.trust import recorded_files, trusted_parameters
 from schemas.errors import RecordingError
 from schemas.vectors import has_vector
 from tasks.recorded.streams import Scored, Stream, score
@@ -32,12 +35,12 @@ def score_session(recording: Recording, rules: Sequence[str], *, trust: bool = F
     found: dict[str, Scored] = {}
     for name, spec in scenario.participants.items():
         if _is_task(spec.kind, trust=trust):
-            task = _make(spec.kind, name, spec.params, rules, recording)
+            task = _make(trusted_parameters(recording, [name], trust=trust), name, rules)
             _require(recording, plan, task)
             found[name] = score(
                 task, _inputs(recording, plan, name), plan.participants[name].period * plan.step_ns
             )
-    return found or {"practice": _without_task(recording, rules)}
+    return found or {"practice": _without_task(recording, rules, trust=trust)}
 
 
 def _require(recording: Recording, plan: Plan, task: Task) -> None:
@@ -81,17 +84,16 @@ def _is_task(kind: str, *, trust: bool) -> bool:
     return loaded is not None and issubclass(loaded, Task)
 
 
-def _make(
-    kind: str, name: str, params: Mapping[str, Any], rules: Sequence[str], recording: Recording
-) -> Task:
+def _make(parameters: SessionParameters, name: str, rules: Sequence[str]) -> Task:
     asked = {"rules": list(rules)} if rules else {}
-    made = registry.make(kind, name, {**params, **asked}, recording.directory())
+    last = {name: {**parameters.last[name], **asked}}
+    made, _ = replace(parameters, last=last, renewals=()).make(name)
     if not isinstance(made, Task):
-        raise RecordingError(f"'{kind}' is no task")
+        raise RecordingError(f"'{parameters.kinds[name]}' is no task")
     return made
 
 
-def _without_task(recording: Recording, rules: Sequence[str]) -> Scored:
+def _without_task(recording: Recording, rules: Sequence[str], *, trust: bool) -> Scored:
     """Return what a task says that was not in the session, from the scene of its robot."""
     robot, scene = _robot(recording)
     arms = {
@@ -105,7 +107,8 @@ def _without_task(recording: Recording, rules: Sequence[str]) -> Scored:
     kind = "peg-board-task" if boards else "practice-task"
     params = {key: scene[key] for key in ("mounting", "setup_joints") if key in scene}
     params |= {"arms": arms, "objects": objects} | ({"fixtures": fixtures} if fixtures else {})
-    task = _make(kind, "practice", params, rules, recording)
+    files = recorded_files(recording, trust=trust)
+    task = _make(SessionParameters({"practice": kind}, {"practice": params}, (), files), "practice", rules)
     streams = {
         port.name: _stream(recording, f"{robot}.{port.name}", _PERIOD_NS)
         for port in task.ports
@@ -117,7 +120,8 @@ def _without_task(recording: Recording, rules: Sequence[str]) -> Scored:
 def _robot(recording: Recording) -> tuple[str, dict[str, Any]]:
     """Return the participant that publishes the poses of arms, best an engine, and its parameters."""
     plan, specs = recording.plan(), recording.scenario().participants
-    for name, spec in sorted(specs.items(), key=lambda item: plan.participants[item[0]].role != "engine"):
+    engines = {name for name, planned in plan.participants.items() if planned.role == "engine"}
+    for name, spec in sorted(specs.items(), key=lambda item: item[0] not in engines):
         if any(f"{name}.{arm}/measured_cp" in recording for arm in _table(spec.params, "arms")):
             return name, spec.params
     raise RecordingError(

@@ -18,10 +18,10 @@ from xml.etree import ElementTree
 
 import fmpy
 
-from hub.planning import registry
 from tests.engines.fmus import build
 from tests.fuzz.byte_mutations import WORDS, mutated, mutated_text
 from tests.fuzz.harness import Note, Target, search
+from tests.participants import make_participant
 
 MODELS = sorted(build.FOLDERS)
 PLATFORMS = {fmpy.platform, fmpy.platform_tuple}
@@ -63,7 +63,7 @@ def _read(data: bytes, directory: Path, *, strict: bool, start: dict[str, object
     """Make the engine of a scenario with this FMU, and its ports."""
     (directory / "plant.fmu").write_bytes(data)
     params = {"path": "plant.fmu", "strict": strict, "start": start or {}}
-    _ = registry.make("fmu", "plant", params, directory).ports
+    _ = make_participant("fmu", "plant", params, directory).ports
 
 
 def _elements(description: bytes, source: random.Random, others: Sequence[bytes]) -> tuple[str, bytes]:

@@ -15,9 +15,9 @@ import numpy as np
 
 from engines.bullet.meshing.tet_mesh import TetMesh
 from engines.bullet.organs.params import OrganParams
-from hub.planning import registry
 from tests.fuzz.byte_mutations import mutated, mutated_text
 from tests.fuzz.harness import Note, Target, search
+from tests.participants import make_participant
 
 ORGAN = {"mesh": "organ.vtk", "young_modulus": "10 kPa"}
 ANCHORS = [[], [{"box": {"low": ["-1 m", "-1 m", "-1 m"], "high": ["1 m", "1 m", "1 m"]}}]]
@@ -65,7 +65,7 @@ def _read(data: bytes, anchors: object, directory: Path) -> None:
     """Make the engine of a scenario with this organ, and its ports."""
     (directory / "organ.vtk").write_bytes(data)
     params = {"organs": {"organ": {**ORGAN, "anchors": anchors}}}
-    _ = registry.make("bullet", "tissue", params, directory).ports
+    _ = make_participant("bullet", "tissue", params, directory).ports
 
 
 def attempt(case: str, directory: Path, note: Note) -> None:

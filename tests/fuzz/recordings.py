@@ -20,7 +20,6 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Schema
 
 from devices.ros.bags.export import export
-from hub.planning import registry
 from hub.recording.chunk import chunk_data
 from hub.recording.mcap_file import McapFile
 from hub.recording.recording import Recording
@@ -33,6 +32,7 @@ from schemas.errors import TrocarError
 from schemas.vectors import has_vector
 from tests.fuzz.byte_mutations import NUMBERS, WORDS, mutated, mutated_text
 from tests.fuzz.harness import Note, Target, search
+from tests.participants import make_participant
 
 FOLDER = Path(__file__).parents[1] / "hub/recording/recordings_0_1_0"
 NAMES = ["palpation", "ros", "ros-mirror", "table"]
@@ -222,7 +222,7 @@ def _play_ros(file: Path, directory: Path) -> None:
 
 
 def _read_device(kind: str, params: dict[str, object], directory: Path) -> None:
-    device = registry.make(kind, "played", params, directory)
+    device = make_participant(kind, "played", params, directory)
     _ = device.ports
     device.open(directory)
     try:

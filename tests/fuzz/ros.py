@@ -28,7 +28,6 @@ from devices.ros.topics.row import Row
 from devices.ros.topics.validation import as_signal, validate
 from devices.ros.zenoh.graph import Graph
 from devices.ros.zenoh.layout import VOLATILE, Attachment, GraphToken
-from hub.planning import registry
 from schemas.codec import decode, message_type
 from schemas.errors import MessageError, TrocarError
 from tests.devices.ros.bags import test_player
@@ -36,6 +35,7 @@ from tests.fuzz.byte_mutations import NUMBERS, mutated, mutated_text
 from tests.fuzz.harness import Note, Target, search
 from tests.fuzz.wire import cdr
 from tests.hub.recording import ros_bags as bags
+from tests.participants import make_participant
 
 PREFIX = b"\x01\x0f" + b"peer567890"
 SERVICE, TYPE = "/PSM1/query_fk", "crtk_msgs/srv/QueryForwardKinematics"
@@ -52,7 +52,7 @@ _ANSWER = _CALL.replace(b"methodCall", b"methodResponse").replace(
 
 @cache
 def _rows() -> list[Row]:
-    params = registry.make("ros2-zenoh", "ros", {"arms": ARMS}, Path()).params
+    params = make_participant("ros2-zenoh", "ros", {"arms": ARMS}, Path()).params
     return [row for row in dvrk_table(params) if row.way == "subscribe"]
 
 
@@ -212,7 +212,7 @@ def _bag(source: random.Random, directory: Path) -> str:
     spoilt = directory / f"spoilt{file.suffix}"
     label, data = mutated(file.read_bytes(), source, [source.choice(files).read_bytes()])
     spoilt.write_bytes(data)
-    device = registry.make(
+    device = make_participant(
         "ros-bag", "real", {"bag": str(spoilt), "arms": ARMS, "listen": ["PSM1"]}, directory
     )
     _ = device.ports

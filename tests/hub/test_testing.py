@@ -15,7 +15,6 @@ from engines.fmu.engine import FmuEngine, FmuParams
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
 from hub.participant import BondPlan, ForceSide, Params, Sample, Stepped, state_hash
-from hub.planning import registry
 from hub.planning.scenario_file import installed_scenarios
 from hub.testing import check_device, check_engine, run_in_process
 from robots.dvrk import psm
@@ -24,6 +23,7 @@ from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message, Header, PoseStamped, StringMessage, Time
 from tests.engines.fmus import build
 from tests.hub.parts import Stylus, out
+from tests.participants import make_participant
 
 MS = 1_000_000
 
@@ -67,7 +67,7 @@ class TestOwnParticipants:
         monkeypatch.syspath_prepend(Path(__file__).parents[2] / "examples" / "two_mass")
         mass = {"mass": 1.0, "stiffness": 10.0, "damping": 0.1, "x": 1.0}
         check_engine(
-            lambda: registry.make("two_mass:Mass", "one", mass, Path()),
+            lambda: make_participant("two_mass:Mass", "one", mass, Path()),
             period_ns=MS,
             inputs={"tip/force": [-2.0]},
             bonds={"tip": plan},
@@ -75,7 +75,7 @@ class TestOwnParticipants:
         sprung = mass | {"x": 0.0, "coupling_stiffness": 100.0, "coupling_damping": 1.0}
         inputs = {"tip/position": [0.5], "tip/velocity": [0.2]}
         check_engine(
-            lambda: registry.make("two_mass:SprungMass", "two", sprung, Path()),
+            lambda: make_participant("two_mass:SprungMass", "two", sprung, Path()),
             period_ns=MS,
             inputs=inputs,
             bonds={"tip": plan},

@@ -60,7 +60,7 @@ def test_the_energy_book_of_a_bond_is_a_series(recorded):
 
 
 def test_a_page_is_offered_them_and_gets_samples(recorded):
-    stage = Stage(recorded.scenario, recorded.outlets)
+    stage = Stage(recorded.scenario, recorded.outlets, recorded.params)
     offered = {one["name"]: one for one in stage.describe()["numbers"]}
     assert offered[f"hub.energy/{BOND}"]["units"]["residual"] == "J"
     section = stage.sample(0, "hub.status", recorded.newest("hub.status", 1_500_000_000))

@@ -59,7 +59,7 @@ def test_a_session_that_is_seen_has_the_same_state_hash(scenario):
         try:
             until(lambda: live.generation)
             live.ask("pause", Empty(), Empty)
-            stage = Stage(live.scenario, live.outlets)
+            stage = Stage(live.scenario, live.outlets, live.params)
             live.want(stage.shown | {"robot.PSM1/measured_js"})
             live.ask("resume", Empty(), Empty)
             value = until(lambda: live.newest("robot.qpos", None))

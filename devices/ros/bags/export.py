@@ -23,7 +23,7 @@ from hub.planning.foreign_code import names_class
 from hub.planning.plan import Plan
 from hub.recording.recording import Recording
 from hub.recording.ros_bag_writer import BagWriter
-from hub.recording.trust import require_trust
+from hub.recording.trust import trusted_parameters
 from hub.transport.port_codec import PortCodec
 from schemas.codec import decode, encode, message_type
 from schemas.errors import DeviceError, MessageError, RecordingError, did_you_mean
@@ -67,7 +67,7 @@ def export(
         recording: the recording of the session.
         directory: the bag, not existing yet.
         gateway: the gateway's name; by default the session's only gateway.
-        trust: allow requests refused by `require_trust`.
+        trust: allow requests refused by `trusted_parameters`.
 
     Raises:
         RecordingError: if the session has no such gateway, if the directory exists or cannot be written,
@@ -109,7 +109,7 @@ def _gateway(recording: Recording, plan: Plan, name: str | None, *, trust: bool)
         if (trust or key not in classes) and issubclass(registry.load(planned.kind), Gateway)
     ]
     if not trust and (name in classes or not there):  # one of these may be the gateway that is meant
-        require_trust(recording, classes, recording.directory(), trust=False)
+        trusted_parameters(recording, classes)
     if name is None and len(there) != 1:
         none = (
             "no gateway to ROS, which would define its topics: add one to the scenario, with"
@@ -125,13 +125,7 @@ def _gateway(recording: Recording, plan: Plan, name: str | None, *, trust: bool)
             f" '{name}'.{did_you_mean(name, there)}"
         )
     meant = there[0] if name is None else name
-    require_trust(recording, {meant: devices[meant]}, recording.directory(), trust=trust)
-    made = registry.make(
-        plan.participants[meant].kind,
-        meant,
-        recording.scenario().participants[meant].params,
-        recording.directory(),
-    )
+    made, _ = trusted_parameters(recording, [meant], trust=trust).make(meant)
     if not isinstance(made, Gateway):
         raise TypeError(f"{made} is not a gateway, though its kind is one of gateways")
     return made

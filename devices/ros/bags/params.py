@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -14,6 +14,7 @@ from devices.ros.topics.row import Row
 from devices.ros.topics.vrep_table import vrep_table
 from hub.recording.ros_bag_reader import BagTopic, RosBag
 from schemas.errors import RecordingError, did_you_mean
+from schemas.files import find_file
 from schemas.quantity import Duration
 
 __all__ = ["BagParams", "listed"]
@@ -45,8 +46,7 @@ class BagParams(TopicParams):
     @field_validator("bag")
     @classmethod
     def _find(cls, bag: Path, info: ValidationInfo) -> Path:
-        context: dict[str, Any] = info.context or {}
-        return (Path(context.get("directory", Path.cwd())) / bag).resolve()
+        return find_file(bag, info)
 
     @model_validator(mode="after")
     def _has_something_to_play(self) -> Self:

@@ -23,6 +23,7 @@ from engines.bullet.organs.materials import TissueDensity, TissueModulus, Tissue
 from engines.bullet.organs.shape import Shape
 from robots import rotation
 from robots.dvrk.parameters import UnitQuaternion
+from schemas.files import find_file
 from schemas.quantity import Duration, Length
 
 __all__ = ["OrganParams"]
@@ -95,8 +96,7 @@ class OrganParams(BaseModel):
     @field_validator("mesh", "material_file")
     @classmethod
     def _from_scenario(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        directory: Path = info.context["directory"] if info.context else Path.cwd()
-        return path and (directory / path).resolve()
+        return path and find_file(path, info)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -21,6 +21,7 @@ from engines.mujoco.model.scene import build
 from engines.mujoco.params import SceneParams
 from robots.dvrk import drives
 from robots.dvrk.setup_joints import CartArm
+from schemas.files import Files
 from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
@@ -85,7 +86,9 @@ def dynamics(
         stand["setup_joints"] = {arm: stand["setup_joints"]}
     if own is not None:
         what["dynamics"] = own
-    scene = SceneParams.model_validate({"arms": {arm: what}, "looks": False, **stand})
+    scene = SceneParams.model_validate(
+        {"arms": {arm: what}, "looks": False, **stand}, context=Files(Path.cwd()).context
+    )
     params = scene.arms[arm]
     model = build(scene)
     data = mujoco.MjData(model)

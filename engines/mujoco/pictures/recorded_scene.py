@@ -7,7 +7,6 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from engines.mujoco.markers.store import ShownMarker, shown_markers
 from engines.mujoco.params import MujocoParams, SceneParams
@@ -17,8 +16,9 @@ from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 from engines.mujoco.pictures.skins import SoftBody
 from hub.recording.bag import BagMessage, output_port
 from hub.recording.recording import Recording
+from hub.recording.trust import trusted_parameters
 from schemas.codec import decode
-from schemas.errors import MessageError, RecordingError, TrocarError
+from schemas.errors import MessageError, RecordingError, ScenarioError, TrocarError
 from schemas.message import Message
 from schemas.scenario import ParticipantSpec
 from schemas.trocar_msgs import ShownMarkers, SoftBodyState
@@ -49,7 +49,8 @@ class RecordedScene:
     def __init__(self, recording: Recording, robot: str | None = None) -> None:
         """Find the participant `robot`, by default the first of kind mujoco.
 
-        Raises RecordingError if there is none, or if no scene can be built of its parameters.
+        Raises RecordingError if there is none, or if no scene can be built of its parameters, and TrustError
+        if these name files with other contents than the recorded ones.
         """
         self._recording = recording
         participants = recording.scenario().participants
@@ -61,14 +62,14 @@ class RecordedScene:
                 f" {', '.join(robots) or 'none'}"
             )
         name = robot or robots[0]
+        parameters = trusted_parameters(recording, [name])
         try:
-            self._params = MujocoParams.model_validate(participants[name].params)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(str(part) for part in first["loc"])
-            raise RecordingError(
-                f"'{recording.file}': no scene of '{name}' can be built: {where}: {first['msg']}"
-            ) from error
+            params = parameters.validated(name)
+        except ScenarioError as error:
+            raise RecordingError(f"'{recording.file}': no scene of '{name}' can be built: {error}") from error
+        if not isinstance(params, MujocoParams):
+            raise TypeError(f"{params} are no parameters of kind mujoco")
+        self._params, self._files = params, parameters.files
         self._qpos = f"/engine/{name}/out/qpos"
         self._looks, self._lens = _looks(participants), _lens(participants)
         self._nodes = _by_body(
@@ -150,7 +151,7 @@ class RecordedScene:
         # a default that is stated may be refused
         stated = self._params.model_dump(include=set(SceneParams.model_fields), exclude_unset=True)
         looks = {"looks": True, "skins": {name: self._looks.get(name, {}) for name in bodies}}
-        params = EndoscopeParams.model_validate(stated | looks | dict(shown))
+        params = EndoscopeParams.model_validate(stated | looks | dict(shown), context=self._files.context)
         positions = _Newest(self._recording, self._qpos)
         nodes = {name: _Newest(self._recording, self._nodes[name]) for name in bodies}
         markers = [_Newest(self._recording, topic) for topic in self._markers]

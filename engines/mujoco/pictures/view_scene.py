@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from engines.mujoco import model
-from engines.mujoco.params import MujocoParams, SceneParams
+from engines.mujoco.params import MujocoParams
 from engines.mujoco.pictures.solid_meshes import Triangles, solid_mesh
 from hub.participant.view import Camera, Frame, Part, Rgb
 from robots import rotation
@@ -32,12 +31,8 @@ class ViewScene:
     inputs = ("qpos",)
     surfaces: Mapping[str, Rgb] = {}
 
-    def __init__(self, params: Mapping[str, Any]) -> None:
-        """Build the model of these parameters; raises pydantic's ValidationError if they are not valid."""
-        stated = MujocoParams.model_validate(params)
-        scene = SceneParams.model_validate(
-            stated.model_dump(include=set(SceneParams.model_fields), exclude_unset=True) | {"looks": True}
-        )
+    def __init__(self, params: MujocoParams) -> None:
+        scene = params.model_copy(update={"looks": True})
         self._arms = scene.arms
         self._model = model.build(scene)
         self._data = mujoco.MjData(self._model)

@@ -16,6 +16,7 @@ from hub.planning.scenario_file import load
 from hub.testing import check_device
 from schemas.codec import encode
 from schemas.errors import MessageError, ScenarioError
+from schemas.files import Files
 from schemas.ros import DiagnosticStatus, Header, Joy, PoseStamped, Time, TwistStamped, Vector3, WrenchStamped
 from schemas.trocar_msgs import ContactModel, ContactPlane
 
@@ -29,7 +30,10 @@ PRESS: list[dict[str, Any]] = [
 
 def _device(path: list[dict[str, Any]] | str = PRESS, **params: Any) -> SimulatedTouch:
     device = SimulatedTouch(
-        "touch", SimulatedTouchParams.model_validate({"styluses": {"right": {"path": path, **params}}})
+        "touch",
+        SimulatedTouchParams.model_validate(
+            {"styluses": {"right": {"path": path, **params}}}, context=Files(Path.cwd()).context
+        ),
     )
     device.open(Path())
     return device

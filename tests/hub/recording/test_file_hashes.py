@@ -7,11 +7,12 @@ from pydantic import Field
 
 from hub.participant import Params
 from hub.planning.scenario_file import load
-from hub.recording.file_hashes import file_hashes, has_contents
+from hub.recording.file_hashes import file_hashes
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
 from schemas.errors import TrustError
+from schemas.files import has_contents
 
 
 class Mesh(Params):

@@ -145,4 +145,6 @@ def test_the_whole_circle(tmp_path, monkeypatch):
     published = inertia.psm(instrument("400006"))
     assert moving == pytest.approx(published["insertion"].mass - published["counterweight"].mass, rel=0.2)
     assert own.joints["yaw"].viscous == pytest.approx(0.136, rel=0.05)
-    MountedPsm.model_validate({"instrument": "400006", "dynamics": "own.yaml"})
+    MountedPsm.model_validate(
+        {"instrument": "400006", "dynamics": "own.yaml"}, context={"directory": tmp_path}
+    )

@@ -57,7 +57,9 @@ SAID = [
 
 
 def player(bag, **params):
-    return BagPlayer("bag", BagParams.model_validate({"bag": bag, **ARMS, **params}))
+    return BagPlayer(
+        "bag", BagParams.model_validate({"bag": bag, **ARMS, **params}, context={"directory": bag.parent})
+    )
 
 
 def played(bag, until=10.0, **params):
@@ -94,6 +96,8 @@ ROSBAG = """
 import sys
 import rosbag, rospy
 from sensor_msgs.msg import JointState
+from schemas.files import Files
+from pathlib import Path
 
 with rosbag.Bag(sys.argv[1], "w", compression="bz2") as bag:
     message = JointState(position=[0.1] * 6)

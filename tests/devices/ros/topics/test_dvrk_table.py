@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from pydantic import ValidationError
 
@@ -8,6 +10,7 @@ from controllers.motion.params import MotionParams
 from devices.ros.params import GatewayParams
 from devices.ros.topics.dvrk_table import NOT_SERVED, dvrk_table
 from schemas.codec import message_type
+from schemas.files import Files
 from tests.devices.ros.crtk_table import PYTHON_CLIENT, WHOLE
 
 PARAMS = GatewayParams.model_validate(WHOLE)
@@ -122,7 +125,7 @@ def test_an_arm_is_simulated_or_real() -> None:
 
 def test_a_description_that_is_not_there() -> None:
     with pytest.raises(ValidationError, match="trocar model export"):
-        GatewayParams.model_validate({"robot_description": "nowhere.urdf"})
+        GatewayParams.model_validate({"robot_description": "nowhere.urdf"}, context=Files(Path()).context)
 
 
 @pytest.mark.parametrize(

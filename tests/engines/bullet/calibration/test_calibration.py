@@ -215,12 +215,13 @@ def test_a_scenario_names_what_the_command_wrote(tmp_path):
     assert result.exit_code == 0, result.output
     assert "modulus at once, kPa" in result.output
     organ = {"size": ["60 mm", "60 mm", "20 mm"], "nodes": 75, "material_file": str(file)}
-    params = OrganParams.model_validate(organ)
+    context = {"directory": tmp_path}
+    params = OrganParams.model_validate(organ, context=context)
     storage, damping = LIVER.at(2.0)
     assert params.elastic.young_modulus == pytest.approx(8e3 * storage, rel=0.05)
     assert params.elastic.damping == pytest.approx(damping, rel=0.15)
     assert params.contact_friction == pytest.approx(0.35, rel=0.05)
-    stated = OrganParams.model_validate({**organ, "damping": "1 ms", "friction": 0.1})
+    stated = OrganParams.model_validate({**organ, "damping": "1 ms", "friction": 0.1}, context=context)
     assert (stated.elastic.damping, stated.contact_friction) == (1e-3, 0.1)
 
 
@@ -250,10 +251,10 @@ def test_an_unusable_material_file_is_refused(content, message, tmp_path):
         MaterialFile.load(file)
 
 
-def test_one_material_is_enough():
+def test_one_material_is_enough(tmp_path):
     organ = {"size": ["60 mm", "60 mm", "20 mm"], "material_file": "a.yaml", "material": "liver"}
     with pytest.raises(ValueError, match="one of them"):
-        OrganParams.model_validate(organ)
+        OrganParams.model_validate(organ, context={"directory": tmp_path})
 
 
 @pytest.mark.parametrize(

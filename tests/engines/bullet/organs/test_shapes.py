@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ KILOGRAMS = {"kidney-with-adrenal": (0.125, 0.170), "colon": (0.06, 0.10), "live
 
 
 def organ(**given):
-    return OrganParams.model_validate(given)
+    return OrganParams.model_validate(given, context={"directory": Path()})
 
 
 def ball(points):
@@ -204,7 +205,9 @@ def test_a_mesh_of_ones_own_works_like_a_shape(tmp_path):
     np.testing.assert_array_equal(params.rest.tetrahedra, GOOD.tetrahedra)
     (bottom,) = params.anchored_nodes.values()
     assert GOOD.nodes[bottom][:, 2] == pytest.approx(-0.02)
-    engine = BulletParams.model_validate({"organs": {"o": {**given, "unit": "mm"}}})
+    engine = BulletParams.model_validate(
+        {"organs": {"o": {**given, "unit": "mm"}}}, context={"directory": tmp_path}
+    )
     assert list(file_hashes([engine], tmp_path)) == [str(tmp_path / "organ.vtk")]
 
 
