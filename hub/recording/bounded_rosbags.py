@@ -23,7 +23,8 @@ def bound_rosbags() -> None:
         ros1.decompressors[name] = partial(unpack, name)
     for name in ("lz4", "zstd"):
         mcap.DECOMPRESSORS[name] = partial(_unpack_stated, name)
-    ros2.zstd = SimpleNamespace(open=ros2.zstd.open, decompress=partial(unpack, "zstd"))
+    names = ros2.__dict__  # it imports `zstd` from where its version of Python has it
+    names["zstd"] = SimpleNamespace(open=names["zstd"].open, decompress=partial(unpack, "zstd"))
 
 
 def _unpack_stated(compression: str, packed: bytes, size: int) -> bytes:

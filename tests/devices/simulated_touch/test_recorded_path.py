@@ -76,9 +76,10 @@ def test_a_recording_without_this_hand(tmp_path: Path) -> None:
 def test_a_recording_is_found_beside_the_scenario(tmp_path: Path) -> None:
     _write(tmp_path / "hand.mcap", RIGHT)
     params = {"styluses": {"right": {"path": "hand.mcap"}}}
-    found = SimulatedTouchParams.model_validate(params, context={"directory": tmp_path})
+    context = {"directory": tmp_path}
+    found = SimulatedTouchParams.model_validate(params, context=context)
     assert found.styluses["right"].path == tmp_path / "hand.mcap"
-    assert SimulatedTouchParams.model_validate_json(found.model_dump_json()) == found
+    assert SimulatedTouchParams.model_validate_json(found.model_dump_json(), context=context) == found
     with pytest.raises(ValidationError, match="no recording at"):
         SimulatedTouchParams.model_validate(
             {"styluses": {"right": {"path": "foot.mcap"}}}, context={"directory": tmp_path}
