@@ -1,1 +1,1 @@
-"""A suturing pad: what a needle meets in tissue, and how the skin looks while it is pulled. NumPy only."""
+"""A suturing pad: forces of tissue on a needle, and the displaced skin. NumPy only."""

@@ -1,19 +1,20 @@
 """The mechanics of a needle in tissue: skin, channel, tip. No ports, no bonds. SI units.
 
-Frame `pad`: z = 0 is the skin at rest, tissue is where z < 0. The frame of a needle is that of
-`robots.training.needles`: origin in the arc's centre, z normal to its plane; the angle of the tip is arc/2.
+Frame `pad`: z = 0 is the skin at rest, tissue is at z < 0. The frame of a needle is defined in
+`robots.training.needles`: origin in the arc's centre, z normal to the arc's plane; the angle of the tip is
+arc/2.
 
-A needle that has broken through the skin leaves a channel, a row of points fixed in the tissue at rest. In
-the needle's frame a point of it has the angle a, the distance p from the axis and the height z. On the wire
-it would have p = r and z = 0; what is missing is the way the tissue is pushed aside there, and
+A needle through the skin leaves a channel, a row of points fixed in the tissue at rest. In the needle's frame
+a channel point has the angle a, the distance p from the axis and the height z. On the wire p = r and z = 0;
+the difference is the displacement of the tissue, and
 
-    compression: K ds [(p - r) e_p + z e_z]  on the needle at each point it covers: K times the area swept
-    friction:    c ds                        against the way along the arc, once it has slipped
-    cutting:     up to F_cut at the tip      against going on, where there is no channel yet
+    compression: K ds [(p - r) e_p + z e_z]  on the needle at each covered point: K times the swept area
+    friction:    c ds                        against the motion along the arc, after slipping
+    cutting:     up to F_cut at the tip      against the advance, at the end of the channel
 
-Compression is the gradient of K/2 times the sum of squares, so it gives back what it has taken; friction and
-cutting are springs that slip at their largest force (Prandtl), so they never give more than they took. A
-needle can leave its channel only along the arc: nothing else makes what is missing vanish.
+Compression is the gradient of K/2 times the sum of squares: conservative. Friction and cutting are springs
+slipping at their largest force (Prandtl): the energy returned is never more than the energy stored. A needle
+can leave its channel only along the arc: no other motion makes the displacement vanish.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from schemas.vectors import Vector
 __all__ = ["SPACING", "Channel", "ChannelState", "Phase"]
 
 SPACING = 0.5e-3
-"""Between the points of a channel, m."""
+"""Distance of neighbouring points of a channel, m."""
 
 
 class Phase(IntEnum):
@@ -40,18 +41,18 @@ class Phase(IntEnum):
 
     OUT = 0
     PRESSING = 1
-    """On the skin, which has not broken."""
+    """On the unbroken skin."""
     IN = 2
     THROUGH = 3
-    """Out again, at the other end of the channel."""
+    """Out again, at the far end of the channel."""
 
 
 class ChannelState(Record):
-    """All that a needle has done to the tissue it is in."""
+    """State of the tissue around a needle."""
 
     phase = choice(Phase.OUT)
     count = integer()
-    """Of points of the channel."""
+    """Number of points of the channel."""
     points = array("most", 3)
     """m, frame `pad`."""
     cut = number()
@@ -69,13 +70,13 @@ class ChannelState(Record):
     tip = number()
     """Force against the tip's way, N."""
     pulled_out = flag()
-    """Whether the last needle in has left by the other end than it came in by."""
+    """Whether the last needle has left by the far end of the channel."""
     covered = number()
-    """Length of the channel that the needle fills, m."""
+    """Length of the channel filled by the needle, m."""
 
 
 class Channel:
-    """One needle and the tissue under one skin."""
+    """A needle and the tissue under a skin."""
 
     def __init__(self, needle: NeedleShape, tissue: TissueParams) -> None:
         self._needle, self._tissue = needle, tissue
@@ -88,18 +89,18 @@ class Channel:
         self._tip = self._stations[-1]
         self._forward = np.array([-np.sin(needle.arc / 2.0), np.cos(needle.arc / 2.0), 0.0])
         self._followed: tuple[Vector, Vector, Vector, Vector] | None = None
-        """Of the last pose in a channel: rotation, points in the needle's frame (m), their distances from its
-        axis (m), and to which share the wire covers them.
+        """Last pose in a channel: rotation, points in the needle's frame (m), distances of the points from
+        the axis (m), and shares of the points covered by the wire.
         """
         self._stretch = np.zeros(3)
 
     def advance(self, rotation: Vector, origin: Vector, *, over_pad: bool) -> tuple[Vector, Vector]:
-        """Follow the needle to a pose, and return force (N) and moment (N m, about 0) on it, frame `pad`.
+        """Follow the needle to a pose; return force (N) and moment (N m, about 0) on the needle, in `pad`.
 
         Args:
-            rotation: of the needle in `pad`, shape (3, 3).
-            origin: of its frame in `pad`, m, shape (3,).
-            over_pad: whether there is tissue under its tip.
+            rotation: rotation of the needle in `pad`, shape (3, 3).
+            origin: origin of the needle's frame in `pad`, m, shape (3,).
+            over_pad: whether there is tissue under the tip.
         """
         state = self.state
         lowest = float(origin[2]) - self._needle.radius * hypot(rotation[2, 0], rotation[2, 1])
@@ -117,7 +118,7 @@ class Channel:
     def displaced(self) -> tuple[Vector, Vector]:
         """Return places in the tissue at rest and their displacements, both m, shape (n, 3), frame `pad`.
 
-        They are of the last pose: the covered points of the channel, and the skin or tissue at the tip.
+        At the last pose: the covered points of the channel, and the skin or tissue at the tip.
         """
         state = self.state
         if state.phase is Phase.OUT:
@@ -135,7 +136,7 @@ class Channel:
         return state.points[: len(displacements)], displacements
 
     def _press(self, rotation: Vector, tip: Vector, origin: Vector, *, over_pad: bool) -> Vector:
-        """Return the force of the unbroken skin on the tip, N; break the skin if it is too large."""
+        """Return the force of the unbroken skin on the tip, N; break the skin at too large a force."""
         state = self.state
         if tip[2] >= 0.0 or not over_pad:
             state.phase, state.tip = Phase.OUT, 0.0
@@ -162,9 +163,9 @@ class Channel:
         self._dig(rotation, origin)
 
     def _skin_angle(self, rotation: Vector, origin: Vector, *, entering: bool) -> float:
-        """Return the angle on the wire, nearest to the tip, at which it passes the skin in or out.
+        """Return the angle on the wire, nearest to the tip, of the passage through the skin, in or out.
 
-        The height of the wire is A cos(angle - b) + origin_z; near the tip it falls when entering.
+        The height of the wire is A cos(angle - b) + origin_z, falling near the tip at an entry.
         """
         along, across, _ = rotation[2].tolist()
         lift = max(self._needle.radius * hypot(along, across), 1e-12)
@@ -175,7 +176,7 @@ class Channel:
         return angle - 2.0 * pi * round((angle - end) / (2.0 * pi))
 
     def _dig(self, rotation: Vector, origin: Vector) -> None:
-        """Add points to the channel up to where it has been cut: where the wire is now."""
+        """Add points to the channel up to the cut end, along the present wire."""
         state = self.state
         while state.count < self._most and state.count * SPACING <= state.cut:
             behind = state.length - state.count * SPACING
@@ -186,8 +187,8 @@ class Channel:
     def _follow(self, rotation: Vector, origin: Vector) -> tuple[Vector, Vector]:
         """Return force and moment of channel and tip, with the tip `length` along the channel.
 
-        Summed in the needle's frame: a point there is (p cos a, p sin a, z), and what the needle feels at it
-        is radial, along the arc, and normal to the arc's plane.
+        Summed in the needle's frame: a point is (p cos a, p sin a, z), and the force on the needle there is
+        radial, along the arc, and normal to the arc's plane.
         """
         state, tissue, radius = self.state, self._tissue, self._needle.radius
         local = (state.points[: state.count] - origin).dot(rotation)
@@ -218,9 +219,9 @@ class Channel:
         return force + lying, moment + turning
 
     def _slide(self, angles: Vector) -> tuple[Vector, Vector]:
-        """Move the tip along the channel to where the points are that lie at `angles` on the wire, rad.
+        """Move the tip along the channel to the points at `angles` on the wire, rad.
 
-        Returns how far behind the tip each of them is along the wire, m, and to which share it covers them.
+        Returns the distance of each point behind the tip along the wire, m, and the covered share.
         """
         state, needle = self.state, self._needle
         ways, middle = self._arclengths[: state.count], needle.length / 2.0
@@ -242,7 +243,7 @@ class Channel:
         return on_wire, weights
 
     def _rub(self, covered: float) -> float:
-        """Return the friction (N) at each covered point; let the wire slip where it is too large."""
+        """Return the friction (N) at each covered point; let the wire slip at too large a friction."""
         state, largest = self.state, self._tissue.friction * SPACING
         stiffness = largest / self._tissue.give
         pull = stiffness * (state.length - state.slid)
@@ -252,7 +253,7 @@ class Channel:
         return pull if covered > 0.0 else 0.0
 
     def _resist(self, rotation: Vector, origin: Vector) -> float:
-        """Return the force (N) against the tip: it cuts, or stretches the skin until that breaks."""
+        """Return the force (N) against the tip: of cutting, or of stretching skin up to the break."""
         state, tissue, needle = self.state, self._tissue, self._needle
         ahead = state.length - state.cut
         if state.phase is Phase.THROUGH or ahead <= 0.0:
@@ -274,12 +275,12 @@ class Channel:
         return state.tip
 
     def _way_to_skin(self, rotation: Vector, origin: Vector) -> float:
-        """Return the way along the arc from the tip to where it comes out, m; negative beyond."""
+        """Return the distance along the arc from the tip to the exit, m; negative beyond."""
         angle = self._skin_angle(rotation, origin, entering=False)
         return self._needle.radius * (angle - self._needle.arc / 2.0)
 
     def _has_left(self, on_wire: Vector) -> bool:
-        """Say whether the needle is out of its channel, at either end; it is then forgotten."""
+        """Return whether the needle is out of its channel, at either end; then forget the channel."""
         state = self.state
         back, out = state.length <= 0.0, float(on_wire.min()) > self._needle.length + SPACING
         if back or out:
@@ -290,12 +291,12 @@ class Channel:
         return back or out
 
     def _outside(self) -> tuple[int, int]:
-        """Return which stations of the wire are behind the channel: from the base, how many."""
+        """Return the stations of the wire behind the channel: from the base, count."""
         behind = self._needle.length - self.state.length
         return 0, max(0, int(behind / self._share) - 1)
 
     def _lie(self, rotation: Vector, origin: Vector, first: int, last: int) -> tuple[Vector, Vector]:
-        """Return force and moment of the skin on those stations of the wire that press on it from above."""
+        """Return force and moment of the skin on the stations of the wire pressing from above."""
         force, moment, stations = np.zeros(3), np.zeros(3), self._stations[first:last]
         depth = self._needle.wire_radius - float(origin[2]) - stations.dot(rotation[2])
         if last > first and float(depth.max()) > 0.0:

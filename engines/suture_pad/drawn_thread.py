@@ -1,4 +1,4 @@
-"""The thread of the pad's needle: drawn into channels by it, held there, and drawn as a tube."""
+"""The thread of the pad's needle: pulled into channels, held there, and shown as a tube."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from schemas.vectors import Vector
 __all__ = ["DrawnThread"]
 
 _APART = 1.0e-3
-"""Between the points of a passage, m."""
+"""Distance of neighbouring points of a passage, m."""
 
 
 class DrawnState(Record):
-    """What the thread remembers beside its passages and its shape."""
+    """State of the thread beside passages and shape."""
 
     drawn = flag()
-    """Whether it has been drawn into the channel that the needle is in."""
+    """Whether the thread is in the needle's present channel."""
 
 
 class DrawnThread:
     """The thread of the pad's needle. Everything is in the frame `pad`."""
 
     def __init__(self, thread: ThreadParams, needle: NeedleShape, tissue: TissueParams, depth: float) -> None:
-        """Hide the thread in a pad that is `depth` metres deep until it is known where the needle is."""
+        """Hide the thread in a pad of `depth` metres until the needle's place is known."""
         self._thread, self._needle = thread, needle
         self._base, self._forward = (needle.frames["base"][:3, at].copy() for at in (3, 1))
         self._passages, self._state = Passages(thread, tissue), DrawnState()
@@ -50,12 +50,12 @@ class DrawnThread:
         return self._passages.pull
 
     def follow(self, rotation: Vector, origin: Vector, channel: ChannelState) -> tuple[Vector, Vector]:
-        """Follow the needle to a pose; return the force (N) of the thread on it, and where that acts (m).
+        """Follow the needle to a pose; return the force (N) of the thread on the needle, and its place (m).
 
         Args:
-            rotation: of the needle, shape (3, 3).
-            origin: of its frame, m.
-            channel: that it is in.
+            rotation: rotation of the needle, shape (3, 3).
+            origin: origin of the needle's frame, m.
+            channel: the needle's channel.
         """
         base, forward = rotation @ self._base + origin, rotation @ self._forward
         self._where = base, forward
@@ -82,20 +82,20 @@ class DrawnThread:
         return self._rod.state.nodes
 
     def tube(self) -> Vector:
-        """Return the nodes of its surface, m."""
+        """Return the nodes of the surface, m."""
         return tube.surface(self.nodes, self._thread.radius)
 
     def triangles(self) -> NDArray[np.uint32]:
-        """Return the triangles of its surface, node indices, shape (f, 3), counter-clockwise from outside."""
+        """Return the triangles of the surface, node indices, shape (f, 3), counter-clockwise from outside."""
         return tube.triangles(self._thread.segments)
 
     @property
     def parts(self) -> tuple[Vector, ...]:
-        """All that it remembers."""
+        """All arrays of the state."""
         return (self._state.values, self._passages.state.values, self._rod.state.values)
 
     def restore(self, parts: list[Vector]) -> None:
-        """Return to what it remembered; raises StateError if it cannot have been that."""
+        """Return to a saved state; raises StateError for an impossible state."""
         for record, values in zip((self._state, self._passages.state, self._rod.state), parts, strict=True):
             record.check(values)
             record.values[:] = values

@@ -36,12 +36,12 @@ from schemas.vectors import Vector
 __all__ = ["SuturePad"]
 
 _NEAR = 5.0e-3
-"""From a hole, across it, m: an event names the hole within this distance."""
+"""Distance from a hole, in the plane of the hole, for an event to name the hole, m."""
 _NO_TRIANGLES = np.zeros((0, 3), np.uint32)
 
 
 class PadState(Record):
-    """What the pad remembers beside its channel."""
+    """State of the pad beside the channel."""
 
     entry = array(3)
     exit = array(3)
@@ -52,7 +52,7 @@ class PadState(Record):
 
 
 class SuturePad(Stepped):
-    """Soft tissue for one needle and its thread."""
+    """Soft tissue for a needle and its thread."""
 
     params_model: ClassVar[type[Params]] = SuturePadParams
     params: SuturePadParams
@@ -75,12 +75,12 @@ class SuturePad(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """What happens to tissue and needle, and the skin."""
+        """Events of tissue and needle, and the skin."""
         return pad_ports(self.params.node_period, thread=self._thread is not None)
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """The needle, with what its thread does to it."""
+        """The needle, with the force of the thread."""
         return (bond_side(),)
 
     def configure(self, setup: Setup) -> Outputs:
@@ -152,7 +152,7 @@ class SuturePad(Stepped):
         return side.result(pushed, no_damper)
 
     def _push(self, position: Vector) -> Vector:
-        """Return the forces (N) of the needle on the pad at its points (m), both in the world, shape (9,)."""
+        """Return the needle's forces (N) on the pad at three points (m), both in the world, shape (9,)."""
         rotation, shift = self._world_in_pad[:3, :3], self._world_in_pad[:3, 3]
         points = position.reshape(3, 3).dot(rotation.T) + shift
         turned, origin = self._frame_of.frame(points)
@@ -176,7 +176,7 @@ class SuturePad(Stepped):
         self._state.tip_force = channel.tip
 
     def _events(self, was: Phase, time_ns: int) -> tuple[TaskEvent, ...]:
-        """Return what a change of phase means, and remember where the needle went in or out."""
+        """Return the events of a change of phase, and store the needle's entry or exit."""
         channel, state = self._channel.state, self._state
         names = {
             (Phase.PRESSING, Phase.IN): ("entered", state.entry, channel.points[0]),
@@ -212,7 +212,7 @@ class SuturePad(Stepped):
         return self._names[nearest] if away[nearest] <= _NEAR else ""
 
     def _drawn(self, time_ns: int) -> dict[str, SoftBodyState]:
-        """Return the skin and the thread, which settles in the time since they were drawn last."""
+        """Return skin and thread; the thread settles over the time since the last drawing."""
         first, thread = time_ns == 0, self._thread
         skin = self._skin.displaced(*self._channel.displaced())
         shown = {SKIN: (skin, self._skin.triangles if first else _NO_TRIANGLES)}
@@ -237,15 +237,15 @@ class SuturePad(Stepped):
         return (self._state.values, self._channel.state.values, *side, *thread)
 
     def state_hash(self) -> int:
-        """Return 64 bits of the channel, what is remembered, and the bond."""
+        """Return 64 bits of channel, pad state, and bond."""
         return state_hash(*self._parts())
 
     def save(self) -> bytes:
-        """Return the channel, what is remembered, and the bond."""
+        """Return channel, pad state, and bond."""
         return b"".join(part.tobytes() for part in self._parts())
 
     def restore(self, state: bytes) -> None:
-        """Return to a saved state, bit for bit. Raises StateError if it does not fit."""
+        """Return to a saved state, bit for bit. Raises StateError for a state of another size."""
         parts = [part.copy() for part in self._parts()]
         restore_arrays(self.name, parts, state)
         self._channel.state.check(parts[1])

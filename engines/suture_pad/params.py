@@ -17,7 +17,7 @@ __all__ = ["SuturePadParams"]
 
 
 class SuturePadParams(Params):
-    """Phantom and needle of the scene, what the tissue is like, and the numerics."""
+    """Phantom and needle of the scene, tissue, and numerics."""
 
     open_to_pages: ClassVar[bool] = True
 
@@ -47,7 +47,7 @@ class SuturePadParams(Params):
 
     @property
     def phantom(self) -> PhantomParams:
-        """The phantom, and where it stands."""
+        """The phantom with its place."""
         return next(one for one in self.fixtures.values() if isinstance(one, PhantomParams))
 
     @property

@@ -1,16 +1,15 @@
-"""A thread in the channels that it was drawn through: what holds it there. No ports, no bonds. SI units.
+"""A thread in its channels, held by friction. No ports, no bonds. SI units.
 
-A passage is a channel that the needle's base has gone into: a row of points in the tissue, of length L from
-its mouth to its end. The thread inside lies on it, so one number says all of it: b, the length of thread that
-has gone into the mouth. The thread does not stretch, so what pulls it is geometry alone:
+A passage is a channel entered by the needle's base: a row of points in the tissue, of length L from mouth to
+end. The thread inside lies on the row, so a single number is its whole state: b, the length of thread fed
+into the mouth. The thread does not stretch, so the pull is geometry alone:
 
-    in the newest    b >= L + the way from its end to the needle's base, or the base's own way while it is in
-    in one before    b >= L + the way from its end to the mouth of the next + the b of that
+    newest passage     b >= L + distance from the end to the needle's base, or the base's own distance inside
+    earlier passage    b >= L + distance from the end to the mouth of the next + b of the next
 
-Friction is a spring per length that slips at its largest force (Prandtl). A passage that nothing pulls
-returns to where its spring is at rest; one that is pulled adds its friction to what the needle's base feels.
-So the force is the gradient of the springs' energy and can only lose; it has no mass and no step that could
-be too long.
+Friction is a spring per length slipping at its largest force (Prandtl). A passage without pull returns to the
+rest of its spring; a pulled passage adds its friction to the force on the needle's base. So the force is the
+gradient of the springs' energy and can only lose energy; there is no mass, and no step is too long.
 """
 
 from __future__ import annotations
@@ -30,35 +29,35 @@ from schemas.vectors import Vector
 __all__ = ["MOST", "Passage", "Passages", "PassagesState"]
 
 MOST = 8
-"""Of passages: as many stitches as one thread is drawn through. More are not held."""
+"""Most passages: stitches made with a thread. Further passages have no friction."""
 _LONGEST = 40
-"""Of points of a passage."""
+"""Most points of a passage."""
 _STILL = np.zeros(3)
 
 
 class PassagesState(Record):
-    """All passages in the order in which they were opened; those beyond `count` are zero."""
+    """All passages in the order of opening; entries beyond `count` are zero."""
 
     count = integer()
     points = array(MOST, _LONGEST, 3)
     """m, frame `pad`."""
     counts = array(MOST)
-    """Of points."""
+    """Numbers of points."""
     through = array(MOST)
-    """Length of thread that has gone into the mouth, m."""
+    """Length of thread fed into the mouth, m."""
     slid = array(MOST)
-    """What that would have to be for no friction, m."""
+    """Length of thread without friction, m."""
 
 
 class Passage(NamedTuple):
-    """One channel with thread in it."""
+    """A channel with thread inside."""
 
     points: Vector
-    """From its mouth to its end, m, shape (n, 3)."""
+    """Points from mouth to end, m, shape (n, 3)."""
     ways: Vector
-    """Of the points from the mouth, m, shape (n,)."""
+    """Distances of the points from the mouth, along the passage, m, shape (n,)."""
     through: float
-    """Length of thread that has gone into the mouth, m."""
+    """Length of thread fed into the mouth, m."""
 
     @property
     def length(self) -> float:
@@ -66,7 +65,7 @@ class Passage(NamedTuple):
         return float(self.ways[-1])
 
     def at(self, ways: Vector) -> Vector:
-        """Return the places so far (m) from the mouth, shape (n, 3); outside they go straight on."""
+        """Return the places at these distances (m) from the mouth, shape (n, 3), straight on outside."""
         inside = np.clip(ways, 0.0, self.length)
         places = np.stack([np.interp(inside, self.ways, self.points[:, axis]) for axis in range(3)], axis=1)
         before, behind = np.minimum(ways - inside, 0.0), np.maximum(ways - inside, 0.0)
@@ -77,7 +76,7 @@ class Passage(NamedTuple):
 
 
 class Passages:
-    """One thread, and the channels of one pad that it runs through."""
+    """A thread and its channels in a pad."""
 
     def __init__(self, thread: ThreadParams, tissue: TissueParams) -> None:
         self._total, self._friction = thread.length, tissue.thread_friction
@@ -88,7 +87,7 @@ class Passages:
         self.refresh()
 
     def open(self, points: Vector, through: float) -> None:
-        """Begin a passage along a row of points (m), shape (n, 3), with so much thread in it."""
+        """Begin a passage along a row of points (m), shape (n, 3), with a length of thread inside (m)."""
         state = self.state
         at, points = state.count, points[:_LONGEST]
         state.points[at, : len(points)], state.counts[at] = points, len(points)
@@ -119,12 +118,12 @@ class Passages:
             yield Passage(*self._rows[at], float(self.state.through[at]))
 
     def advance(self, base: Vector, forward: Vector, inserted: float | None) -> Vector:
-        """Follow the needle's base, and return the force on it, N, frame `pad`.
+        """Follow the needle's base, and return the force on the base, N, frame `pad`.
 
         Args:
-            base: of the needle, m, frame `pad`.
-            forward: from the base into the needle, unit vector, frame `pad`.
-            inserted: how far the base is in the newest passage, m; None: it is outside.
+            base: base of the needle, m, frame `pad`.
+            forward: unit vector from the base into the needle, frame `pad`.
+            inserted: depth of the base in the newest passage, m; None: outside.
         """
         newest = self.state.count - 1
         self.pull = 0.0
@@ -145,9 +144,9 @@ class Passages:
         return force
 
     def _slide(self, demand: float, *, is_led: bool) -> float:
-        """Draw the newest passage to `demand` (m) and the others after it; return the sum of friction, N.
+        """Pull the newest passage to `demand` (m), then the earlier passages; return the sum of friction, N.
 
-        `is_led`: the needle itself is in the newest, and pushes its thread back, too.
+        `is_led`: the needle itself is in the newest passage, and pushes the thread back, too.
         """
         pull, total, is_taut = 0.0, self._total, True
         through, slid = self.state.through, self.state.slid
@@ -165,7 +164,7 @@ class Passages:
         return pull
 
     def _forget(self, inserted: float | None) -> None:
-        """Forget the newest passage if the needle has left it by its mouth, and the oldest without thread."""
+        """Forget the newest passage if the needle has left by the mouth, and the oldest without thread."""
         state = self.state
         if inserted is not None and inserted <= 0.0:
             state.count -= 1

@@ -14,8 +14,7 @@ __all__ = ["BOND", "EVENTS", "SKIN", "THREAD_NUMBERS", "bond_side", "pad_ports"]
 BOND = "needle"
 SKIN = "skin"
 EVENTS = ("entered", "exited", "withdrawn", "pulled out")
-"""The tip has broken through the skin; has come out again; the needle is out the way it came, or all through.
-"""
+"""The tip has broken through the skin; has come out again; the needle is out by the entry, or all through."""
 _NUMBERS = (
     ("phase", "", ", ".join(f"{phase:d} {phase.name.lower()}" for phase in Phase)),
     ("insertion", "m", "way of the tip along the arc since it has broken through the skin"),
@@ -30,11 +29,11 @@ _OF_THREAD = (
     ("passages", "", "how many channels the thread runs through"),
 )
 THREAD_NUMBERS = tuple(name for name, _, _ in _OF_THREAD)
-"""Outputs that only a pad has whose needle has a thread."""
+"""Outputs of a pad with a threaded needle only."""
 
 
 def pad_ports(node_period_ns: int, *, thread: bool) -> tuple[Port, ...]:
-    """Return all ports but those of the bond."""
+    """Return all ports but the ports of the bond."""
     numbers = _NUMBERS + (_OF_THREAD if thread else ())
     broken = f"{', '.join(EVENTS)}: with the nearest hole, and the force of the tip just before"
     return (

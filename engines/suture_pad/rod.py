@@ -1,14 +1,14 @@
-"""The shape of a thread: an elastic rod that does not stretch and is too light to pull. SI units.
+"""The shape of a thread: an inextensible elastic rod, too light to pull. SI units.
 
-Its nodes are equally far apart along it. Some are held: that at the needle's base, the one that would be
-ahead of it in the needle, and those that lie in a passage. What is between two passages, or before or behind
-all, is a span, from one place that the thread runs through to the next. A span that is as long as the way is
-straight. Any other takes a step of backward Euler, without mass:
+Nodes are equally far apart along the thread. Some are held: the node at the needle's base, a virtual node
+ahead of the base in the needle, and nodes in a passage. The parts between, before and behind passages are
+spans, from one fixed place of the thread to the next. A span as long as its distance is straight. Any other
+span takes a step of backward Euler, without mass:
 
     (1 + dt E I / (c h^4) D2' D2) x = x_before - dt * sinking z,    |edges| = their lengths
 
-with D2 the second differences of the nodes. Lengths are kept by Newton's method on their multipliers, in the
-metric of the left side, so that bending does not fight them. No free node is below the skin's level.
+with D2 the second differences of the nodes. Lengths are kept by Newton's method on the multipliers, in the
+metric of the left side, so bending does not act against the lengths. No free node is below the skin's level.
 """
 
 from __future__ import annotations
@@ -27,42 +27,43 @@ from schemas.vectors import Vector
 __all__ = ["Rod", "RodState"]
 
 _BESIDE = 0.2
-"""A node so near to a passage, in segments along the thread, is held by it: edges have some length."""
+"""Distance of a node held by a passage, in segments along the thread: edges have some length."""
 _TAUT = 1e-3
-"""By which share a span is longer than the way and still straight."""
+"""Largest relative slack of a straight span."""
 _EXACT = 2e-6
-"""By how much an edge may be too long or short, m."""
+"""Tolerance of an edge's length, m."""
 _MOST_STEPS = 20
-"""Of Newton's method: three are common."""
+"""Most steps of Newton's method: three are common."""
 _SOFTNESS = 1e-4
-"""Of the multipliers, as a share of their diagonal: else a nearly straight span has an edge too many."""
+"""Softness of the multipliers, relative to their diagonal: else a nearly straight span has an edge too many.
+"""
 
 
 class RodState(Record):
     """Where the thread is."""
 
     is_laid = flag()
-    """Whether it has been laid out behind its needle."""
+    """Whether the thread has been laid out behind the needle."""
     nodes = array("nodes", 3)
-    """From the needle's base on, m, frame `pad`."""
+    """Nodes from the needle's base on, m, frame `pad`."""
 
 
 class Span(NamedTuple):
-    """A part of the thread between two places that it runs through, in ways along it from the base, m."""
+    """A part of the thread between two fixed places, as lengths along the thread from the base, m."""
 
     start: float
     end: float
     place: Vector
-    """Of its start, m, shape (3,)."""
+    """Place of the start, m, shape (3,)."""
     end_place: Vector | None
-    """Of its end, m, shape (3,); None: the thread's end, which is free."""
+    """Place of the end, m, shape (3,); None: the thread's free end."""
 
 
 class Rod:
-    """The nodes of one thread."""
+    """The nodes of a thread."""
 
     def __init__(self, thread: ThreadParams, hidden: float) -> None:
-        """Lay the thread out at a height (m, frame `pad`) until it is known where the needle is."""
+        """Lay the thread out at a height (m, frame `pad`) until the needle's place is known."""
         self._thread = thread
         count = thread.segments + 1
         self.state = RodState(nodes=count)
@@ -75,10 +76,10 @@ class Rod:
         """Take a step of `dt` seconds.
 
         Args:
-            base: of the needle, m, frame `pad`.
-            forward: from the base into the needle, unit vector, frame `pad`.
-            passages: that the thread runs through, from the newest on.
-            dt: s.
+            base: base of the needle, m, frame `pad`.
+            forward: unit vector from the base into the needle, frame `pad`.
+            passages: passages of the thread, from the newest on.
+            dt: duration of the step, s.
         """
         state, thread = self.state, self._thread
         if not state.is_laid:
@@ -100,7 +101,7 @@ class Rod:
         state.nodes[:] = nodes[1:]
 
     def _spans(self, base: Vector, passages: Sequence[Passage]) -> list[Span]:
-        """Return the parts that are outside of passages, from the needle's base on."""
+        """Return the parts outside of passages, from the needle's base on."""
         spans: list[Span] = []
         start, place = 0.0, base
         for passage in passages:
@@ -109,9 +110,9 @@ class Rod:
         return [*spans, Span(start, self._thread.length, place, None)]
 
     def _take(self, span: Span, held: NDArray[np.bool_], nodes: Vector, dt: float) -> None:
-        """Move the nodes of a span that passages have not `held`.
+        """Move the nodes of a span not `held` by passages.
 
-        `nodes` has the one ahead of the base before all others.
+        `nodes` begins with the virtual node ahead of the base.
         """
         within = np.flatnonzero((self._ways > span.start) & (self._ways <= span.end))
         if span.end_place is not None:
@@ -136,7 +137,7 @@ class Rod:
     def _between_held(
         self, span: Span, within: NDArray[np.int64], held: NDArray[np.bool_], nodes: Vector
     ) -> tuple[Span, NDArray[np.int64]]:
-        """Return the span between nodes that its passages hold just outside of them, and its free nodes."""
+        """Return the span between the nodes held just outside of passages, and the span's free nodes."""
         if len(within) and held[within[0]]:
             span = span._replace(start=float(self._ways[within[0]]), place=nodes[within[0] + 1])
             within = within[1:]
@@ -147,13 +148,13 @@ class Rod:
 
 
 def _kept(span: Span, ways: Vector, nodes: Vector, weights: Vector) -> Vector:
-    """Return the nodes (m), shape (n, 3), so that edges have their lengths and none is below the level.
+    """Return the nodes (m), shape (n, 3), with edges of exact length and no node below the level.
 
     Args:
-        span: that they are of.
-        ways: of the nodes along the thread, m, shape (n,).
-        nodes: where they would be without.
-        weights: by how much a force on one moves another, shape (n, n).
+        span: span of the nodes.
+        ways: lengths along the thread to the nodes, m, shape (n,).
+        nodes: unconstrained nodes, m, shape (n, 3).
+        weights: displacement of a node per force on another node, shape (n, n).
     """
     ends = [] if span.end_place is None else [span.end_place]
     points: Vector = np.concatenate([[span.place], nodes, np.array(ends).reshape(-1, 3)])

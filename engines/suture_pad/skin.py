@@ -1,7 +1,7 @@
-"""The skin as it is drawn: a level slab, displaced around where a needle pulls it.
+"""The skin for drawing: a level slab, displaced around a pulling needle.
 
-It has no mechanics: those are the channel's. A node near points whose tissue is displaced goes with them, by
-the displacement of the nearest ones, and the less the farther they are. SI units, frame `pad`.
+The skin has no mechanics (see `channel`). A node near displaced tissue follows the displacement of the
+nearest points, the less the farther away. SI units, frame `pad`.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from schemas.vectors import Vector
 __all__ = ["Skin"]
 
 _FINE, _COARSE = 1.0e-3, 8.0e-3
-"""Between nodes of the top where stitches are, and elsewhere, m."""
+"""Node spacing near stitches and elsewhere, m."""
 _REACH = 5.0e-3
-"""Distance at which a node goes with a displaced point by 1/e of it, m. By eye; an elastic half space under a
-point load sinks as the inverse of the distance.
+"""Distance for a following of 1/e of a point's displacement, m. By eye; an elastic half space under a point
+load sinks with the inverse of the distance.
 """
 _BLEND = 0.5e-3
-"""How much farther than the nearest one a displaced point may be for 1/e of its share, m."""
+"""Extra distance, beyond the nearest displaced point, for a weight of 1/e, m."""
 _MARGIN = 15.0e-3
-"""Beyond the outermost holes, m, to which the fine part goes."""
+"""Margin of the fine part beyond the outermost holes, m."""
 
 
 class Skin:
-    """A slab with its top at z = 0."""
+    """A slab with the top at z = 0."""
 
     def __init__(self, size: tuple[float, float, float], holes: Vector) -> None:
-        """Take the size along x, y and z (m) and where the holes are, m, shape (n, 3)."""
+        """`size`: along x, y and z, m; `holes`: places of the holes, m, shape (n, 3)."""
         xs, ys = (_lines(size[axis] / 2.0, holes[:, axis]) for axis in (0, 1))
         columns, rows = len(xs), len(ys)
         self._xs, self._ys = xs, ys
@@ -38,7 +38,7 @@ class Skin:
         bottom = top - [0.0, 0.0, size[2]]
         rim = _rim(rows, columns)
         self.rest = np.concatenate([top, bottom[rim]])
-        """Nodes at rest, m, shape (n, 3): the top, row by row, then its rim at the bottom."""
+        """Nodes at rest, m, shape (n, 3): the top, row by row, then the rim at the bottom."""
         self.triangles = _triangles(rows, columns, rim)
         """Indices of nodes, counter-clockwise from outside, shape (f, 3)."""
 
@@ -65,7 +65,7 @@ class Skin:
 
 
 def _lines(half: float, holes: Vector) -> Vector:
-    """Return the lines of the grid along one axis, m: fine around the holes."""
+    """Return the lines of the grid along an axis, m: fine around the holes."""
     low, high = max(-half, holes.min() - _MARGIN), min(half, holes.max() + _MARGIN)
     parts = [
         np.linspace(start, end, max(1, round((end - start) / step)), endpoint=False)

@@ -1,7 +1,7 @@
-"""A rigid needle by three points of it: its frame from where they are, and forces on them for a wrench.
+"""A rigid needle as three points: its frame from the points, and forces on the points for a wrench.
 
-A bond of three points carries all that a frame can, and its energy book is exact in all of it: power is the
-sum of forces times velocities, whichever way the needle turns. SI units.
+A bond of three points carries as much as a frame, with an exact energy book: power is the sum of forces times
+velocities for any motion of the needle. SI units.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 class ThreePoints:
-    """Three points of a body that are not on one line."""
+    """Three points of a body, not on a line."""
 
     def __init__(self, marks: Vector) -> None:
-        """Take where the points are in the body's frame, m, shape (3, 3)."""
+        """`marks`: points in the body's frame, m, shape (3, 3)."""
         self._middle = marks.mean(axis=0)
         self._back = _axes(marks).T.copy()
 
     def frame(self, points: Vector) -> tuple[Vector, Vector]:
-        """Return rotation, shape (3, 3), and origin (m), shape (3,), of the body whose points are there.
+        """Return rotation, shape (3, 3), and origin (m), shape (3,), of the body with these points.
 
-        Points that a prediction has moved apart a little give the frame in which one edge is exact in
-        direction, and the plane.
+        Points slightly distorted by a prediction give the frame exact in the direction of one edge and in the
+        plane.
         """
         rotation: Vector = _axes(points) @ self._back
         return rotation, points.sum(axis=0) / 3.0 - rotation @ self._middle
 
     @staticmethod
     def forces(points: Vector, force: Vector, moment: Vector) -> Vector:
-        """Return forces (N) on `points`, shape (3, 3), that together are `force` and `moment` about 0.
+        """Return forces (N) on `points`, shape (3, 3), equal to `force` and `moment` about 0.
 
-        Of all such forces they have the least sum of squares.
+        The forces have the least sum of squares.
         """
         rows, (fx, fy, fz), (mx, my, mz) = points.tolist(), force.tolist(), moment.tolist()
         cx, cy, cz = (plain_sum(axis) / 3.0 for axis in zip(*rows, strict=True))

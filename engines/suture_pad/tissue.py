@@ -1,9 +1,9 @@
-"""What a curved needle meets in tissue: the parameters of the force model, each with its source. SI units.
+"""Parameters of the forces of tissue on a curved needle, each with its source. SI units.
 
 Model: Jackson and Cavusoglu, "Modeling of needle-tissue interaction forces during surgical suturing", ICRA
 2012 (10.1109/ICRA.2012.6224756): friction along the embedded arc, compression in proportion to the area swept
-between needle and channel, cutting at the tip. Its parameters are for the authors' own phantom and are not in
-the abstract; ours are chosen in the ranges that others measured, and marked where they are assumed.
+between needle and channel, cutting at the tip. The paper's parameters are for the authors' own phantom and
+are not in the abstract; ours are chosen in measured ranges of other authors, and marked where assumed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _Positive = Annotated[float, Field(gt=0.0)]
 
 
 class TissueParams(Params):
-    """Skin and what is under it; the defaults are a soft silicone pad."""
+    """Skin and the tissue below; the defaults are a soft silicone pad."""
 
     entry_puncture: Force = Field(
         default=0.8,

@@ -1,4 +1,4 @@
-"""A line as it is drawn: a tube around its nodes, open at both ends."""
+"""A line for drawing: a tube around nodes, open at both ends."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from schemas.vectors import Vector
 __all__ = ["surface", "triangles"]
 
 _SIDES = 5
-"""They meet at 72 degrees, which a skin draws round (`engines.mujoco.pictures.skin_mesh`)."""
+"""Number of sides. At an angle of 72 degrees a skin is drawn round (`engines.mujoco.pictures.skin_mesh`)."""
 _ANGLES = 2.0 * pi / _SIDES * np.arange(_SIDES)
 _ROUND = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 
 
 def surface(nodes: Vector, radius: float) -> Vector:
-    """Return rings of points around `nodes`, shape (n, 3), one after the other: shape (n sides, 3), m."""
+    """Return consecutive rings of points around `nodes`, shape (n, 3): shape (n sides, 3), m."""
     ways = np.gradient(nodes, axis=0)
     ways /= np.maximum(np.sqrt((ways * ways).sum(axis=1, keepdims=True)), 1e-12)
     sides = np.empty_like(ways)
@@ -34,7 +34,7 @@ def surface(nodes: Vector, radius: float) -> Vector:
 def triangles(segments: int) -> NDArray[np.uint32]:
     """Return the triangles of the surface around a line of so many segments, shape (f, 3).
 
-    They are indices of its points, counter-clockwise from outside.
+    The triangles are indices of points, counter-clockwise from outside.
     """
     ring = np.arange(_SIDES)
     starts = _SIDES * np.arange(segments)[:, None]
