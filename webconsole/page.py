@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from time import monotonic, monotonic_ns
 from typing import Any
 
@@ -34,10 +34,10 @@ from webconsole.commands import (
     command,
 )
 from webconsole.console import Console
-from webconsole.frame import Section, acknowledged, frame
+from webconsole.frame import acknowledged, frame
 from webconsole.gate import Gate, Role
 from webconsole.live import Live
-from webconsole.source import Value
+from webconsole.new_sections import NewSections
 from webconsole.stage import Stage
 
 __all__ = ["Page"]
@@ -48,8 +48,8 @@ _FRAME_S = 1.0 / 60.0
 _STATE_S = 0.25
 _MOST_WAITING = 2
 """Frames that a page has not acknowledged; until it does, newer values replace what it would have got."""
-_PICTURES_PER_S = 25.0
-"""Of each eye, at most: with 14 kB each, scene and organ, a page gets less than 1 MB/s."""
+_MOST_PROBLEMS = 50
+"""Damaged values of which a page is told."""
 _MESSAGES_PER_S = 400.0
 """Of a page: 60 acknowledgements, 120 inputs of a hand, and a burst of them after a pause."""
 _MOST_REFUSED = 200
@@ -73,11 +73,11 @@ class Page:
         self._show = Show(do="show")
         self._at_ns: int | None = None
         self._number = self._acknowledged = 0
-        self._sent: dict[str, Value] = {}
-        self._surfaces: set[str] = set()
+        self._new = NewSections(console)
+        self._told: set[str] = set()
+        """Problems that the page knows."""
         self._lines = 0
         self._rate = TokenBucket(_MESSAGES_PER_S)
-        self._pictures = TokenBucket(_PICTURES_PER_S, 2.0)
         self._refused = 0
         self._changed = asyncio.Event()
 
@@ -142,7 +142,7 @@ class Page:
             case Show():
                 self._show = order
                 if order.again:
-                    self._sent, self._surfaces = {}, set()
+                    self._new.send_all()
                 self._want()
             case At():
                 self._at_ns = None if order.time is None else self._past_ns(order.time)
@@ -213,12 +213,11 @@ class Page:
         while True:
             if source.generation != self._generation:
                 await self._begin()
-            content: dict[str, Any] = {
-                "is": "state",
-                **source.state,
-                "pilots": self._console.pilots.state(self),
-                "card": self._console.card(self._at_ns),
-            }
+            card, problem = self._card()
+            state = dict(source.state)
+            await self._tell_problems([*state.pop("problems", ()), *problem, *self._new.problems.values()])
+            pilots = self._console.pilots.state(self)
+            content: dict[str, Any] = {"is": "state", **state, "pilots": pilots, "card": card}
             if self._role == "operator":  # their links are an operator's
                 content["started"] = self._console.started.as_json()
             if isinstance(source, Live):
@@ -227,12 +226,26 @@ class Page:
             await self._tell(content)
             await asyncio.sleep(_STATE_S)
 
+    def _card(self) -> tuple[dict[str, Any] | None, list[str]]:
+        """Return the score card, or why it cannot be read."""
+        try:
+            return self._console.card(self._at_ns), []
+        except TrocarError as error:
+            return None, [f"the score card: {error}"]
+
+    async def _tell_problems(self, problems: Sequence[str]) -> None:
+        """Tell the page of values that cannot be shown, each once."""
+        for text in problems:
+            if text not in self._told and len(self._told) < _MOST_PROBLEMS:
+                self._told.add(text)
+                await self._tell({"is": "trouble", "text": f"not shown: {text[:500]}"})
+
     async def _begin(self) -> None:
         """Describe a session that this page has not shown yet."""
         generation = self._console.source.generation
         stage = await self._console.stage()
         self._generation = generation
-        self._sent, self._surfaces, self._stage = {}, set(), stage
+        self._new, self._stage, self._told = NewSections(self._console), stage, set()
         if self._console.source.kind == "live":
             self._return()
         described = {} if stage is None else stage.describe()
@@ -266,77 +279,8 @@ class Page:
                 self._changed.clear()
             if self._stage is None or self._number - self._acknowledged >= _MOST_WAITING:
                 continue
-            try:
-                parts = [*self._parts(self._stage)]
-            except TrocarError as error:
-                await self._tell({"is": "trouble", "text": str(error)[:500]})
-                await asyncio.sleep(1.0)
-                continue
-            if parts:
+            sections = self._new.make(self._stage, self._show, self._at_ns)
+            if sections:
                 self._number += 1
-                time_ns = max((value.time_ns for value in self._sent.values()), default=0)
-                at = time_ns if self._at_ns is None else self._at_ns
-                await self._socket.send_bytes(frame(self._number, at, parts))
-
-    def _parts(self, stage: Stage) -> Iterator[Section]:
-        """Yield what has changed since the last frame."""
-        for participant in stage.scenes:
-            values = {name: value for name in stage.inputs(participant) if (value := self._newest(name))}
-            if values and self._are_new(values):
-                yield self._console.poses(stage, participant, values)
-        for name in stage.surfaces:
-            if name not in self._surfaces:
-                first = self._console.source.first(name)
-                surface = None if first is None else stage.surface(name, first)
-                if surface is None:
-                    continue
-                self._surfaces.add(name)
-                yield surface
-            yield from self._changed_section(stage, name)
-        for bond in stage.arrows:
-            place, force = self._newest(bond.place), self._newest(bond.force)
-            if place and force and self._are_new({bond.place: place, bond.force: force}, "arrows "):
-                yield stage.arrow(bond, place, force)
-        for device, wrenches in stage.felt.items():
-            values = {name: value for name in wrenches if (value := self._newest(name))}
-            if values and self._are_new(values, "felt "):
-                yield stage.force(device, values)
-        for name in stage.markers:
-            value = self._newest(name)
-            if value is not None and not self._is_shown(name, value):
-                yield self._console.section(stage, name, value)
-        if self._show.pictures and (self._at_ns is not None or self._has_new(stage.pictures)):
-            for name in stage.pictures:
-                yield from self._changed_section(stage, name)
-        for index, name in enumerate(self._show.numbers):
-            value = self._newest(name) if stage.is_numeric(name) else None
-            if value is not None and self._are_new({name: value}):
-                yield stage.sample(index, name, value)
-
-    def _has_new(self, pictures: Sequence[str]) -> bool:
-        """Return whether there are new pictures and the page may have them; both eyes' go together."""
-        new = any(self._newest(name) is not self._sent.get(name) for name in pictures)
-        return new and self._pictures.spend(monotonic_ns())
-
-    def _changed_section(self, stage: Stage, name: str) -> Iterator[Section]:
-        value = self._newest(name)
-        if value is not None and self._are_new({name: value}):
-            yield self._console.section(stage, name, value)
-
-    def _is_shown(self, name: str, value: Value) -> bool:
-        """Return whether the last value said the same, and take this one as sent.
-
-        Markers are published again and again, and change seldom.
-        """
-        before, self._sent[name] = self._sent.get(name), value
-        return before is not None and before.payload == value.payload
-
-    def _newest(self, name: str) -> Value | None:
-        return self._console.source.newest(name, self._at_ns)
-
-    def _are_new(self, values: dict[str, Value], what: str = "") -> bool:
-        """Return whether one of these was not sent before, and take them as sent; `what`: as what."""
-        new = any(self._sent.get(what + name) != value for name, value in values.items())
-        if new:
-            self._sent.update({what + name: value for name, value in values.items()})
-        return new
+                at = self._new.time_ns if self._at_ns is None else self._at_ns
+                await self._socket.send_bytes(frame(self._number, at, sections))

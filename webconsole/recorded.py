@@ -13,10 +13,11 @@ import numpy as np
 from hub.participant import Params
 from hub.recording.bag import output_port
 from hub.recording.moments import Moments
-from hub.recording.recording import Recording
+from hub.recording.recording import STATUS_TOPIC, Recording
 from hub.recording.series import Series
 from hub.recording.trust import trusted_parameters
-from schemas.errors import RecordingError
+from schemas.codec import decode
+from schemas.errors import MessageError, RecordingError, TrocarError
 from schemas.ports import Port
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import SessionStatus
@@ -79,10 +80,10 @@ class Recorded:
     def state(self) -> Mapping[str, Any]:
         """Name of the session, and when the recording begins and ends (s)."""
         start, end = self._moments.span_ns
-        statuses = [status for _, status in self.recording.statuses()]
-        last: SessionStatus | None = statuses[-1] if statuses else None
+        statuses, problems = self._read_statuses
+        last = statuses[-1][1] if statuses else None
         return {
-            "session": self.recording.session(),
+            "session": self.recording.scenario().name if last is None else last.session,
             "state": "recording" if last is None or last.state == "done" else f"recording, {last.state}",
             "file": str(self.recording.file),
             "start": start / 1e9,
@@ -90,11 +91,29 @@ class Recorded:
             "late": 0 if last is None else last.late_steps,
             "dropped": 0 if last is None else last.dropped_messages,
             "detail": "" if last is None else last.detail,
+            "problems": problems,
         }
 
     def params(self, participant: str) -> Params:
         """Return the validated parameters of a participant; raises what `trusted_parameters` raises."""
         return trusted_parameters(self.recording, [participant]).validated(participant)
+
+    @cached_property
+    def _read_statuses(self) -> tuple[list[tuple[int, SessionStatus]], list[str]]:
+        """The statuses with their times (ns), and a sentence about those that are damaged."""
+        found, damaged = list[tuple[int, SessionStatus]](), list[str]()
+        try:
+            messages = self.recording.messages(STATUS_TOPIC) if STATUS_TOPIC in self.recording.topics else ()
+            for message in messages:
+                try:
+                    found.append((message.time_ns, decode(SessionStatus, message.payload)))
+                except MessageError as error:
+                    damaged.append(str(error))
+        except RecordingError as error:
+            damaged.append(str(error))
+        if not damaged:
+            return found, []
+        return found, [f"{len(damaged)} statuses of the session cannot be read, the first: {damaged[0]}"]
 
     def want(self, names: frozenset[str]) -> None:
         """Nothing has to be asked for."""
@@ -155,29 +174,41 @@ class Recorded:
     @cached_property
     def events(self) -> list[Entry]:
         """What happened: in tasks, with tissue, to devices, and when inputs were lost; by time."""
-        found = [*self._messages(), *self._contacts(), *self._stale(), *self._statuses()]
-        return sorted(found, key=lambda one: one.time_s)
+        parts = (self._messages(), self._contacts(), _readable(self._stale(), "session"), self._statuses())
+        return sorted((entry for part in parts for entry in part), key=lambda one: one.time_s)
 
     def _messages(self) -> Iterator[Entry]:
         lines = Entries()
         for outlet in self.outlets:
-            if outlet.port.type not in LOGGED:
-                continue
-            for message in self.recording.messages(self._topics[outlet.name]):
+            if outlet.port.type in LOGGED:
+                yield from _readable(self._lines_of(outlet, lines), outlet.name)
+
+    def _lines_of(self, outlet: Outlet, lines: Entries) -> Iterator[Entry]:
+        """Yield the lines of an outlet, and one about all of its messages that are damaged."""
+        damaged = list[Entry]()
+        for message in self.recording.messages(self._topics[outlet.name]):
+            try:
                 yield from lines.of(outlet, Value(message.time_ns, message.payload))
+            except MessageError as error:
+                damaged.append(Entry(message.time_ns / 1e9, "warn", outlet.name, str(error)))
+        if damaged:
+            text = f"{len(damaged)} messages cannot be read, the first: {damaged[0].text}"
+            yield damaged[0]._replace(text=text)
 
     def _contacts(self) -> Iterator[Entry]:
         """Yield when something was touched and let go: the wrench of a bond's force side."""
         for bond in self.scenario.bonds if self.scenario else ():
             name = f"{bond.force}/wrench"
-            if name not in self.recording:
-                continue
-            series = self._series(name)
-            force = np.linalg.norm(series.values[:, :3], axis=1)
-            touches = force > _CONTACT_N
-            for at in np.flatnonzero(touches[1:] != touches[:-1]) + 1:
-                text = f"contact, {force[at]:.2g} N" if touches[at] else "contact ends"
-                yield Entry(float(series.time[at]), "info", name, text)
+            if name in self.recording:
+                yield from _readable(self._contacts_of(name), name)
+
+    def _contacts_of(self, name: str) -> Iterator[Entry]:
+        series = self._series(name)
+        force = np.linalg.norm(series.values[:, :3], axis=1)
+        touches = force > _CONTACT_N
+        for at in np.flatnonzero(touches[1:] != touches[:-1]) + 1:
+            text = f"contact, {force[at]:.2g} N" if touches[at] else "contact ends"
+            yield Entry(float(series.time[at]), "info", name, text)
 
     def _stale(self) -> Iterator[Entry]:
         """Yield when a device's samples ceased and when they came back."""
@@ -193,7 +224,7 @@ class Recorded:
     def _statuses(self) -> Iterator[Entry]:
         """Yield late steps and refused messages, at the status before which they were."""
         late = refused = 0
-        for time_ns, status in self.recording.statuses():
+        for time_ns, status in self._read_statuses[0]:
             more_late, more_refused = status.late_steps - late, status.dropped_messages - refused
             if more_late > 0:
                 yield Entry(time_ns / 1e9, "warn", "session", f"{more_late} late steps")
@@ -203,3 +234,14 @@ class Recorded:
 
     def close(self) -> None:
         """Files are opened for each look alone."""
+
+
+def _readable(entries: Iterator[Entry], source: str) -> Iterator[Entry]:
+    """Yield entries as far as they can be read, and then why no further."""
+    time_s = 0.0
+    try:
+        for entry in entries:
+            time_s = entry.time_s
+            yield entry
+    except TrocarError as error:
+        yield Entry(time_s, "warn", source, f"not shown from here on: {error}")

@@ -33,6 +33,13 @@ from schemas.vectors import has_vector
 from tests.fuzz.byte_mutations import NUMBERS, WORDS, mutated, mutated_text
 from tests.fuzz.harness import Note, Target, search
 from tests.participants import make_participant
+from webconsole.commands import Show
+from webconsole.console import Console
+from webconsole.frame import frame
+from webconsole.new_sections import NewSections
+from webconsole.pilot import Pilots
+from webconsole.recorded import Recorded
+from webconsole.stage import Stage
 
 FOLDER = Path(__file__).parents[1] / "hub/recording/recordings_0_1_0"
 NAMES = ["palpation", "ros", "ros-mirror", "table"]
@@ -41,9 +48,9 @@ _KEPT_NS = 20_000_000
 
 
 class Contents:
-    """What is in a recording, to be changed and written again."""
+    """The beginning of a recording, to be changed and written again."""
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, file: Path, until_ns: int = _KEPT_NS) -> None:
         with file.open("rb") as stream:
             reader = make_reader(stream)
             summary = reader.get_summary()
@@ -52,7 +59,7 @@ class Contents:
             self.channels = list(summary.channels.values())
             self.messages = [
                 (channel.id, message.log_time, message.data)
-                for _, channel, message in reader.iter_messages(ending_before=_KEPT_NS)
+                for _, channel, message in reader.iter_messages(ending_before=until_ns)
             ]
             self.attachments = [(one.name, one.data) for one in reader.iter_attachments()]
 
@@ -236,9 +243,29 @@ def _verify(file: Path, _directory: Path) -> None:
     verify(Recording(file), endpoint="tcp/127.0.0.1:0")
 
 
+def _show(file: Path, _directory: Path) -> None:
+    """Show it on a page; once it is open, the page says what is damaged, and shows the rest."""
+    source = Recorded(file)
+    try:
+        assert source.scenario is not None
+        console = Console(source, Pilots())
+        stage = Stage(source.scenario, source.outlets, source.params)
+        show = Show(do="show", numbers=[*stage.numbers, *stage.gauges][:24])
+        sections = NewSections(console)
+        json.dumps(
+            [stage.describe(), source.state, [one.as_json() for one in source.events]], allow_nan=False
+        )
+        for at_ns in (None, 0, _KEPT_NS // 2):
+            frame(1, at_ns or 0, sections.make(stage, show, at_ns))
+        assert stage.packed
+    except TrocarError as error:
+        raise AssertionError(f"the page of a recording ends: {error}") from error
+
+
 ACTIONS: list[Callable[[Path, Path], None]] = [
     _read_all,
     _read_all,
+    _show,
     _recover,
     _replay,
     _play,
@@ -247,7 +274,7 @@ ACTIONS: list[Callable[[Path, Path], None]] = [
     lambda file, directory: report(Recording(file), directory / "page.html"),
     lambda file, directory: export(Recording(file), directory / "bag") and None,
 ]
-LABELS = ["read", "read", "recover", "replay", "scripted", "ros-bag", "verify", "report", "export"]
+LABELS = ["read", "read", "show", "recover", "replay", "scripted", "ros-bag", "verify", "report", "export"]
 
 
 def attempt(case: str, directory: Path, note: Note) -> None:

@@ -7,10 +7,15 @@ from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, suppress
 
 import numpy as np
 import pytest
+from mcap.records import Channel, Schema
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from tests.webconsole.conftest import finish
+from schemas.codec import encode
+from schemas.ros import Header, Time
+from schemas.trocar_msgs import ScoreCard, ScoreValue
+from tests.fuzz.recordings import Contents
+from tests.webconsole.conftest import finish, served
 from tests.webconsole.test_gate import Visitor
 from webconsole.frame import SectionKind, sections
 from webconsole.recorded import Recorded
@@ -176,6 +181,47 @@ def test_a_message_that_is_too_long_ends_the_connection(console_of_recording):
         assert socket.close_code == 1009
 
     run(body, console_of_recording)
+
+
+def test_damaged_messages_are_told_and_the_rest_is_shown(recording, tmp_path):
+    """A status, a score card and a wrench that cannot be decoded, each beside sound ones."""
+    (file,) = recording.glob("*.mcap")
+    contents, damaged = Contents(file, 10**9), tmp_path / "damaged" / "damaged.mcap"
+    damaged.parent.mkdir()
+    names = {channel.topic: channel.id for channel in contents.channels}
+    spoilt = {names["/hub/status"]: 0, names["/engine/tissue/out/probe/wrench"]: 300}
+    contents.schemas.append(Schema(99, b"", "ros2msg", ScoreCard.ros_type))
+    contents.channels.append(Channel(99, "/engine/task/out/card", "cdr", {}, 99))
+    value = ScoreValue(name="path", value=1.5, unit="m", reason="")
+    card = ScoreCard(header=Header(stamp=Time(), frame_id=""), task="t", goals=2, reached=1, metrics=[value])
+    contents.messages += [(99, 100_000_000, encode(card)), (99, 400_000_000, b"\0\1\0\0\xff")]
+    for channel, index in spoilt.items():
+        at = [at for at, (of, *_) in enumerate(contents.messages) if of == channel][index]
+        contents.messages[at] = (*contents.messages[at][:2], b"\0\1\0\0\xff\xff\xff")
+    contents.write(damaged)
+
+    async def body(socket):
+        await socket.send('{"do": "show", "numbers": ["tissue.probe/wrench", "robot.PSM1/probe/pose"]}')
+        await socket.send('{"do": "at", "time": 0.3015}')
+        told = [(await answer(socket, **{"is": "trouble"}))["text"] for _ in range(3)]
+        causes = "1 statuses of the session cannot be read", "tissue.probe/wrench", "the score card"
+        assert all(any(cause in text for text in told) for cause in causes), told
+        await socket.send('{"do": "at", "time": 0.2}')
+        while (state := await answer(socket, **{"is": "state"}))["card"] is None:
+            pass
+        assert (state["session"], state["state"]) == ("palpation", "recording")
+        assert state["card"]["metrics"] == [{"name": "path", "value": 1.5, "unit": "m", "reason": ""}]
+        frames = []
+        while not frames or frames[-1][1] != 200_000_000:
+            frames.append(await next_frame(socket))
+            await socket.send(struct.pack("<I", frames[-1][0]))
+        assert {section.place for section in frames[-1][2] if section.kind == SectionKind.SAMPLE} == {0, 1}
+
+    with served(Recorded(damaged)) as server:
+        run(body, server)
+        events = json.loads(Visitor(server).admit().get("/events").body)
+    assert [one for one in events if "not shown from here on" in one["text"]]
+    assert [one for one in events if one["text"].startswith("contact")] == []
 
 
 def test_a_recording_that_was_cut_short_is_shown_as_far_as_it_goes(recording, tmp_path, caplog):
