@@ -21,8 +21,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from robots.dvrk import identified, linkage, psm
+from robots.dvrk.arm_bodies import instrument
 from robots.dvrk.dynamics import STANDARD_GRAVITY, Dynamics
-from robots.dvrk.inertia import Inertia, instrument
+from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import instrument as tool_of
 
 OUTPUT = Path(__file__).parents[1] / "robots" / "dvrk" / "data" / "psm_inertia.json"

@@ -45,7 +45,7 @@ PICTURED: dict[str, dict[str, Any]] = {
 _H = 40_000_000
 _NEEDLE = NEEDLES["sh-plus"]
 _HELD = np.array([0.0, 0.0, 7.7e-3])
-"""Of the wire, in the frame of the tip: where the pads are (`robots.dvrk.rolling_needle_driver`)."""
+"""Of the wire, in the frame of the tip: where the pads are (`robots.dvrk.end_effectors.rolling_jaw`)."""
 _FINGER = 0.0459
 """rad: of a finger that holds the wire, as physics leaves it in the scenario."""
 _SWING = np.array([0.03, 0.03, 4e-3, 0.15, 0.15, 0.15])

@@ -25,7 +25,7 @@ from hub.participant import (
     signal_in,
     signal_out,
 )
-from robots.dvrk.musha import HAND
+from robots.dvrk.end_effectors.musha import HAND
 from robots.dvrk.parameters import ArmName
 from schemas.errors import SessionError, StateError
 from schemas.ports import Port
@@ -95,7 +95,7 @@ class Caliper(Controller):
     def ports(self) -> tuple[Port, ...]:
         """Hand and tissue in; the command to the fingers and the widths out."""
         scalar, size = Float64Message, 3 * _SPHERES
-        motors, bones = tuple(joint.name for joint in HAND.joints), tuple(link.name for link in HAND.links)
+        motors, bones = tuple(joint.name for joint in HAND.joints), tuple(bone.name for bone in HAND.bones)
         at, force = "of the hand's contact spheres", "on the hand's contact spheres"
         width = "between the fingertips' surfaces when both have touched; 0 before"
         true_width = "of the mesh at rest along the line through both fingertips"

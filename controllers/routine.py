@@ -27,7 +27,7 @@ from hub.participant import (
     integer,
     signal_out,
 )
-from robots.dvrk.musha import HAND
+from robots.dvrk.end_effectors.musha import HAND
 from robots.dvrk.parameters import UnitQuaternion
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import OperatingState, StringStamped

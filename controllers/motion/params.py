@@ -25,9 +25,9 @@ class Gripper(NamedTuple):
     """What an instrument grasps with."""
 
     name: str
-    """Second part of its ports' names: `jaw` or `hand`."""
+    """Second part of its ports' names, such as `jaw`."""
     joints: tuple[Joint, ...]
-    """What is commanded: the jaw's angle, with the roller's if it has one, or the closings of the fingers."""
+    """Commanded joints: a jaw's angle, with the roller's if it has one, or closings of fingers."""
     start: tuple[float, ...]
     """Positions at time 0, rad."""
 
@@ -38,10 +38,8 @@ class PsmParams(MountedPsm):
     @property
     def gripper(self) -> Gripper | None:
         """What the instrument grasps with; None: it does not grasp."""
-        tool = self.tool
-        if tool.jaw is not None:
-            return Gripper("jaw", tool.jaw_joints, (self.jaw, 0.0)[: len(tool.jaw_joints)])
-        return None if tool.hand is None else Gripper("hand", tool.hand.joints, self.hand)
+        effector = self.end_effector
+        return Gripper(effector.name, effector.joints, self.end_effector_start) if effector.joints else None
 
     @property
     def home(self) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.motion.frames import turned
-from robots.dvrk import inertia
+from robots.dvrk import arm_bodies
 from robots.dvrk.dynamics import STANDARD_GRAVITY, Dynamics
 from robots.dvrk.linkage import Linkage
 from robots.dvrk.setup_joints import CartArm
@@ -254,7 +254,9 @@ class KnownWeight:
         self._nothing = np.zeros(len(chain.joints))
         self._dynamics = None
         if arm == "ECM":
-            self._dynamics = Dynamics(chain, Linkage((), ()), {"roll": inertia.ecm()["roll"]}, self._nothing)
+            self._dynamics = Dynamics(
+                chain, Linkage((), ()), {"roll": arm_bodies.ecm()["roll"]}, self._nothing
+            )
 
     def effort(self, q: Vector) -> Vector:
         """Return the efforts (N m, N), shape (n,), that carry it at joint positions `q`, shape (n,)."""

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self, cast
 from pydantic import Field, model_validator
 
 from hub.participant import Params
-from robots.dvrk.instruments import STEEL_DENSITY
+from robots.dvrk.inertia import STEEL_DENSITY
 from robots.dvrk.parameters import UnitQuaternion
 from robots.training.boards import BOARDS, Ring
 from robots.training.fixtures import BoardName

@@ -13,6 +13,7 @@ from typing_extensions import TypedDict  # pydantic needs this one before Python
 
 from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
+from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
 from robots.dvrk.mounted import MountedArms, MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm
@@ -21,14 +22,7 @@ from schemas.keys import valid_name
 from schemas.quantity import Duration
 from schemas.scenario import Name
 
-__all__ = [
-    "MujocoParams",
-    "SceneParams",
-    "has_hand",
-    "has_jaw",
-    "has_probe",
-    "has_spheres",
-]
+__all__ = ["MujocoParams", "SceneParams"]
 
 
 @with_config(ConfigDict(extra="forbid"))
@@ -120,11 +114,7 @@ class SceneParams(Params):
 
     @model_validator(mode="after")
     def _rolls_by_friction(self) -> Self:
-        rolling = [
-            name
-            for name, arm in self.arms.items()
-            if isinstance(arm, MountedPsm) and arm.tool.roller is not None
-        ]
+        rolling = [name for name, arm in self.arms.items() if isinstance(arm.end_effector, RollingJaw)]
         if rolling and self.objects and self.grasp != "friction":
             raise ValueError(
                 f"grasp: {self.grasp} would lock the object that the instrument of {', '.join(rolling)}"
@@ -171,23 +161,3 @@ class MujocoParams(SceneParams):
             " stand still in the model, and the covers of arms touch nothing"
         ),
     )
-
-
-def has_jaw(params: MountedPsm | MountedEcm) -> bool:
-    """Return whether the arm holds an instrument that opens and closes."""
-    return isinstance(params, MountedPsm) and params.tool.jaw is not None
-
-
-def has_hand(params: MountedPsm | MountedEcm) -> bool:
-    """Return whether the arm holds a hand."""
-    return isinstance(params, MountedPsm) and params.tool.hand is not None
-
-
-def has_spheres(params: MountedPsm | MountedEcm) -> bool:
-    """Return whether the arm holds an instrument with contact spheres."""
-    return isinstance(params, MountedPsm) and bool(params.tool.spheres)
-
-
-def has_probe(params: MountedPsm | MountedEcm) -> bool:
-    """Return whether the arm holds a palpation probe."""
-    return isinstance(params, MountedPsm) and params.tool.name == "palpation-probe"

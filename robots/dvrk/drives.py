@@ -12,69 +12,19 @@ of the discs is kept coupled (`discs`, `friction`). See docs/decisions/0010.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from math import exp, inf, tanh
+from collections.abc import Mapping, Sequence
+from math import exp, tanh
 from types import MappingProxyType
 
 import numpy as np
 
 from robots.dvrk import ecm
 from robots.dvrk import psm as psm_arm
-from robots.dvrk.hand import Hand
+from robots.dvrk.drive import JAW_COLUMN, Disc, Drive, disc_shares
 from robots.dvrk.instruments import Instrument
-from robots.dvrk.rolling_needle_driver import ROLLER
 from schemas.plain_sum import plain_sum
 
-__all__ = ["ECM", "FINGERS", "SMOOTHING", "Disc", "Drive", "discs", "friction", "psm"]
-
-FINGERS = ("jaw_left", "jaw_right")
-"""Of the jaw, each turned by half its angle."""
-
-SMOOTHING = 50.0
-"""s/rad, s/m: FONT's Coulomb friction is Fs tanh(50 dq)."""
-
-
-@dataclass(frozen=True)
-class Drive:
-    """The drive of one joint; rad, N m and kg m^2, or m, N and kg."""
-
-    stiffness: float
-    """Proportional gain of the servo."""
-    damping: float
-    """Derivative gain, on the error of the velocity."""
-    viscous_friction: float
-    """Effort per velocity; 0 where the discs hold it."""
-    coulomb_friction: float
-    """Effort; 0 where the discs hold it."""
-    elasticity: float
-    """Effort per position: the joint asks for elasticity * q + offset."""
-    offset: float
-    armature: float
-    """Inertia of the drive that is not in a body."""
-    effort: float
-    """Largest effort."""
-    velocity: float
-    """Largest velocity."""
-    smoothing: float = SMOOTHING
-    """How fast Coulomb friction changes its sign, s/rad or s/m."""
-    static_friction: float = 0.0
-    """Effort at rest beyond Coulomb's friction (Stribeck)."""
-    stribeck_velocity: float = inf
-    """At which it has fallen to 1/e."""
-
-
-@dataclass(frozen=True)
-class Disc:
-    """One disc of an instrument: it turns by the sum over the joints of share * position; rad, N m."""
-
-    shares: Mapping[str, float]
-    viscous_friction: float
-    coulomb_friction: float
-    smoothing: float = SMOOTHING
-    static_friction: float = 0.0
-    stribeck_velocity: float = inf
-
+__all__ = ["ECM", "discs", "friction", "psm"]
 
 _ARM = {
     "yaw": (120.0, 6.0, 0.136392294, 0.063000355, 0.135144709, 0.00726440463),
@@ -83,15 +33,10 @@ _ARM = {
 }
 """p, d (SAW), Fv, Fs, K, O (FONT). The inertia of these drives is in the identified masses."""
 
-_DISC_STIFFNESS, _DISC_DAMPING = 6.0, 0.09
-"""N m/rad, N m s/rad of all four discs (SAW)."""
-_DISC_INERTIA = _DISC_DAMPING**2 / (4.0 * _DISC_STIFFNESS)
-"""kg m^2: neither published identification states a rotor inertia of the discs (FONT has none,
-WPI-AIM/dvrk_dynamics_identification finds negative ones); this is the one that the gains damp critically, d =
-2 sqrt(p I).
-"""
 _DISC_FRICTION = ((0.0013, 0.0077), (0.0104, 0.0198), (0.0047, 0.0152), (0.0061, 0.0081))
 """Fv, Fs of the four discs (FONT, motors 4 to 7)."""
+_COLUMNS = ("roll", "wrist_pitch", "wrist_yaw")
+"""Joints by column of `disc_shares`, before the jaw; both pitch joints of a snake add up to its pitch."""
 _ROLL_ELASTICITY, _ROLL_OFFSET = 0.0025, 0.0038
 """N m/rad, N m at the joint (FONT, K4 and O4)."""
 
@@ -105,98 +50,42 @@ _ECM_GAINS = {
 
 
 def psm(tool: Instrument) -> Mapping[str, Drive]:
-    """Return the drives of a PSM with `tool` by joint, including those of its jaw or hand and the roller."""
-    chain = psm_arm.chain(tool)
+    """Return the drives of a PSM with `tool` by joint, then those of its end effector by motor."""
     drives = {
-        joint.name: Drive(*_ARM[joint.name], 0.0, joint.effort, joint.velocity) for joint in chain.joints[:3]
+        joint.name: Drive(*_ARM[joint.name], 0.0, joint.effort, joint.velocity)
+        for joint in psm_arm.ARM_JOINTS
     }
-    square = {
-        name: plain_sum(disc.shares.get(name, 0.0) ** 2 for disc in discs(tool)) for name in _moved(tool)
-    }
-    limits = {joint.name: (joint.effort, joint.velocity) for joint in tool.joints}
-    if tool.jaw is not None:
-        # Both fingers turn by half the jaw's angle and share its inertia and stiffness; the torque of each
-        # works along the whole of it.
-        square |= dict.fromkeys(FINGERS, 2.0 * square[FINGERS[0]])
-        limits |= dict.fromkeys(FINGERS, (tool.jaw.effort, tool.jaw.velocity / 2.0))
-    for name, share in square.items():
-        elastic = (_ROLL_ELASTICITY, _ROLL_OFFSET) if name == "roll" else (0.0, 0.0)
-        drives[name] = Drive(
-            _DISC_STIFFNESS * share,
-            _DISC_DAMPING * share,
-            0.0,
-            0.0,
-            *elastic,
-            _DISC_INERTIA * share,
-            *limits[name],
-        )
-    if tool.roller is not None:
-        share = (tool.roller.wire_radius / tool.roller.pulley) ** 2
-        of_disc = (_DISC_STIFFNESS * share, _DISC_DAMPING * share, 0.0, 0.0, 0.0, 0.0, _DISC_INERTIA * share)
-        drives[ROLLER] = Drive(*of_disc, tool.roller.joint.effort, tool.roller.joint.velocity)
-    if tool.hand is not None:
-        drives |= {
-            joint.name: drive for joint, drive in zip(tool.hand.joints, _motors(tool.hand), strict=True)
-        }
+    turning = discs(tool)
+    for joint in tool.joints:
+        share = plain_sum(disc.shares.get(joint.name, 0.0) ** 2 for disc in turning)
+        elastic = (_ROLL_ELASTICITY, _ROLL_OFFSET) if joint.name == "roll" else (0.0, 0.0)
+        drives[joint.name] = Drive.of_disc(share, joint.effort, joint.velocity, *elastic)
+    drives |= {motor.name: motor.drive for motor in tool.end_effector.motors}
     return MappingProxyType(drives)
 
 
-def _motors(hand: Hand) -> Iterator[Drive]:
-    """Yield the drives of `hand` in the order of its joints.
-
-    A closing is turned by a disc that winds a tendon up and lets it go; its friction stays with the motor, as
-    the springs that open a finger do not turn it. A spread moves the end of a spring, with the friction of
-    the first joints.
-    """
-    spring, friction = hand.phalanges[0].stiffness, float(hand.damping[0])
-    for joint in hand.joints:
-        gains = (_DISC_STIFFNESS, _DISC_DAMPING) if joint.name in hand.fingers else (spring, friction)
-        armature = _DISC_INERTIA if joint.name in hand.fingers else 0.0
-        yield Drive(*gains, 0.0, 0.0, 0.0, 0.0, armature, joint.effort, joint.velocity)
-
-
 def discs(tool: Instrument) -> tuple[Disc, ...]:
-    """Return the discs that turn roll, wrist and jaw of `tool`.
-
-    The inverse of SAW's matrix from discs to joints determines by how much.
-    """
-    shares = np.linalg.inv(tool.actuator_to_joint)  # (disc, joint)
-    names = _moved(tool)
-    columns = [_column(name) for name in names]
+    """Return the discs that turn roll, wrist and jaw of `tool`."""
+    columns = {joint.name: _column(joint.name) for joint in tool.joints}
+    for motor in tool.end_effector.motors:
+        if motor.kind == "disc":
+            columns |= dict.fromkeys(motor.moves, JAW_COLUMN)
     turned = [
-        {
-            name: float(row[column])
-            for name, column in zip(names, columns, strict=True)
-            if abs(row[column]) > 1e-9
-        }
-        for row in shares
+        {name: float(row[column]) for name, column in columns.items() if row[column]}
+        for row in disc_shares(tool.actuator_to_joint)
     ]
     return tuple(Disc(moved, *losses) for moved, losses in zip(turned, _DISC_FRICTION, strict=True) if moved)
 
 
-def _moved(tool: Instrument) -> tuple[str, ...]:
-    return (*(joint.name for joint in tool.joints), *(FINGERS if tool.jaw is not None else ()))
-
-
-def _column(name: str) -> int:
-    """Return the column of a joint or finger in SAW's matrix: roll, wrist pitch, wrist yaw, jaw.
-
-    The two pitch joints of a snake add up to its pitch.
-
-    The two pitch joints of a snake add up to its pitch.
-    """
-    return next(
-        i for i, kind in enumerate(("roll", "wrist_pitch", "wrist_yaw", "jaw")) if name.startswith(kind)
-    )
+def _column(joint: str) -> int:
+    return next(i for i, kind in enumerate(_COLUMNS) if joint.startswith(kind))
 
 
 def _of_ecm() -> Mapping[str, Drive]:
     """Return the drives of an ECM by joint.
 
-    No friction of it is published: it is taken to be the same share of the largest effort as in the PSM's
-    joint of that name.
-
-    It is taken to be the same share of the largest effort as in the PSM's joint of that name.
+    No friction is published: it is taken to be the same share of the largest effort as in the PSM's joint of
+    that name.
     """
     # of disc 1 at the joint of a needle driver 400006
     friction_of_roll = np.array(_DISC_FRICTION[0]) * [0.6397**2, 0.6397]

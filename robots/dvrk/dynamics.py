@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robots.dvrk import drives, ecm, inertia, linkage, psm
+from robots.dvrk import arm_bodies, drives, ecm, linkage, psm
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import Instrument
 from robots.dvrk.linkage import Linkage
@@ -160,18 +160,18 @@ class Dynamics:
         return -np.einsum("a,biac,bc->i", pull, self.displacements(q)[..., :3, :], self._pseudo[..., 3])
 
 
-def of_psm(tool: Instrument, probe_radius: float = inertia.PROBE_RADIUS) -> Dynamics:
+def of_psm(tool: Instrument) -> Dynamics:
     """Return the dynamics of a PSM with `tool`, its jaw closed."""
     chain = psm.chain(tool)
     rotors = [drives.psm(tool)[joint.name].armature for joint in chain.joints]
-    return Dynamics(chain, linkage.PSM, inertia.psm(tool, probe_radius), np.array(rotors))
+    return Dynamics(chain, linkage.PSM, arm_bodies.psm(tool), np.array(rotors))
 
 
-def of_ecm(endoscope_mass: float = inertia.ENDOSCOPE_MASS["Classic_SD"]) -> Dynamics:
+def of_ecm(endoscope_mass: float = arm_bodies.ENDOSCOPE_MASS["Classic_SD"]) -> Dynamics:
     """Return the dynamics of the ECM with an endoscope of this mass (kg)."""
     chain = ecm.chain()
     rotors = [drives.ECM[joint.name].armature for joint in chain.joints]
-    return Dynamics(chain, linkage.ECM, inertia.ecm(endoscope_mass), np.array(rotors))
+    return Dynamics(chain, linkage.ECM, arm_bodies.ecm(endoscope_mass), np.array(rotors))
 
 
 def _along(slopes: Vector, rates: Vector) -> Vector:

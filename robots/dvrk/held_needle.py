@@ -24,6 +24,7 @@ import numpy as np
 from robots.dvrk import inverse as six
 from robots.dvrk import psm
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
 from robots.dvrk.instruments import Instrument
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
@@ -50,15 +51,16 @@ def chain(tool: Instrument, needle: Needle, held: float) -> SerialChain:
 
     The needle is held at the angle `held` (rad) behind its tip.
 
-    Raises MotionError if `tool` has no roller or the needle does not reach so far.
+    Raises MotionError if `tool` has no rolling jaw or the needle does not reach so far.
     """
-    if tool.roller is None:
+    jaw = tool.end_effector
+    if not isinstance(jaw, RollingJaw):
         raise MotionError(f"'{tool.name}' does not roll a needle; take ROLLING_NEEDLE_DRIVER")
     if not 0.0 <= held <= needle.arc:
         raise MotionError(f"a needle of {needle.arc:.4g} rad cannot be held {held:.4g} rad behind its tip")
     arm = psm.chain(tool).joints
     wrist = replace(arm[-1], theta=arm[-1].theta + pi / 2.0)  # x ahead, along the fingers
-    roll = replace(tool.roller.joint, alpha=pi, a=tool.roller.distance)
+    roll = replace(jaw.roller, alpha=pi, a=jaw.distance)
     along = needle.arc / 2.0 - held
     radial, tangent = (
         np.array([np.cos(along), np.sin(along), 0.0]),

@@ -1,6 +1,6 @@
 """The identified dynamics of the PSM in combined terms.
 
-The masses of `robots.dvrk.inertia` are fitted to them and tested against them.
+The masses of `robots.dvrk.arm_bodies` are fitted to them and tested against them.
 
 Source: FONT = gafontanelli/DVRK-dynamicModel (commit 51c55d75), dvrk_dynamics/src/PSM_robot.cpp with its
 parameters PSM1_param.txt; Fontanelli, Ficuciello, Villani, Siciliano, "Modelling and identification of the da

@@ -1,4 +1,4 @@
-"""Instruments of the PSM: joints, tip frame, jaw or hand, and what their links weigh. SI units, radians.
+"""Instruments of the PSM: joints, tip frame, end effector, and the masses of their links. SI units, radians.
 
 The numbers of all 54 instruments that the dVRK's controller knows are in `data/instruments.json`, each with
 the file they come from; right angles are exact there. An instrument is called by its name
@@ -18,30 +18,27 @@ from typing import Any
 
 import numpy as np
 
-from robots.dvrk.contact_spheres import ContactSphere, on_jaw
-from robots.dvrk.hand import Hand
-from robots.dvrk.musha import HAND
-from robots.dvrk.rolling_needle_driver import NAME as ROLLING
-from robots.dvrk.rolling_needle_driver import Roller, roller
+from robots.dvrk.drive import JAW_COLUMN, disc_shares
+from robots.dvrk.end_effectors.contact_sphere import ContactSphere
+from robots.dvrk.end_effectors.electrode import Electrode
+from robots.dvrk.end_effectors.end_effector import EndEffector
+from robots.dvrk.end_effectors.hand import Hand
+from robots.dvrk.end_effectors.jaw import WRIST_ACCELERATION, WRIST_VELOCITY, Jaw
+from robots.dvrk.end_effectors.musha import HAND
+from robots.dvrk.end_effectors.probe import Probe
+from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
 from robots.serial_chain import Joint, jerk_limit
 from schemas.errors import MotionError, did_you_mean
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
-__all__ = ["SHAFT_RADIUS", "STEEL_DENSITY", "WRIST_RADIUS", "Instrument", "Jaw", "instrument", "instruments"]
+__all__ = ["ROLLING", "SHAFT_RADIUS", "WRIST_RADIUS", "Instrument", "instrument", "instruments"]
 
 SHAFT_RADIUS = 0.0084 / 2
-"""Of the 8 mm instruments (m), as modelled in unina-icaros/dvrk-vrep."""
+"""Radius of the 8 mm instruments (m), as modelled in unina-icaros/dvrk-vrep."""
 
 WRIST_RADIUS = 0.0063 / 2
-"""Of the link between wrist pitch and wrist yaw (m), same source."""
-
-STEEL_DENSITY = 7900.0
-"""Stainless steel 1.4301 (AISI 304), kg/m^3 (EN 10088-1, physical properties: 7.9 kg/dm^3)."""
-
-_WRIST_VELOCITY, _WRIST_ACCELERATION = radians(1080.0), radians(720.0)
-"""rad/s and rad/s^2, of roll, wrist and jaw (jhu-dvrk/sawIntuitiveResearchKit,
-core/components/code/mtsIntuitiveResearchKitPSM.cpp).
-"""
+"""Radius of the link between wrist pitch and wrist yaw (m), same source."""
 
 _JAW_LENGTHS = {
     "006": 0.0102,
@@ -52,58 +49,27 @@ _JAW_LENGTHS = {
     "205": 0.021,
     "309": 0.0155,
 }
-"""From the wrist yaw axis to the end of the jaws (m), by the last digits of the number, which name its type
-(jhu-dvrk/dvrk_model, urdf/common/instruments/tip; the fenestrated bipolar forceps, 205, taken as long as the
-Maryland ones, 172).
+"""Length of jaws from the wrist yaw axis (m), by the last digits of the number, which name its type
+(jhu-dvrk/dvrk_model, urdf/common/instruments/tip; the fenestrated bipolar forceps, 205, taken as long as
+the Maryland ones, 172).
 """
 
 _OTHER_JAW_LENGTH = _JAW_LENGTHS["049"]
-"""Of jaws whose length no public model states (m): that of the Cadiere forceps."""
+"""Length of jaws that no public model states (m): that of the Cadiere forceps."""
 
 _PROBE = "palpation-probe"
 """A steel sphere centred on the tip frame in place of the jaws of a large needle driver 400006."""
 
 _MUSHA = "MUSHA_HAND"
-"""A hand (`robots.dvrk.musha`) on the shaft of a large needle driver 400006."""
+"""The MUSHA hand on the shaft of a large needle driver 400006."""
 
-
-@dataclass(frozen=True)
-class Jaw:
-    """Two fingers about the wrist yaw axis, each turned by half the jaw angle, either way."""
-
-    lower: float
-    """Smallest angle, rad; below 0 the fingers press on each other."""
-    upper: float
-    effort: float
-    """Largest torque, N m."""
-    length: float
-    """From the wrist yaw axis to the end of the fingers, m."""
-    velocity: float = _WRIST_VELOCITY
-    acceleration: float = _WRIST_ACCELERATION
-    jerk: float = jerk_limit(_WRIST_ACCELERATION)
-
-    @property
-    def joint(self) -> Joint:
-        """The angle as a joint."""
-        return Joint(
-            "jaw",
-            "revolute",
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            self.lower,
-            self.upper,
-            self.velocity,
-            self.effort,
-            self.acceleration,
-            self.jerk,
-        )
+ROLLING = "ROLLING_NEEDLE_DRIVER"
+"""A large needle driver 400006 with a rolling jaw."""
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """What is mounted on the arm: joints from the shaft to the wrist, and a tip."""
+    """What is mounted on the arm: joints from the shaft to the wrist, a tip, and an end effector."""
 
     name: str
     number: str
@@ -114,8 +80,7 @@ class Instrument:
     """
     tip: Vector
     """Pose of the tip frame in the frame of the last link, shape (4, 4)."""
-    jaw: Jaw | None
-    """None where there is no jaw: probe, cautery hook and spatula, hand."""
+    end_effector: EndEffector
     actuator_to_joint: Vector
     """Joint positions (roll, wrist pitch, wrist yaw, jaw; with a hand roll and the closings of its fingers)
     of disc positions (rad), shape (4, 4).
@@ -127,10 +92,11 @@ class Instrument:
     """
     pitch_mass: float = 2.491212e-4
     """Mass of the link between wrist pitch and wrist yaw, kg (same file)."""
-    hand: Hand | None = None
-    """In place of wrist and jaw."""
-    roller: Roller | None = None
-    """In the jaw: turns a needle between the fingers."""
+
+    @property
+    def has_wrist(self) -> bool:
+        """Whether there are joints between the shaft's roll and the end effector."""
+        return len(self.joints) > 1
 
     @property
     def has_snake_wrist(self) -> bool:
@@ -138,25 +104,19 @@ class Instrument:
         return len(self.joints) > 3
 
     @property
-    def jaw_joints(self) -> tuple[Joint, ...]:
-        """Joints that are commanded of the jaw: its angle and, with a roller, the needle's.
+    def jaw(self) -> Jaw | None:
+        """The end effector, if it is a jaw, for what only a jaw can do: grasp a needle, a ring."""
+        return self.end_effector if isinstance(self.end_effector, Jaw) else None
 
-        They are empty without a jaw.
-        """
-        return (
-            ()
-            if self.jaw is None
-            else (self.jaw.joint,)
-            if self.roller is None
-            else (self.jaw.joint, self.roller.joint)
-        )
+    @property
+    def jaw_joints(self) -> tuple[Joint, ...]:
+        """Joints of the jaw; empty without one."""
+        return () if self.jaw is None else self.jaw.joints
 
     @cached_property
     def spheres(self) -> tuple[ContactSphere, ...]:
-        """What touches tissue; empty without a jaw, and for a palpation probe, which is a sphere itself."""
-        if self.hand is not None:
-            return self.hand.spheres
-        return () if self.jaw is None else on_jaw(self.jaw.length, self.tip[:3, 2])
+        """The spheres that touch tissue; none of a palpation probe, whose own sphere does."""
+        return self.end_effector.spheres(self.tip)
 
 
 def instrument(name: str) -> Instrument:
@@ -178,18 +138,12 @@ def instruments() -> Mapping[str, Instrument]:
     data = json.loads(files("robots.dvrk").joinpath("data/instruments.json").read_text(encoding="utf-8"))
     made = {name: _from_data(name, row, data) for name, row in data["instruments"].items()}
     driver = made["LARGE_NEEDLE_DRIVER_400006"]
-    made[_PROBE] = Instrument(
-        _PROBE, "", driver.joints, driver.tip, None, driver.actuator_to_joint, driver.source
-    )
+    made[_PROBE] = replace(driver, name=_PROBE, number="", end_effector=Probe())
     made[_MUSHA] = _with_hand(_MUSHA, HAND, driver)
-    source = f"{driver.source}; robots.dvrk.rolling_needle_driver"
-    made[ROLLING] = replace(
-        driver,
-        name=ROLLING,
-        number="",
-        source=source,
-        roller=None if driver.jaw is None else roller(driver.jaw.effort),
-    )
+    source = f"{driver.source}; robots.dvrk.end_effectors.rolling_jaw"
+    row = data["instruments"][driver.name]
+    rolling = RollingJaw(*_jaw_numbers(driver.number, row, driver.actuator_to_joint))
+    made[ROLLING] = replace(driver, name=ROLLING, number="", source=source, end_effector=rolling)
     return MappingProxyType(made)
 
 
@@ -207,10 +161,9 @@ def _with_hand(name: str, hand: Hand, shaft: Instrument) -> Instrument:
         "",
         shaft.joints[:1],
         tip,
-        None,
+        hand,
         coupling,
-        f"{shaft.source} (shaft); robots.dvrk.musha",
-        hand=hand,
+        f"{shaft.source} (shaft); robots.dvrk.end_effectors.musha",
     )
 
 
@@ -226,17 +179,30 @@ def _by_number() -> Mapping[str, Instrument]:
 
 def _from_data(name: str, row: dict[str, Any], data: dict[str, Any]) -> Instrument:
     number = next(word for word in name.split("_") if word.isdigit() and len(word) == 6)
-    lower, upper, effort = row["jaw"]
-    jaw = Jaw(lower, upper, effort, _JAW_LENGTHS.get(number[3:], _OTHER_JAW_LENGTH)) if effort else None
-    tip = np.vstack([data["tips"][row["tip"]], [0.0, 0.0, 0.0, 1.0]])
     coupling = np.array(data["actuator_to_joint"][row["actuator_to_joint"]])
+    jaw = Jaw(*_jaw_numbers(number, row, coupling))
     return Instrument(
-        name, number, tuple(_joint(*cells) for cells in row["joints"]), tip, jaw, coupling, row["source"]
+        name,
+        number,
+        tuple(_joint(*cells) for cells in row["joints"]),
+        np.vstack([data["tips"][row["tip"]], [0.0, 0.0, 0.0, 1.0]]),
+        jaw if jaw.effort else Electrode(),
+        coupling,
+        row["source"],
     )
+
+
+def _jaw_numbers(
+    number: str, row: dict[str, Any], coupling: Vector
+) -> tuple[float, float, float, float, float]:
+    """Return the numbers of the jaw that `row` describes, in the order of the fields of `Jaw`."""
+    lower, upper, effort = row["jaw"]
+    share = plain_sum(turn**2 for turn in disc_shares(coupling)[:, JAW_COLUMN].tolist())
+    return lower, upper, effort, _JAW_LENGTHS.get(number[3:], _OTHER_JAW_LENGTH), share
 
 
 def _joint(
     name: str, alpha: float, a: float, d: float, theta: float, lower: float, upper: float, effort: float
 ) -> Joint:
-    limits = (_WRIST_VELOCITY, effort, _WRIST_ACCELERATION, jerk_limit(_WRIST_ACCELERATION))
+    limits = (WRIST_VELOCITY, effort, WRIST_ACCELERATION, jerk_limit(WRIST_ACCELERATION))
     return Joint(name, "revolute", radians(alpha), a, d, radians(theta), lower, upper, *limits)

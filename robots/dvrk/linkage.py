@@ -96,7 +96,7 @@ PSM = Linkage(
 )
 """The counterweight runs in the column (0.043 m beside the instrument's axis, dvrk_env) by the insertion's
 cable: as far up as the instrument goes down (the model of Fontanelli et al., IROS 2017, has it so); its
-height is an assumption without effect on the dynamics at pitch 0, see `robots.dvrk.inertia`.
+height is an assumption without effect on the dynamics at pitch 0, see `robots.dvrk.arm_bodies`.
 """
 
 # ECM (dvrk_env ecm.urdf.xacro). There the front link drives, and the back one guides the lower bar.

@@ -6,7 +6,8 @@ SI units, radians.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Self
@@ -22,10 +23,14 @@ from pydantic import (
 )
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
-from robots.dvrk import drives, ecm, inertia, psm
-from robots.dvrk.drives import Disc, Drive
-from robots.dvrk.inertia import PROBE_RADIUS, Inertia
+from robots.dvrk import arm_bodies, drives, ecm, psm
+from robots.dvrk.drive import Disc, Drive
+from robots.dvrk.end_effectors.contact_sphere import ContactSphere
+from robots.dvrk.end_effectors.end_effector import EndEffector, Mount
+from robots.dvrk.end_effectors.probe import PROBE_RADIUS, Probe
+from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import Instrument, instrument
+from robots.dvrk.link import Link
 from robots.dvrk.own_dynamics import JAW, OwnDynamics
 from robots.dvrk.parameters import (
     FOLDED,
@@ -36,6 +41,7 @@ from robots.dvrk.parameters import (
     UnitQuaternion,
     check_start,
     home,
+    start_positions,
 )
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
@@ -72,6 +78,26 @@ class MountedArm(BaseModel):
     @abstractmethod
     def chain(self) -> SerialChain:
         """The arm's kinematics."""
+
+    @property
+    def end_effector(self) -> EndEffector:
+        """What stands at the end of what the arm holds; nothing moves at that of an endoscope."""
+        return EndEffector()
+
+    @property
+    def end_effector_start(self) -> tuple[float, ...]:
+        """Positions of the end effector's joints at time 0."""
+        return ()
+
+    @cached_property
+    def end_effector_links(self) -> tuple[Link, ...]:
+        """Moving links of the end effector, parents before children."""
+        return self.end_effector.links(Mount.on(self.chain))
+
+    @property
+    def spheres(self) -> tuple[ContactSphere, ...]:
+        """Spheres with which the arm touches tissue."""
+        return ()
 
     @property
     @abstractmethod
@@ -117,7 +143,7 @@ class MountedArm(BaseModel):
 
     @cached_property
     def drives(self) -> Mapping[str, Drive]:
-        """The drives by joint, those of jaw or hand included."""
+        """The drives by joint, those of the end effector by motor."""
         published = self._published[1]
         return published if self._own is None else self._own.drives_of(published)
 
@@ -143,9 +169,24 @@ class PsmTool(BaseModel):
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
 
     @property
-    def fingers(self) -> HandPositions:
-        """Closings, then spreads, of a hand's fingers at time 0: folded."""
-        return FOLDED
+    def _stated(self) -> Mapping[str, Sequence[float]]:
+        """Positions at time 0 by the name of the end effector that they are for."""
+        return {"jaw": (self.jaw,)}
+
+    @property
+    def end_effector(self) -> EndEffector:
+        """The instrument's end effector."""
+        return self.tool.end_effector
+
+    @property
+    def end_effector_start(self) -> tuple[float, ...]:
+        """Positions of the end effector's joints at time 0."""
+        return start_positions(self.end_effector, self._stated)
+
+    @property
+    def spheres(self) -> tuple[ContactSphere, ...]:
+        """Spheres with which the instrument touches tissue."""
+        return self.tool.spheres
 
     @cached_property
     def tool(self) -> Instrument:
@@ -159,7 +200,7 @@ class PsmTool(BaseModel):
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start, self.tool, self.jaw, self.fingers)
+        check_start(self.chain, self.start, self.end_effector, self._stated)
         return self
 
 
@@ -174,6 +215,13 @@ class MountedPsm(PsmTool, MountedArm):
         description="closings, then spreads, of a hand's fingers at time 0; default: folded",
     )
 
+    @cached_property
+    def tool(self) -> Instrument:
+        """The instrument's numbers; a palpation probe has the radius that the scene states."""
+        tool = super().tool
+        is_probe = isinstance(tool.end_effector, Probe)
+        return replace(tool, end_effector=Probe(self.probe_radius)) if is_probe else tool
+
     @property
     def _driven(self) -> list[str]:
         jaw = [] if self.tool.jaw is None else [JAW]
@@ -181,13 +229,11 @@ class MountedPsm(PsmTool, MountedArm):
 
     @property
     def _published(self) -> _Published:
-        tool = self.tool
-        return inertia.psm(tool, self.probe_radius), drives.psm(tool), drives.discs(tool)
+        return arm_bodies.psm(self.tool), drives.psm(self.tool), drives.discs(self.tool)
 
     @property
-    def fingers(self) -> HandPositions:
-        """Closings, then spreads, of a hand's fingers at time 0."""
-        return self.hand
+    def _stated(self) -> Mapping[str, Sequence[float]]:
+        return {**super()._stated, "hand": self.hand}
 
 
 class MountedEcm(MountedArm):
@@ -214,11 +260,11 @@ class MountedEcm(MountedArm):
 
     @property
     def _published(self) -> _Published:
-        return inertia.ecm(), drives.ECM, ()
+        return arm_bodies.ecm(), drives.ECM, ()
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start)
+        check_start(self.chain, self.start, self.end_effector, {})
         return self
 
 

@@ -17,7 +17,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from ruamel.yaml import YAML, YAMLError
 
-from robots.dvrk.drives import FINGERS, SMOOTHING, Disc, Drive
+from robots.dvrk.drive import SMOOTHING, Disc, Drive
+from robots.dvrk.end_effectors.jaw import FINGERS
 from robots.dvrk.inertia import Inertia
 from schemas.errors import MotionError
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import repeat
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, WithJsonSchema
 
 from robots.dvrk import psm, setup_joints
-from robots.dvrk.instruments import Instrument, instrument
+from robots.dvrk.end_effectors.end_effector import EndEffector
+from robots.dvrk.instruments import instrument
 from robots.limits import ANGLE_TOLERANCE, distinct
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
@@ -26,6 +28,7 @@ __all__ = [
     "check_start",
     "home",
     "settable",
+    "start_positions",
 ]
 
 ArmName = Literal["PSM1", "PSM2", "PSM3"]
@@ -72,7 +75,7 @@ EcmPositions = tuple[Angle, Angle, Length, Angle]
 """Positions of the ECM's four joints (rad, m)."""
 
 SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
-"""Of the setup joints that carry one arm: the lift (m), then five angles."""
+"""Positions of the setup joints that carry one arm: the lift (m), then five angles."""
 
 MountedPositions = tuple[Angle, Angle, Length, Angle] | tuple[Angle, Angle, Length, Angle, Angle, Angle]
 """Positions of a PSM's joints (rad, m), as many as it has with its instrument: four with a hand, else six."""
@@ -96,39 +99,35 @@ def home(arm: dict[str, Any]) -> MountedPositions:
 def check_start(
     chain: SerialChain,
     start: Sequence[float],
-    tool: Instrument | None = None,
-    jaw: float = 0.0,
-    hand: Sequence[float] = (),
+    end_effector: EndEffector,
+    given: Mapping[str, Sequence[float]],
 ) -> None:
-    """Raise ValueError, as pydantic's validators do, for what is outside its range.
+    """Raise ValueError, as pydantic's validators do, for positions out of range.
 
     Args:
         chain: the arm's kinematics.
         start: its joint positions, shape (n,).
-        tool: what it holds.
-        jaw: opening of the tool's jaw, rad.
-        hand: closings, then spreads, of the tool's fingers, rad.
+        end_effector: what the arm moves at its tip.
+        given: positions that the scenario states for joints of end effectors, by the effector's name.
     """
     try:
         chain.check(np.array(start, np.float64))
     except MotionError as error:
         raise ValueError(str(error)) from error
-    range_ = tool.jaw if tool is not None else None
-    if range_ is None and jaw:
-        raise ValueError(f"jaw at {jaw:g} rad, but what the arm holds has no jaw; leave it out")
-    if range_ is not None and not _inside(jaw, range_.lower, range_.upper):
-        value, lower, upper = distinct(jaw, range_.lower, range_.upper)
-        raise ValueError(f"jaw at {value} rad, allowed are {lower} .. {upper}")
-    joints = tool.hand.joints if tool is not None and tool.hand is not None else ()
-    if not joints and any(hand):
-        raise ValueError("closings of a hand, but what the arm holds is none; leave them out")
-    for joint, closing in zip(joints, hand, strict=bool(joints)):
-        if not _inside(closing, joint.lower, joint.upper):
-            raise ValueError(joint.refusal(closing))
+    for name, positions in given.items():
+        if name != end_effector.name and any(positions):
+            values = ", ".join(f"{position:g}" for position in positions)
+            raise ValueError(f"{name} at {values} rad, but the arm's instrument has no {name}; leave it out")
+    positions = start_positions(end_effector, given)
+    for joint, position in zip(end_effector.joints, positions, strict=True):
+        if not joint.lower - ANGLE_TOLERANCE <= position <= joint.upper + ANGLE_TOLERANCE:
+            raise ValueError(joint.refusal(position))
 
 
-def _inside(angle: float, lower: float, upper: float) -> bool:
-    return lower - ANGLE_TOLERANCE <= angle <= upper + ANGLE_TOLERANCE
+def start_positions(end_effector: EndEffector, given: Mapping[str, Sequence[float]]) -> tuple[float, ...]:
+    """Return the positions of all joints of an end effector at time 0; 0 where the scenario states none."""
+    count = len(end_effector.joints)
+    return (*given.get(end_effector.name, ()), *repeat(0.0, count))[:count]
 
 
 def settable(arm: setup_joints.CartArm) -> AfterValidator:

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.dvrk import held_needle, psm, stitch
-from robots.dvrk.contact_spheres import FINGER_HALF_WIDTH
+from robots.dvrk.end_effectors.contact_sphere import FINGER_HALF_WIDTH
 from robots.dvrk.held_needle import Needle
-from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS, Instrument, instrument
-from robots.dvrk.rolling_needle_driver import NAME
+from robots.dvrk.instruments import ROLLING, SHAFT_RADIUS, WRIST_RADIUS, Instrument, instrument
 from robots.dvrk.stitch import Stitch
 from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
@@ -91,7 +90,7 @@ def study(stitches: tuple[Stitch, ...] | None = None, needle: Needle | None = No
     stitches, needle, tool = (
         stitch.lattice() if stitches is None else stitches,
         needle or Needle(),
-        instrument(NAME),
+        instrument(ROLLING),
     )
     rolls = held_needle.rolls(held_needle.chain(tool, needle, 0.0))
     constant, rolling = np.zeros((len(stitches), len(rolls)), bool), np.zeros(len(stitches), bool)

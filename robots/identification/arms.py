@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from robots.dvrk import drives, ecm, inertia, linkage, psm
-from robots.dvrk.drives import FINGERS, Drive
+from robots.dvrk import arm_bodies, drives, ecm, linkage, psm
+from robots.dvrk.drive import Disc, Drive
+from robots.dvrk.end_effectors.jaw import FINGERS
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import Instrument
 from robots.dvrk.linkage import Linkage
@@ -44,7 +45,7 @@ class IdentifiedArm(NamedTuple):
     joints: tuple[Joint, ...]
     drives: Mapping[str, Drive]
     """Published, by joint."""
-    discs: tuple[drives.Disc, ...]
+    discs: tuple[Disc, ...]
     """Published; the shares are of these joints."""
     start: tuple[float, ...]
     """Home position of the arm, jaw half open; rad and m, shape (n,)."""
@@ -52,7 +53,7 @@ class IdentifiedArm(NamedTuple):
 
 def of_psm(tool: Instrument, *, jaw: bool = False) -> IdentifiedArm:
     """Return a PSM with `tool`; `jaw`: the jaw is a joint too, otherwise at rest."""
-    chain, bodies, driven = psm.chain(tool), inertia.psm(tool), dict(drives.psm(tool))
+    chain, bodies, driven = psm.chain(tool), arm_bodies.psm(tool), dict(drives.psm(tool))
     joints, discs, start = chain.joints, drives.discs(tool), psm.home(tool)
     if jaw and tool.jaw is not None:
         # below 0 the fingers press on each other
@@ -83,7 +84,7 @@ def of_ecm() -> IdentifiedArm:
         tool="endoscope",
         chain=chain,
         bars=linkage.ECM,
-        bodies=inertia.ecm(),
+        bodies=arm_bodies.ecm(),
         carried={},
         joints=chain.joints,
         drives=drives.ECM,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robots.dvrk.drives import SMOOTHING
+from robots.dvrk.drive import SMOOTHING
 from robots.identification.linear_model import FrictionShape, LinearModel
 from schemas.vectors import Vector
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robots.dvrk.drives import SMOOTHING
+from robots.dvrk.drive import SMOOTHING
 from robots.dvrk.dynamics import Dynamics
 from robots.identification.arms import IdentifiedArm
 from schemas.vectors import Vector

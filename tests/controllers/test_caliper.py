@@ -13,7 +13,7 @@ from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine, run_in_process
-from robots.dvrk.musha import HAND
+from robots.dvrk.end_effectors.musha import HAND
 from schemas.errors import SessionError, StateError
 from schemas.ros import Header
 from schemas.trocar_msgs import SoftBodyState

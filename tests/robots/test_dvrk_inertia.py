@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.dvrk import drives, dynamics, identified, inertia
+from robots.dvrk import arm_bodies, drives, dynamics, identified
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import instrument, instruments
 from schemas.errors import MotionError
@@ -57,7 +57,7 @@ def test_the_bodies_fit_better_than_asked():
 
 @pytest.mark.parametrize("tool", [name for name in instruments() if "GEARED" not in name])
 def test_every_body_is_one_that_can_be(tool):
-    for name, body in {**inertia.psm(instrument(tool)), **inertia.ecm()}.items():
+    for name, body in {**arm_bodies.psm(instrument(tool)), **arm_bodies.ecm()}.items():
         moments = np.linalg.eigvalsh(body.tensor)
         assert body.mass > 0.0, name
         assert moments[0] > 0.0, name
@@ -66,7 +66,7 @@ def test_every_body_is_one_that_can_be(tool):
 
 
 def test_a_needle_driver_moves_as_much_mass_as_was_identified():
-    masses = {name: body.mass for name, body in inertia.psm(NEEDLE_DRIVER).items()}
+    masses = {name: body.mass for name, body in arm_bodies.psm(NEEDLE_DRIVER).items()}
     moving = sum(
         masses[name] for name in ("insertion", "roll", "wrist_pitch", "wrist_yaw", "jaw_left", "jaw_right")
     )
@@ -128,12 +128,8 @@ def test_a_rod_and_a_box_weigh_what_they_should():
 def test_every_instrument_has_drives_for_all_it_moves(tool):
     tool = instrument(tool)
     found = drives.psm(tool)
-    grasping = drives.FINGERS if tool.jaw else (*tool.hand.fingers, *tool.hand.spreads) if tool.hand else ()
-    rolling = {"roller"} if tool.roller else set()
-    assert (
-        set(found)
-        == {"yaw", "pitch", "insertion", *(joint.name for joint in tool.joints), *grasping} | rolling
-    )
+    motors = {motor.name for motor in tool.end_effector.motors}
+    assert set(found) == {"yaw", "pitch", "insertion", *(joint.name for joint in tool.joints), *motors}
     assert all(
         drive.stiffness > 0 and drive.damping > 0 and drive.effort > 0 and drive.velocity > 0
         for drive in found.values()

@@ -30,7 +30,7 @@ def test_the_jaw_is_where_the_standard_needle_driver_has_it():
     frames = CHAIN.frames(q)
     assert np.allclose(frames[5, :3, 3], driver.frames(q[:6])[5, :3, 3], atol=1e-15)
     assert np.allclose(
-        frames[6, :3, 3], (driver.forward(q[:6]) @ [0.0, 0.0, TOOL.roller.distance, 1.0])[:3], atol=1e-15
+        frames[6, :3, 3], (driver.forward(q[:6]) @ [0.0, 0.0, TOOL.jaw.distance, 1.0])[:3], atol=1e-15
     )
 
 
@@ -38,7 +38,7 @@ def test_rolling_turns_the_needle_about_its_tangent_in_the_jaw_and_leaves_the_he
     q = np.array([*psm.HOME, 0.0])
     tip = psm.chain(TOOL).forward(q[:6])
     straight = CHAIN.forward(q)
-    grip = tip @ [0.0, 0.0, TOOL.roller.distance, 1.0]
+    grip = tip @ [0.0, 0.0, TOOL.jaw.distance, 1.0]
     for roll in np.radians([-90.0, -30.0, 45.0, 90.0]):
         rolled = CHAIN.forward(np.array([*psm.HOME, roll]))
         assert np.allclose(wire(rolled, HELD), grip[:3], atol=1e-15)
@@ -49,7 +49,7 @@ def test_rolling_turns_the_needle_about_its_tangent_in_the_jaw_and_leaves_the_he
 
 def test_ahead_forehand_and_backhand():
     tip = psm.chain(TOOL).forward(np.array(psm.HOME))
-    ahead, grip = tip[:3, 2], (tip @ [0.0, 0.0, TOOL.roller.distance, 1.0])[:3]
+    ahead, grip = tip[:3, 2], (tip @ [0.0, 0.0, TOOL.jaw.distance, 1.0])[:3]
     poses = {roll: CHAIN.forward(np.array([*psm.HOME, np.radians(roll)])) for roll in (-90.0, 0.0, 90.0)}
     assert (poses[0.0][:3, 3] - grip) @ ahead == pytest.approx(NEEDLE.radius)
     assert poses[-90.0][:3, 2] @ ahead == pytest.approx(1.0)

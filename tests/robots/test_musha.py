@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robots.dvrk import arms
+from robots.dvrk.end_effectors.musha import HAND, TROCAR_RADIUS
 from robots.dvrk.inverse import inverse
-from robots.dvrk.musha import HAND, TROCAR_RADIUS
 from schemas.errors import MotionError
 
 PULLEYS = np.array([phalanx.pulley for phalanx in HAND.phalanges])
@@ -58,12 +58,12 @@ def test_contacts_are_where_the_links_are():
     q = np.random.default_rng(1).uniform(-1.0, 1.0, (3, 3))
     found = HAND.contacts(q)
     poses = {"roll": np.eye(4)}
-    at_zero = {"roll": np.eye(4), **{link.name: link.pose for link in HAND.links}}
-    for i, link in enumerate(HAND.links):
+    at_zero = {"roll": np.eye(4), **{link.name: link.pose for link in HAND.bones}}
+    for i, link in enumerate(HAND.bones):
         c, s = np.cos(q.ravel()[i]), np.sin(q.ravel()[i])
         turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
         poses[link.name] = poses[link.parent] @ np.linalg.inv(at_zero[link.parent]) @ link.pose @ turn
-        sphere = HAND.spheres[i]
+        sphere = HAND.spheres(np.eye(4))[i]
         assert np.allclose(
             (poses[link.name] @ [*sphere.position, 1.0])[:3], found.reshape(-1, 3)[i], atol=1e-15
         )

@@ -150,13 +150,8 @@ def _simulated_arm(arm: CartArm, mounted: MountedPsm | MountedEcm, reference: st
     for ratio in ("ratio", "ratio_v", "ratio_a"):
         yield _state(arm, f"trajectory_j/{ratio}", Float64Message.ros_type)
     yield from (Row(f"/{arm}/{name}", type_, "serve", owner=arm) for name, type_ in _SERVICES.items())
-    if isinstance(mounted, MountedPsm) and (mounted.tool.jaw is not None or mounted.tool.hand is not None):
-        gripper, driven = (
-            ("jaw", mounted.tool.jaw_joints)
-            if mounted.tool.hand is None
-            else ("hand", mounted.tool.hand.joints)
-        )
-        grasping = tuple(joint.name for joint in driven)
+    if grasping := tuple(joint.name for joint in mounted.end_effector.joints):
+        gripper = mounted.end_effector.name
         yield from _joint_states(arm, f"{gripper}/", grasping)
         gripper_commands = {f"{gripper}/{name}": type_ for name, type_ in crtk.GRIPPER_COMMANDS.items()}
         yield from _events_and_commands(arm, {}, gripper_commands, grasping)

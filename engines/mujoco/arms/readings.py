@@ -1,8 +1,9 @@
-"""What the arms report, out of the model's sensors."""
+"""Joint states and poses that the arms report, out of the model's sensors."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import groupby
 
 import mujoco
 import numpy as np
@@ -10,24 +11,18 @@ from numpy.typing import NDArray
 
 from engines.mujoco.arms.motors import Motors
 from engines.mujoco.arms.servos import Servos
-from engines.mujoco.model import FINGERS, first_sensor
+from engines.mujoco.model import first_sensor
+from engines.mujoco.model.end_effector import sensed_motors
 from engines.mujoco.model.poses import ROS_ORDER
-from engines.mujoco.params import has_jaw
-from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.end_effectors.end_effector import EndEffector
+from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
 __all__ = ["Readings"]
 
-_JAW = np.array(
-    [[1.0, 1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.5, 0.5]]
-)
-"""From those of its two fingers to position, velocity and effort of a jaw: opened by both, with the torque of
-either.
-"""
-_ROLLING_JAW = np.zeros((6, 9))
-"""From those of the two fingers and the roller to those of the jaw and the roller, alternating."""
-_ROLLING_JAW[::2, :6], _ROLLING_JAW[1::2, 6:] = _JAW, np.eye(3)
+_EFFORT = 2
+"""Place of efforts in a joint state, after positions and velocities."""
 
 
 class Readings:
@@ -51,7 +46,7 @@ class Readings:
         self._sensors = data.sensordata
         self._qpos = np.empty(model.nq if positions is None else len(positions))
         self._positions = data.qpos
-        self._jaws: list[tuple[Vector, Vector, Vector]] = []
+        self._end_effectors: list[tuple[Vector, Vector, Vector]] = []
         self._motors = Motors(model, data) if weighs else None
         poses: list[NDArray[np.intp]] = []
         self._poses = np.empty(7 * len(arms))
@@ -64,28 +59,37 @@ class Readings:
                 self.outputs[f"{arm}/measured_js"] = self._motors.add(arm, params, measured)
             self.outputs[f"{arm}/setpoint_js"] = servos.arm_setpoint(arm)
             self.outputs[f"{arm}/measured_cp"] = self._poses[7 * i : 7 * i + 7]
-            if isinstance(params, MountedPsm) and has_jaw(params):
-                fingers = int(model.sensor(f"{arm}/position/{FINGERS[0]}").adr[0])
-                jaw = self.outputs[f"{arm}/jaw/measured_js"] = np.empty(3 * len(params.tool.jaw_joints))
-                matrix = _JAW if params.tool.roller is None else _ROLLING_JAW
-                self._jaws.append((matrix, self._sensors[fingers : fingers + matrix.shape[1]], jaw))
-            elif isinstance(params, MountedPsm) and (hand := params.tool.hand) is not None:
-                fingers, k, m = (
-                    int(model.sensor(f"{arm}/position/{hand.fingers[0]}").adr[0]),
-                    3 * len(hand.joints),
-                    3 * len(hand.links),
-                )
-                self.outputs[f"{arm}/hand/measured_js"] = self._sensors[fingers : fingers + k]
-                self.outputs[f"{arm}/hand/phalanges/measured_js"] = self._sensors[
-                    fingers + k : fingers + k + m
-                ]
+            self._add_end_effector(model, arm, params)
         self._where = np.concatenate(poses)
         self.update()
 
+    def _add_end_effector(self, model: mujoco.MjModel, arm: str, params: MountedArm) -> None:
+        """Report the joints of an end effector, and its links that are read by themselves."""
+        effector = params.end_effector
+        if not effector.joints:
+            return
+        to_joints = _to_joints(effector)
+        count = to_joints.shape[1]
+        first = next(name for group in sensed_motors(effector) for name in group)
+        at = int(model.sensor(f"{arm}/position/{first}").adr[0])
+        sensed, port = self._sensors[at : at + count], f"{arm}/{effector.name}/measured_js"
+        if np.array_equal(to_joints, np.eye(count)):
+            self.outputs[port] = sensed
+        else:
+            self.outputs[port] = joints = np.empty(len(to_joints))
+            self._end_effectors.append((to_joints, sensed, joints))
+        at += count
+        for reading, links in groupby(params.end_effector_links, lambda link: link.reading):
+            if reading:
+                size = 3 * len(list(links))
+                port = f"{arm}/{effector.name}/{reading}/measured_js"
+                self.outputs[port] = self._sensors[at : at + size]
+                at += size
+
     def update(self) -> None:
         """Update what is due in every step."""
-        for matrix, fingers, jaw in self._jaws:
-            matrix.dot(fingers, jaw)
+        for to_joints, sensed, joints in self._end_effectors:
+            to_joints.dot(sensed, joints)
         if self._motors is not None:
             self._motors.update()
 
@@ -96,3 +100,21 @@ class Readings:
             self._qpos[:] = self._positions
         else:
             self._whole.dot(self._positions, self._qpos)
+
+
+def _to_joints(effector: EndEffector) -> Vector:
+    """Return the matrix from the sensors of an end effector's motors to its joint state.
+
+    The joint state has positions, velocities and efforts of all joints. Positions of motors that serve one
+    joint add up; efforts do by the motors' shares, so that their work is that of the joint.
+    """
+    joints = [joint.name for joint in effector.joints]
+    columns: list[Vector] = []
+    for group in sensed_motors(effector):
+        for quantity in range(3):
+            for motor in group.values():
+                column = np.zeros(3 * len(joints))
+                row = quantity * len(joints) + joints.index(motor.joint)
+                column[row] = motor.share if quantity == _EFFORT else 1.0
+                columns.append(column)
+    return np.column_stack(columns)

@@ -1,25 +1,23 @@
 """The drives of all arms of a scene: commands in, inputs of MuJoCo's servos out.
 
-All joints and jaws of all arms stand in one vector, in the order of the arms: joints, then the jaw if there
-is one. The setpoints follow the commands at most as fast as joints and jaws may move, so no command, however
-it jumps, closes a jaw through an object between its fingers. One matrix product gives the inputs of the
+All joints of all arms stand in one vector, in the order of the arms: the arm's, then those of its end
+effector. The setpoints follow the commands at most as fast as joints may move, so no command, however it
+jumps, closes a jaw through an object between its fingers. One matrix product gives the inputs of the
 servos: position, its slope as velocity, and a feed-forward effort.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from engines.mujoco.arms.friction import Friction
-from engines.mujoco.model import FINGERS
 from hub.participant import Inputs
-from robots.dvrk.instruments import Jaw
 from robots.dvrk.mounted import MountedEcm, MountedPsm
-from robots.dvrk.rolling_needle_driver import PADS, ROLLER
 from robots.dvrk.setup_joints import CartArm
 from robots.serial_chain import Joint
 from schemas.errors import SessionError
@@ -35,25 +33,34 @@ docs/decisions/0010.
 """
 
 _Row = tuple[float, float, float, float]
-"""Of a drive: start, lower and upper limit, velocity."""
+"""Start, lower and upper limit, velocity of a joint."""
 _Share = tuple[int, int, float]
-"""Actuator, drive, and the actuator's share of the drive's position."""
+"""Actuator, joint, and the actuator's share of the joint's position."""
+
+
+class _Axes(NamedTuple):
+    """Joints that are commanded together, where they start, and what serves them."""
+
+    joints: Sequence[Joint]
+    start: Sequence[float]
+    motors: Sequence[tuple[str, str, float]]
+    """Name of a motor, of the joint that it serves, and its share of the joint's position."""
 
 
 @dataclass
 class _Group:
-    """What is commanded through one pair of ports: the joints of an arm, or its jaw."""
+    """Joints commanded through one pair of ports: those of an arm, or of its end effector."""
 
     arm: str
-    part: slice
-    """In the vectors of all drives."""
-    actuators: list[int]
-    bodies: list[int]
-    """Whose weight its controller bears."""
     ports: str
-    """Its ports' names up to `servo_jp` and `servo_jf`."""
-    weighed: list[int]
-    """Those of `bodies` whose weight the real controller bears: the endoscope. Springs and weights balance
+    """Names of its ports up to `servo_jp` and `servo_jf`."""
+    bodies: list[int]
+    """Bodies whose weight its controller bears."""
+    part: slice = field(default_factory=lambda: slice(0))
+    """Place in the vectors of all joints."""
+    actuators: list[int] = field(default_factory=list[int])
+    weighed: list[int] = field(default_factory=list[int])
+    """Of `bodies`, those whose weight the real controller bears: the endoscope. Springs and weights balance
     all else.
     """
     mode: float = _POSITION
@@ -75,11 +82,19 @@ class Servos:
         rows: list[_Row] = []
         shares: list[_Share] = []
         for arm, params in arms.items():
-            self._add_joints(arm, f"{arm}/", params.chain.joints, params.start, rows, shares)
-            if isinstance(params, MountedPsm) and params.tool.jaw is not None:
-                self._add_jaw(arm, params, params.tool.jaw, rows, shares)
-            elif isinstance(params, MountedPsm) and (hand := params.tool.hand) is not None:
-                self._add_joints(arm, f"{arm}/hand/", hand.joints, params.hand, rows, shares)
+            effector = params.end_effector
+            grasping = {f"{arm}/{link.name}" for link in params.end_effector_links}
+            own = [i for i in range(model.nbody) if model.body(i).name.startswith(f"{arm}/")]
+            fixed = [i for i in own if model.body(i).name not in grasping]
+            joints = params.chain.joints
+            alone = [(joint.name, joint.name, 1.0) for joint in joints]
+            axes = _Axes(joints, params.start, alone)
+            self._add_group(_Group(arm, f"{arm}/", fixed), axes, rows, shares)
+            if effector.joints:
+                motors = [(motor.name, motor.joint, motor.share) for motor in effector.motors]
+                axes = _Axes(effector.joints, params.end_effector_start, motors)
+                moving = [i for i in own if i not in fixed]
+                self._add_group(_Group(arm, f"{arm}/{effector.name}/", moving), axes, rows, shares)
         start, self._lower, self._upper, speed = np.array(rows).T.copy()
         n = start.size
         self._inputs = np.concatenate([start, start, np.zeros(n)])
@@ -104,46 +119,20 @@ class Servos:
         np.multiply(self._springs, start - self._rest, out=self._effort)
         self._layout.dot(self._inputs, data.ctrl)
 
-    def _add_joints(
-        self,
-        arm: str,
-        ports: str,
-        joints: Sequence[Joint],
-        start: Sequence[float],
-        rows: list[_Row],
-        shares: list[_Share],
-    ) -> None:
-        """Add joints that have a drive each."""
-        self._add_group(arm, ports, [joint.name for joint in joints], len(rows), len(joints))
-        shares += [(actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)]
+    def _add_group(self, group: _Group, axes: _Axes, rows: list[_Row], shares: list[_Share]) -> None:
+        """Add joints that are commanded together, and the motors that serve them."""
+        model, first = self._model, len(rows)
+        places = {joint.name: first + i for i, joint in enumerate(axes.joints)}
+        for motor, joint, share in axes.motors:
+            group.actuators.append(model.actuator(f"{group.arm}/{motor}").id)
+            shares.append((group.actuators[-1], places[joint], share))
         rows += [
-            (q, joint.lower, joint.upper, joint.velocity) for q, joint in zip(start, joints, strict=True)
+            (q, joint.lower, joint.upper, joint.velocity)
+            for q, joint in zip(axes.start, axes.joints, strict=True)
         ]
-
-    def _add_jaw(
-        self, arm: str, params: MountedPsm, jaw: Jaw, rows: list[_Row], shares: list[_Share]
-    ) -> None:
-        """Add a jaw, whose two fingers share one drive, and the roller in it."""
-        self._add_group(arm, f"{arm}/jaw/", list(FINGERS), len(rows), 1)
-        group = self._groups[-1]
-        shares += [(actuator, len(rows), 0.5) for actuator in group.actuators]
-        rows.append((params.jaw, jaw.lower, jaw.upper, jaw.velocity))
-        if (roller := params.tool.roller) is not None:
-            group.part = slice(len(rows) - 1, len(rows) + 1)
-            group.actuators.append(self._model.actuator(f"{arm}/{ROLLER}").id)
-            shares.append((group.actuators[-1], len(rows), 1.0))
-            rows.append((0.0, roller.joint.lower, roller.joint.upper, roller.joint.velocity))
-
-    def _add_group(self, arm: str, ports: str, joints: list[str], first: int, count: int) -> None:
-        model = self._model
-        actuators = [model.actuator(f"{arm}/{joint}").id for joint in joints]
-        grasps = ports != f"{arm}/"
-        # those of a jaw with its pads, and the phalanges of a hand
-        grasping = tuple(f"{arm}/{finger}" for finger in (*FINGERS, *PADS, "finger"))
-        own = [i for i in range(model.nbody) if model.body(i).name.startswith(f"{arm}/")]
-        bodies = [i for i in own if model.body(i).name.startswith(grasping) == grasps]
-        weighed = [i for i in bodies if model.body(i).name == "ECM/roll"]
-        self._groups.append(_Group(arm, slice(first, first + count), actuators, bodies, ports, weighed))
+        group.part = slice(first, len(rows))
+        group.weighed += [i for i in group.bodies if model.body(i).name == "ECM/roll"]
+        self._groups.append(group)
 
     def _matrices(self, shares: list[tuple[int, int, float]], n: int, period: float) -> tuple[Vector, Vector]:
         """Return two matrices, from the servos' inputs to `ctrl` and from `qpos` to the drives' positions.

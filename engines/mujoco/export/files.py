@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 from xml.etree import ElementTree
@@ -18,8 +18,6 @@ from engines.mujoco.params import SceneParams
 __all__ = ["FORMATS", "START", "Format", "write"]
 
 Format = Literal["mjcf", "urdf"]
-
-_WRITERS: Mapping[Format, Callable[[mujoco.MjSpec], ElementTree.Element]] = {"mjcf": mjcf, "urdf": urdf}
 
 FORMATS: Mapping[str, Format] = {".xml": "mjcf", ".mjcf": "mjcf", ".urdf": "urdf"}
 """By the suffix of the file."""
@@ -41,7 +39,7 @@ def write(scene: SceneParams, path: Path, form: Format) -> list[Path]:
         for joint, position in zip(arm.chain.joints, arm.start, strict=True):
             ties.set_brake(model, joint.name, position)
     _add_start(model, scene)
-    root = _WRITERS[form](model)
+    root = mjcf(model) if form == "mjcf" else urdf(model, scene.arms)
     ElementTree.indent(root)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(ElementTree.tostring(root, encoding="unicode") + "\n", encoding="utf-8")

@@ -11,6 +11,8 @@ MuJoCo refuses it where it moves.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from math import atan2, hypot
 from xml.etree.ElementTree import Element, SubElement
 
@@ -18,9 +20,9 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.export.assets import FOLDER, file_of, numbers
-from engines.mujoco.model.names import FINGERS
 from robots import rotation
-from robots.dvrk.rolling_needle_driver import PADS, ROLLER
+from robots.dvrk.mounted import MountedArm
+from robots.dvrk.setup_joints import CartArm
 from schemas.errors import ScenarioError
 from schemas.vectors import Vector
 
@@ -36,27 +38,59 @@ That is the wrist yaw with 6.6e-6 kg.
 _AT_ORIGIN, _UPRIGHT = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def urdf(spec: mujoco.MjSpec) -> Element:
+@dataclass(frozen=True)
+class _Lead:
+    """How a joint is driven."""
+
+    joint: str
+    """Joint that it mimics; empty: none."""
+    ratio: float
+    """Position over that of the joint that it mimics."""
+    servo: str
+    """Servo whose limits are its own."""
+
+
+def urdf(spec: mujoco.MjSpec, arms: Mapping[CartArm, MountedArm]) -> Element:
     """Return the root element `robot` of the model's URDF, whose meshes are files in `FOLDER`."""
     model = spec.compile()
     robot = Element("robot", name=spec.modelname)
     # what MuJoCo needs to read it as it is
     SubElement(SubElement(robot, "mujoco"), "compiler", strippath="false", discardvisual="false")
     SubElement(robot, "link", name=_WORLD)
+    leads = _leads(arms)
     for body in spec.bodies[1:]:
         if any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in body.joints):
             continue
         _add_link(robot, spec, model, body)
-        _add_joint(robot, spec, model, body)
+        _add_joint(robot, spec, model, body, leads)
         for site in body.sites:
             if "/contact/" in site.name:
                 continue  # contact spheres have no use outside Trocar
             _add_frame(robot, model, body, site)
-    for finger, leader in ((FINGERS[0], "jaw"), (PADS[0], ROLLER)):
-        for body in spec.bodies:
-            if body.name.endswith(f"/{finger}"):
-                _add_leader(robot, spec, body, body.name.replace(finger, leader))
+    led: set[str] = set()
+    for body in spec.bodies[1:]:
+        for joint in body.joints:
+            lead = leads.get(joint.name)
+            if lead is not None and lead.joint and lead.joint not in led:
+                led.add(lead.joint)
+                _add_leader(robot, spec, body, lead)
     return robot
+
+
+def _leads(arms: Mapping[CartArm, MountedArm]) -> dict[str, _Lead]:
+    """Return by joint how the links of end effectors are driven.
+
+    Links that a motor moves as one mimic the joint that is commanded; those on a tendon move by themselves.
+    """
+    leads: dict[str, _Lead] = {}
+    for arm, params in arms.items():
+        for motor in params.end_effector.motors:
+            servo, lead = f"{arm}/{motor.name}", _Lead("", 1.0, f"{arm}/{motor.name}")
+            if motor.kind in ("disc", "gear"):
+                lead = _Lead(f"{arm}/{motor.joint}", motor.ratio, servo)
+            for link in motor.moves:
+                leads.setdefault(f"{arm}/{link}", lead)
+    return leads
 
 
 def _add_link(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody) -> None:
@@ -116,7 +150,13 @@ def _add_shape(shape: Element, geom: mujoco.MjsGeom) -> None:
             raise ScenarioError(f"a shape of kind {kind} does not exist in URDF")
 
 
-def _add_joint(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody) -> None:
+def _add_joint(
+    robot: Element,
+    spec: mujoco.MjSpec,
+    model: mujoco.MjModel,
+    body: mujoco.MjsBody,
+    leads: Mapping[str, _Lead],
+) -> None:
     moving = next(iter(body.joints), None)
     name = _joint(moving.name if moving else body.name)
     joint = SubElement(robot, "joint", name=name, type=_KINDS[moving.type] if moving else "fixed")
@@ -127,39 +167,25 @@ def _add_joint(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body:
     if moving is None:
         return
     SubElement(joint, "axis", xyz=numbers(moving.axis))
-    leader, ratio = _leader(spec, moving.name)
-    if leader:
-        SubElement(joint, "mimic", joint=_joint(leader), multiplier=repr(ratio), offset="0")
-    _add_limit(
-        joint,
-        spec,
-        moving.range,
-        leader or moving.name,
-        ratio if joint.get("type") == "prismatic" and leader.endswith(ROLLER) else 1.0,
-    )
+    lead = leads.get(moving.name) or _tied(spec, moving.name)
+    if lead.joint:
+        SubElement(joint, "mimic", joint=_joint(lead.joint), multiplier=repr(lead.ratio), offset="0")
+    is_slide_of_turn = moving.name in leads and joint.get("type") == "prismatic"
+    _add_limit(joint, spec, moving.range, lead.servo, lead.ratio if is_slide_of_turn else 1.0)
     SubElement(
         joint, "dynamics", damping=repr(float(moving.damping[0])), friction=repr(float(moving.frictionloss))
     )
 
 
-def _leader(spec: mujoco.MjSpec, joint: str) -> tuple[str, float]:
-    """Return the joint that `joint` follows, empty if none, and the ratio of their positions."""
-    arm, _, link = joint.rpartition("/")
-    if link in FINGERS:
-        return f"{arm}/jaw", 0.5
-    if link in PADS:
-        # m for rad
-        return f"{arm}/{ROLLER}", float(
-            spec.joint(joint).range[1] / spec.actuator(f"{arm}/{ROLLER}").ctrlrange[1]
-        )
+def _tied(spec: mujoco.MjSpec, joint: str) -> _Lead:
+    """Return how a joint of the arm or of its linkage is driven."""
     tie = spec.equality(joint)
-    return (tie.name2, float(tie.data[1])) if tie else ("", 0.0)
+    return _Lead(tie.name2, float(tie.data[1]), tie.name2) if tie else _Lead("", 0.0, joint)
 
 
-def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, driven: str, way: float = 1.0) -> None:
-    """State range, effort and velocity; `way` is that of a pad for an angle of its roller, m/rad."""
-    servo = spec.actuator(f"{driven.rpartition('/')[0]}/{FINGERS[0]}" if driven.endswith("/jaw") else driven)
-    servo = servo or spec.actuator(driven.rpartition("_")[0])  # that of the finger, for a phalanx
+def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, servo_name: str, way: float = 1.0) -> None:
+    """State range, effort and velocity; `way`: travel of the joint per radian of its servo, m/rad."""
+    servo = spec.actuator(servo_name)
     lower, upper = (repr(float(end)) for end in span)
     SubElement(
         joint,
@@ -171,15 +197,14 @@ def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, driven: str, w
     )
 
 
-def _add_leader(robot: Element, spec: mujoco.MjSpec, follower: mujoco.MjsBody, name: str) -> None:
+def _add_leader(robot: Element, spec: mujoco.MjSpec, follower: mujoco.MjsBody, lead: _Lead) -> None:
     """Add the joint that the joint of `follower` and its twin mimic."""
-    _add_frame_link(robot, _link(name))
-    joint = SubElement(robot, "joint", name=_joint(name), type="revolute")
+    _add_frame_link(robot, _link(lead.joint))
+    joint = SubElement(robot, "joint", name=_joint(lead.joint), type="revolute")
     SubElement(joint, "parent", link=_link(follower.parent.name))
-    SubElement(joint, "child", link=_link(name))
+    SubElement(joint, "child", link=_link(lead.joint))
     SubElement(joint, "axis", xyz="0 0 1")
-    moving = follower.joints[0]
-    _add_limit(joint, spec, moving.range / _leader(spec, moving.name)[1], name)
+    _add_limit(joint, spec, follower.joints[0].range / lead.ratio, lead.servo)
 
 
 def _add_frame(robot: Element, model: mujoco.MjModel, body: mujoco.MjsBody, site: mujoco.MjsSite) -> None:

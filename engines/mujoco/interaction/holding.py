@@ -13,17 +13,16 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.interaction.proximity import Rays
-from engines.mujoco.model import FINGERS
 from engines.mujoco.model.poses import ROS_ORDER
+from engines.mujoco.model.rigid import RIGID
 from engines.mujoco.params import SceneParams
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.end_effectors.jaw import FINGERS, Jaw
 from schemas.vectors import Vector
 
 __all__ = ["Holding", "prepare"]
 
 _SETTLED = 0.1
 """s; a jaw that closes at its greatest speed has come to rest on the object by then."""
-_RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 
 
 def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
@@ -33,7 +32,7 @@ def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
             for arm in _jawed(scene):
                 ends = {"objtype": mujoco.mjtObj.mjOBJ_BODY, "name1": f"{arm}/wrist_yaw", "name2": thing}
                 spec.add_equality(
-                    name=f"{thing}/{arm}/weld", type=mujoco.mjtEq.mjEQ_WELD, active=False, **ends, **_RIGID
+                    name=f"{thing}/{arm}/weld", type=mujoco.mjtEq.mjEQ_WELD, active=False, **ends, **RIGID
                 )
 
 
@@ -44,9 +43,7 @@ def _jawed(scene: SceneParams) -> list[str]:
 def _jaws(scene: SceneParams) -> dict[str, float]:
     """Return the length of the fingers of every arm that has a jaw, m."""
     return {
-        name: arm.tool.jaw.length
-        for name, arm in scene.arms.items()
-        if isinstance(arm, MountedPsm) and arm.tool.jaw is not None
+        name: arm.end_effector.length for name, arm in scene.arms.items() if isinstance(arm.end_effector, Jaw)
     }
 
 

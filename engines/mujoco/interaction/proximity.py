@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from engines.mujoco.model import FINGERS
+from robots.dvrk.end_effectors.jaw import FINGERS
 from schemas.vectors import Vector
 
 __all__ = ["Rays"]

@@ -9,12 +9,13 @@ import numpy as np
 
 from engines.mujoco.looks import cart as cart_look
 from engines.mujoco.looks import ecm as ecm_look
-from engines.mujoco.looks import fingers, instruments, musha, roller
+from engines.mujoco.looks import end_effectors, instruments
 from engines.mujoco.looks import psm as psm_look
 from engines.mujoco.looks import setup_joints as setup_look
 from engines.mujoco.looks.part import Collisions, Looks, Part, Primitive
 from engines.mujoco.looks.solids import hull
 from robots.dvrk import psm as psm_arm
+from robots.dvrk.end_effectors.end_effector import Mount
 from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS, Instrument
 from robots.dvrk.setup_joints import CartArm
 
@@ -56,31 +57,23 @@ def ecm() -> Collisions:
 
 
 def instrument(tool: Instrument) -> Collisions:
-    """Return what collides of an instrument in its PSM: housing, shaft, wrist, and fingers or electrode."""
+    """Return what collides of an instrument in its PSM: housing, shaft, wrist, and end effector."""
     looks: Looks = instruments.parts(tool)
-    frames = psm_arm.chain(tool).frames(np.zeros(3 + len(tool.joints)))
-    if tool.hand is not None:
-        housing, shaft = looks["insertion"], looks["roll"][0].vertices[:, 2]
-        tube = _upright("shaft", SHAFT_RADIUS, float(shaft.min()), float(shaft.max()))
-        return {
-            "insertion": (_hull("housing", housing),),
-            "roll": (tube,),
-            **musha.capsules(tool.hand, frames[3]),
-        }
-    pitch, yaw = frames[4][2, 3], frames[-2][2, 3]
+    chain = psm_arm.chain(tool)
+    shaft = looks["roll"][0].vertices[:, 2]
     collisions: dict[str, tuple[Part | Primitive, ...]] = {
-        "insertion": (_hull("housing", looks["insertion"]),),
-        "roll": (_upright("shaft", SHAFT_RADIUS, pitch, float(looks["roll"][0].vertices[:, 2].max())),),
-        tool.joints[1].name: (_upright("wrist", WRIST_RADIUS, yaw, pitch),),
-        tool.joints[-1].name: (_hull(tool.joints[-1].name, looks[tool.joints[-1].name]),),
+        "insertion": (_hull("housing", looks["insertion"]),)
     }
-    if tool.jaw is not None:
-        form, pose = fingers.shape(tool, tool.jaw), instruments.finger_frame(tool)
-        for name, side in zip(instruments.FINGERS, (1, -1), strict=True):
-            collisions[name] = (fingers.grip(name, form, side, pose),)
-        if tool.roller is not None:
-            collisions |= {name: (box,) for name, box in roller.boxes(tool.roller, pose)}
-    return collisions
+    if tool.has_wrist:
+        frames = chain.frames(np.zeros(len(chain.joints)))
+        pitch, yaw = frames[4][2, 3], frames[-2][2, 3]
+        wrist, last = tool.joints[1].name, tool.joints[-1].name
+        collisions["roll"] = (_upright("shaft", SHAFT_RADIUS, pitch, float(shaft.max())),)
+        collisions[wrist] = (_upright("wrist", WRIST_RADIUS, yaw, pitch),)
+        collisions[last] = (_hull(last, looks[last]),)
+    else:
+        collisions["roll"] = (_upright("shaft", SHAFT_RADIUS, float(shaft.min()), float(shaft.max())),)
+    return {**collisions, **end_effectors.collision(tool.end_effector, tool.name, Mount.on(chain))}
 
 
 def _hull(name: str, shown: tuple[Part, ...]) -> Part:

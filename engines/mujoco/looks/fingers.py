@@ -1,4 +1,4 @@
-"""Fingers of instruments: what shape each kind has, its mesh, and the box that grasps.
+"""Fingers of jaws: the shape of each kind, its mesh, and the box that grasps.
 
 A finger is drawn with x the way the left one opens, y the wrist yaw axis, z to the tip, origin in the axis.
 Its pad is flat and lies in the plane x = 0, so that the pads of two fingers meet when the jaw is at 0; a
@@ -11,15 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from engines.mujoco.looks.part import DARK, STEEL, Part, Primitive
+from engines.mujoco.looks.part import DARK, STEEL, Collisions, Looks, Part, Primitive
 from engines.mujoco.looks.solids import block, outline, part, placed, plate, rod, union
-from robots.dvrk.instruments import Instrument, Jaw
+from robots.dvrk.end_effectors.end_effector import Mount
+from robots.dvrk.end_effectors.jaw import FINGERS, Jaw
 from schemas.vectors import Vector
 
-__all__ = ["Shape", "finger", "grip", "shape"]
+__all__ = ["Shape", "collision", "finger_frame", "fingers", "grips", "parts", "shape"]
 
 _HUB_RADIUS, _HUB_WIDTH = 0.0025, 0.00195
-"""Of the eye about the wrist yaw axis: a hub lies on either side of y = 0 (bounds of the jaw meshes in
+"""Eye about the wrist yaw axis: a hub lies on either side of y = 0 (bounds of the jaw meshes in
 med-air/SurRoL).
 """
 _ROOT = 0.0030
@@ -62,10 +63,41 @@ mm, 3.0 mm for both), forms ours.
 """
 
 
-def shape(tool: Instrument, jaw: Jaw) -> Shape:
-    """Return the shape of the fingers of `tool`."""
-    kind = next((kind for word, kind in _KINDS.items() if word in tool.name), _FORCEPS)
-    return replace(kind, length=jaw.length, recess=0.0 if tool.roller is None else tool.roller.size[2])
+def parts(jaw: Jaw, instrument: str, mount: Mount) -> Looks:
+    """Return the meshes of both fingers."""
+    return fingers(shape(instrument, jaw), finger_frame(mount))
+
+
+def collision(jaw: Jaw, instrument: str, mount: Mount) -> Collisions:
+    """Return the boxes of both fingers."""
+    return grips(shape(instrument, jaw), finger_frame(mount))
+
+
+def shape(instrument: str, jaw: Jaw, recess: float = 0.0) -> Shape:
+    """Return the shape of the fingers of an instrument, called by its name."""
+    kind = next((kind for word, kind in _KINDS.items() if word in instrument), _FORCEPS)
+    return replace(kind, length=jaw.length, recess=recess)
+
+
+def finger_frame(mount: Mount) -> Vector:
+    """Return the frame that fingers are drawn in, shape (4, 4).
+
+    x is the direction in which the left one opens, y the wrist yaw axis, z points to the tip.
+    """
+    pose = np.eye(4)
+    pose[:3, 1], pose[:3, 2], pose[:3, 3] = mount.axis, (0.0, 0.0, -1.0), mount.pose[:3, 3]
+    pose[:3, 0] = np.cross(pose[:3, 1], pose[:3, 2])
+    return pose
+
+
+def fingers(form: Shape, pose: Vector) -> Looks:
+    """Return the meshes of two fingers in the frame `pose`, shape (4, 4)."""
+    return {name: finger(name, form, side, pose) for name, side in zip(FINGERS, (1, -1), strict=True)}
+
+
+def grips(form: Shape, pose: Vector) -> Collisions:
+    """Return the boxes of two fingers in the frame `pose`, shape (4, 4)."""
+    return {name: (grip(name, form, side, pose),) for name, side in zip(FINGERS, (1, -1), strict=True)}
 
 
 def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:

@@ -1,4 +1,4 @@
-"""Look of the PSM's instruments: housing, shaft, wrist and fingers.
+"""Look of the PSM's instruments: housing, shaft, wrist and end effector.
 
 They are drawn in the PSM's base frame with every joint at 0. The housing belongs to the body `insertion`, the
 shaft to `roll`; each wrist link and finger to the body of its name. Sources: shaft, wrist and jaw lengths
@@ -10,60 +10,39 @@ from __future__ import annotations
 
 import numpy as np
 
-from engines.mujoco.looks import musha, roller
-from engines.mujoco.looks.fingers import finger, shape
+from engines.mujoco.looks import end_effectors
 from engines.mujoco.looks.part import BLACK, BLUE, SLATE, STEEL, Looks, Part
 from engines.mujoco.looks.solids import block, outline, part, placed, plate, rod, union
 from robots.dvrk import psm
+from robots.dvrk.end_effectors.end_effector import Mount
 from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS, Instrument
 from schemas.vectors import Vector
 
-__all__ = ["FINGERS", "finger_frame", "parts"]
+__all__ = ["parts"]
 
-FINGERS = ("jaw_left", "jaw_right")
-"""The left one opens about z of the last wrist frame, the right one against it."""
 _HOUSING_END = 0.4080
 """Height of the housing's lower face over the remote centre, m."""
-_ELECTRODE_LENGTH = 0.0155
-"""Of what no public model states, as for jaws in `robots.dvrk.instruments`, m."""
 
 
 def parts(tool: Instrument) -> Looks:
     """Return the meshes by body."""
-    frames = psm.chain(tool).frames(np.zeros(3 + len(tool.joints)))[3:-1]
-    if tool.hand is not None:
-        return {"insertion": _housing(), **_with_shaft(musha.parts(tool.hand, frames[0]), frames[0])}
-    looks = {"insertion": _housing(), "roll": _shaft(frames[1])}
+    chain = psm.chain(tool)
+    frames = chain.frames(np.zeros(len(chain.joints)))[3:-1]
+    shaft = _shaft(frames[1]) if tool.has_wrist else _plain_shaft(frames[0])
+    looks = {"insertion": _housing(), "roll": shaft}
     for joint, frame, below in zip(tool.joints[1:-1], frames[1:-1], frames[2:], strict=True):
         looks[joint.name] = (_wrist_link(joint.name, frame, below),)
-    looks[tool.joints[-1].name] = (_pin(tool.joints[-1].name, frames[-1]),)
-    if tool.jaw is not None:
-        pose = finger_frame(tool)
-        for name, side in zip(FINGERS, (1, -1), strict=True):
-            looks[name] = finger(name, shape(tool, tool.jaw), side, pose)
-        if tool.roller is not None:
-            looks |= roller.parts(tool.roller, pose)
-    elif tool.number:
-        looks[tool.joints[-1].name] += (_electrode(finger_frame(tool)),)
+    if tool.has_wrist:
+        looks[tool.joints[-1].name] = (_pin(tool.joints[-1].name, frames[-1]),)
+    for body, added in end_effectors.parts(tool.end_effector, tool.name, Mount.on(chain)).items():
+        looks[body] = (*looks.get(body, ()), *added)
     return looks
 
 
-def _with_shaft(hand: Looks, end: Vector) -> Looks:
-    """Add a shaft down to `end`, shape (4, 4), to the look of a hand."""
+def _plain_shaft(end: Vector) -> tuple[Part, ...]:
+    """Return a shaft without a wrist, down to `end`, shape (4, 4)."""
     tube = rod((0.0, 0.0, end[2, 3]), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS, segments=14)
-    return {**hand, "roll": (part("shaft", tube, BLACK), *hand["roll"])}
-
-
-def finger_frame(tool: Instrument) -> Vector:
-    """Return the frame that fingers are drawn in, shape (4, 4).
-
-    x is the direction in which the left one opens, y the wrist yaw axis, z points to the tip.
-    """
-    frame = psm.chain(tool).frames(np.zeros(3 + len(tool.joints)))[-2]
-    pose = np.eye(4)
-    pose[:3, 1], pose[:3, 2], pose[:3, 3] = frame[:3, 2], (0.0, 0.0, -1.0), frame[:3, 3]
-    pose[:3, 0] = np.cross(pose[:3, 1], pose[:3, 2])
-    return pose
+    return (part("shaft", tube, BLACK),)
 
 
 def _housing() -> tuple[Part, ...]:
@@ -127,10 +106,3 @@ def _pin(name: str, frame: Vector) -> Part:
     """Pin of the wrist yaw."""
     pin = rod((0.0, 0.0, -0.0034), (0.0, 0.0, 0.0034), 0.0011)
     return part(name, placed(pin, frame[:3, :3], frame[:3, 3]), STEEL)
-
-
-def _electrode(pose: Vector) -> Part:
-    """Electrode in place of jaws: a stem with a hooked end, in the frame `pose`, shape (4, 4)."""
-    stem = rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.0130), 0.0008)
-    hook = block((-0.0006, -0.0018, 0.0125), (0.0006, 0.0008, _ELECTRODE_LENGTH))
-    return part("electrode", placed(union(stem, hook), pose[:3, :3], pose[:3, 3]), STEEL)

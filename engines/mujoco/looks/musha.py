@@ -10,14 +10,15 @@ from __future__ import annotations
 import numpy as np
 from manifold3d import Manifold
 
-from engines.mujoco.looks.part import BLACK, DARK, STEEL, Looks, Part, Primitive
+from engines.mujoco.looks.part import BLACK, DARK, STEEL, Collisions, Looks, Part, Primitive
 from engines.mujoco.looks.solids import block, part, placed, rod, turned, union
-from robots.dvrk.hand import Hand, HandLink
+from robots.dvrk.end_effectors.end_effector import Mount
+from robots.dvrk.end_effectors.hand import Hand, HandLink
+from robots.dvrk.end_effectors.musha import TROCAR_RADIUS
 from robots.dvrk.instruments import SHAFT_RADIUS
-from robots.dvrk.musha import TROCAR_RADIUS
 from schemas.vectors import Vector
 
-__all__ = ["capsules", "parts"]
+__all__ = ["collision", "parts"]
 
 _HUB, _EAR = 0.0016, 0.0020
 """Half widths along a joint's axis: of the hub, and from where to where of the ears at its sides, m; an ear
@@ -27,19 +28,19 @@ _EAR_END = 0.0023
 _SEGMENTS = 10
 
 
-def parts(hand: Hand, shaft: Vector) -> Looks:
-    """Return the meshes of palm and phalanges by body; the hand's frame is `shaft`, shape (4, 4)."""
-    looks: dict[str, tuple[Part, ...]] = {"roll": (_palm(hand, shaft),)}
-    for link in hand.links:
-        looks[link.name] = _phalanx(hand, link, shaft @ link.pose)
+def parts(hand: Hand, _instrument: str, mount: Mount) -> Looks:
+    """Return the meshes of palm and phalanges by body."""
+    looks: dict[str, tuple[Part, ...]] = {mount.link: (_palm(hand, mount.pose),)}
+    for link in hand.bones:
+        looks[link.name] = _phalanx(hand, link, mount.pose @ link.pose)
     return looks
 
 
-def capsules(hand: Hand, shaft: Vector) -> dict[str, tuple[Primitive, ...]]:
+def collision(hand: Hand, _instrument: str, mount: Mount) -> Collisions:
     """Return by body the capsule of each phalanx, from joint to joint or to the centre of the fingertip."""
     shapes: dict[str, tuple[Primitive, ...]] = {}
-    for link in hand.links:
-        frame, half = shaft @ link.pose, link.phalanx.length / 2.0
+    for link in hand.bones:
+        frame, half = mount.pose @ link.pose, link.phalanx.length / 2.0
         pose = np.eye(4)
         # a capsule lies along z
         pose[:3, 0], pose[:3, 1], pose[:3, 2] = frame[:3, 1], frame[:3, 2], frame[:3, 0]
@@ -54,7 +55,7 @@ def _palm(hand: Hand, shaft: Vector) -> Part:
     body = turned(
         [(0.0, -0.004), (SHAFT_RADIUS, -0.004), (radius, 0.0), (radius, top), (0.0, top)], segments=14
     )
-    first = [link for link in hand.links if link.parent == "roll"]
+    first = [link for link in hand.bones if link.parent == "roll"]
     ears = [placed(_ears(0.0, top - hand.palm), link.pose[:3, :3], link.pose[:3, 3]) for link in first]
     return part("palm", placed(union(body, *ears), shaft[:3, :3], shaft[:3, 3]), STEEL)
 

@@ -13,16 +13,16 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from engines.mujoco.model.names import FINGERS
 from engines.mujoco.model.scene import place
-from engines.mujoco.model.tree import Follow, links
+from engines.mujoco.model.tree import links
 from engines.mujoco.params import SceneParams
+from robots.dvrk.link import Follow
 from schemas.vectors import Vector
 
 __all__ = ["lean"]
 
-_TOUCHING = ("roll", "wrist_pitch", "wrist_yaw", *FINGERS)
-"""The links that reach where things are."""
+_WRIST = ("roll", "wrist_pitch", "wrist_yaw")
+"""The links that, with those of an end effector, reach where objects are."""
 
 
 def lean(spec: mujoco.MjSpec, scene: SceneParams) -> tuple[mujoco.MjModel, Vector]:
@@ -39,9 +39,14 @@ def lean(spec: mujoco.MjSpec, scene: SceneParams) -> tuple[mujoco.MjModel, Vecto
         assert tie is not None
         spec.delete(tie)
         spec.delete(spec.joint(name))
+    touching = {
+        f"{arm}/{link}"
+        for arm, params in scene.arms.items()
+        for link in (*_WRIST, *(link.name for link in params.end_effector_links))
+    }
     for geom in list(spec.geoms):
         is_cover = geom.type == mujoco.mjtGeom.mjGEOM_MESH and not geom.contype
-        if is_cover and geom.parent.name.rpartition("/")[2] not in _TOUCHING:
+        if is_cover and geom.parent.name not in touching:
             spec.delete(geom)
     model = spec.compile()
     _carry(whole, model, scene, follows)

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-__all__ = ["CONTACT", "FINGERS", "first_sensor", "instrument_body", "probe_body", "sphere_site"]
-
-FINGERS = ("jaw_left", "jaw_right")
-"""Both turn about the wrist yaw axis by half the jaw's angle: the left one towards the tip's +y, the right
-one towards -y.
-"""
+__all__ = ["CONTACT", "first_sensor", "instrument_body", "probe_body", "sphere_site"]
 
 CONTACT = "contact"
-"""Of an arm: the bond at its contact spheres, and what the names of their sites begin with."""
+"""Name of an arm's bond at its contact spheres, and the second part of the names of their sites."""
 
 
 def probe_body(arm: str) -> str:
@@ -32,9 +27,9 @@ def first_sensor(arm: str) -> str:
     """Return the name of the first of the arm's sensors.
 
     They lie in this order: positions, velocities and efforts of the n joints; tip in the base frame (position
-    3, quaternion w, x, y, z); tip in the world (the same, then linear and angular velocity); where there is a
-    jaw, positions, velocities and efforts of the two fingers, left before right, and then of a roller; or of
-    the fingers of a hand and then of its phalanges; positions of all contact spheres in the world, then their
+    3, quaternion w, x, y, z); tip in the world (the same, then linear and angular velocity); those of the end
+    effector (`engines.mujoco.model.end_effector.add_sensors`), such as positions, velocities and efforts of
+    the two fingers of a jaw, left before right; positions of all contact spheres in the world, then their
     velocities.
     """
     return f"{arm}/position/yaw"

@@ -8,12 +8,10 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import arm, fixtures, objects, setup_joints, shapes
-from engines.mujoco.model.names import FINGERS
 from engines.mujoco.model.tree import links
-from engines.mujoco.params import SceneParams, has_hand
+from engines.mujoco.params import SceneParams
 from robots import rotation
 from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
-from robots.dvrk.rolling_needle_driver import PADS
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
@@ -36,9 +34,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     result.modelname = scene.model
     result.compiler.degree = False
     result.option.timestep = _TIMESTEP
-    _set_options(
-        result.option, grasping=bool(scene.objects) or any(has_hand(arm) for arm in scene.arms.values())
-    )
+    _set_options(result.option, grasping=bool(scene.objects) or any(map(_has_springs, scene.arms.values())))
     result.worldbody.add_light(pos=[0.0, 0.0, 3.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
     for name, params in scene.arms.items():
@@ -59,22 +55,9 @@ def place(
     """Put the joints of `arms`, with fingers and, unless the model is lean, linkages, where they start."""
     for name, params in arms.items():
         start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
-        if isinstance(params, MountedPsm) and (hand := params.tool.hand) is not None:
-            start |= dict(
-                zip(
-                    (link.name for link in hand.links),
-                    hand.unloaded(np.array(params.hand)).ravel().tolist(),
-                    strict=True,
-                )
-            )
-        start |= dict.fromkeys(PADS, 0.0)
+        start |= params.end_effector.positions(np.array(params.end_effector_start))
         for link in links(name, params):
-            if link.follow is not None:
-                q = link.follow.ratio * start[link.follow.joint]
-            elif link.name in FINGERS and isinstance(params, MountedPsm):
-                q = params.jaw / 2.0
-            else:
-                q = start[link.name]
+            q = link.follow.ratio * start[link.follow.joint] if link.follow else start[link.name]
             joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{name}/{link.name}")
             if joint >= 0:
                 data.qpos[int(model.jnt_qposadr[joint])] = q
@@ -83,8 +66,8 @@ def place(
 def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
     """Choose integrator and friction cone.
 
-    `grasping`: there are objects or a hand, so friction must hold objects, and light fingers must rest at
-    their stops. See docs/decisions/0012 and 0018.
+    `grasping`: there are objects or fingers on tendons, so friction must hold objects, and light fingers must
+    rest at their stops. See docs/decisions/0012 and 0018.
     """
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     if grasping:
@@ -92,6 +75,10 @@ def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 1000.0
         # both cost more than they save here
         option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
+
+
+def _has_springs(params: MountedArm) -> bool:
+    return any(link.spring is not None for link in params.end_effector_links)
 
 
 def _free_pose(params: MountedArm) -> Vector:

@@ -17,8 +17,8 @@ import numpy as np
 
 from engines.mujoco import looks
 from engines.mujoco.model.poses import placed
-from engines.mujoco.params import has_probe
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
@@ -47,12 +47,12 @@ def add_arm(
     whats = ("ecm",) if isinstance(params, MountedEcm) else ("psm", f"instrument/{params.tool.name}")
     for what in whats:
         add(spec, what, arm, bodies, seen=seen)
-    if isinstance(params, MountedPsm) and has_probe(params):
-        body, _ = bodies["wrist_yaw"]
+    if isinstance(params.end_effector, Probe):
+        body, _ = bodies[params.chain.joints[-1].name]
         body.add_geom(
             name=f"{arm}/probe",
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            size=[params.probe_radius, 0.0, 0.0],
+            size=[params.end_effector.radius, 0.0, 0.0],
             mass=0.0,
             group=_SEEN,
             **_instrument(arm),

@@ -7,8 +7,8 @@ import pytest
 
 from controllers.motion.equipment import tool_type
 from robots.dvrk import arms
+from robots.dvrk.arm_bodies import ENDOSCOPE_MASS
 from robots.dvrk.dynamics import STANDARD_GRAVITY
-from robots.dvrk.inertia import ENDOSCOPE_MASS
 from robots.dvrk.instruments import instrument, instruments
 from robots.dvrk.kinematics_queries import KinematicsQueries
 from schemas.crtk import StringStamped

@@ -7,7 +7,7 @@ from controllers.motion.params import MotionParams
 from controllers.routine import RoutineParams
 from hub.testing import check_engine
 from robots.dvrk import arms
-from robots.dvrk.musha import HAND
+from robots.dvrk.end_effectors.musha import HAND
 from tests.controllers.motion.rig import H, Rig, cp, jf, jp
 
 ARM = {"PSM1": {"instrument": "MUSHA_HAND"}}

@@ -8,8 +8,8 @@ from controllers.motion.params import MotionParams
 from hub.testing import Driver
 from robots import rotation
 from robots.dvrk import arms, cart
+from robots.dvrk.arm_bodies import ENDOSCOPE_MASS
 from robots.dvrk.dynamics import STANDARD_GRAVITY
-from robots.dvrk.inertia import ENDOSCOPE_MASS
 from robots.dvrk.setup_joints import SIMULATED
 from schemas.crtk import StringStamped
 from schemas.ros import BoolMessage

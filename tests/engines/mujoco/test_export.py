@@ -374,18 +374,15 @@ def test_urdf_slides_the_pads_of_a_roller_against_each_other(tmp_path):
     scene = SceneParams.model_validate({"arms": {"PSM1": {"instrument": "ROLLING_NEEDLE_DRIVER"}}})
     write(scene, tmp_path / "dvrk.urdf", "urdf")
     robot = yourdfpy.URDF.load(str(tmp_path / "dvrk.urdf"), load_meshes=False)
-    roller = scene.arms["PSM1"].tool.roller
+    jaw = scene.arms["PSM1"].tool.jaw
     limit = robot.joint_map["PSM1_roller"].limit
-    assert (limit.lower, limit.upper, limit.effort) == (
-        roller.joint.lower,
-        roller.joint.upper,
-        roller.joint.effort,
-    )
+    roller = jaw.roller
+    assert (limit.lower, limit.upper, limit.effort) == (roller.lower, roller.upper, roller.effort)
     robot.update_cfg({"PSM1_roller": 0.5})
     left, right = (
         robot.get_transform(f"PSM1_pad_{side}_link", "PSM1_wrist_yaw_link")[:3, 3]
         for side in ("left", "right")
     )
     ahead = scene.arms["PSM1"].tool.tip[:3, 2]
-    assert np.allclose(left, 0.5 * roller.wire_radius * ahead)
-    assert np.allclose(right, -0.5 * roller.wire_radius * ahead)
+    assert np.allclose(left, 0.5 * jaw.wire_radius * ahead)
+    assert np.allclose(right, -0.5 * jaw.wire_radius * ahead)

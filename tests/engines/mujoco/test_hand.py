@@ -14,7 +14,7 @@ from engines.mujoco.params import MujocoParams, SceneParams
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from robots.dvrk import arms
-from robots.dvrk.musha import HAND, TROCAR_RADIUS
+from robots.dvrk.end_effectors.musha import HAND, TROCAR_RADIUS
 
 H = 1_000_000
 SCENE = {"arms": {"PSM1": {"instrument": "MUSHA_HAND"}}, "looks": False}
@@ -78,7 +78,7 @@ def test_spheres_are_where_the_robots_kinematics_have_them():
     run = Run().go(HAND.command("caliper", 0.4), 300)
     shaft = arms.chain("PSM1", "MUSHA_HAND").frames(run.outputs["PSM1/measured_js"][:4])[3]
     expected = HAND.contacts(run.positions) @ shaft[:3, :3].T + shaft[:3, 3]
-    found = [run.data.site(f"PSM1/contact/{sphere.name}").xpos for sphere in HAND.spheres]
+    found = [run.data.site(f"PSM1/contact/{sphere.name}").xpos for sphere in HAND.spheres(np.eye(4))]
     assert np.allclose(found, expected.reshape(9, 3), atol=1e-9)
 
 
@@ -155,7 +155,7 @@ def test_an_exported_hand_reads_back(tmp_path):
     robot = yourdfpy.URDF.load(str(tmp_path / "hand.urdf"), load_meshes=False)
     q = {**dict.fromkeys(robot.actuated_joint_names, 0.0), "PSM1_insertion": 0.12}
     command = HAND.command("caliper", 0.3)
-    q |= dict(zip((f"PSM1_{link.name}" for link in HAND.links), HAND.unloaded(command).ravel(), strict=True))
+    q |= dict(zip((f"PSM1_{link.name}" for link in HAND.bones), HAND.unloaded(command).ravel(), strict=True))
     robot.update_cfg(q)
     shaft = arms.chain("PSM1", "MUSHA_HAND").frames(np.array([0.0, 0.0, 0.12, 0.0]))[3]
     expected = (shaft @ [*HAND.contacts(HAND.unloaded(command))[0, 2], 1.0])[:3]

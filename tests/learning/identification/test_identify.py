@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import trocar
 from learning.identification.command_line import app
 from learning.identification.measurements import has_jaw, measurements
-from robots.dvrk import inertia
+from robots.dvrk import arm_bodies
 from robots.dvrk.instruments import instrument
 from robots.dvrk.mounted import MountedPsm
 from robots.dvrk.own_dynamics import OwnDynamics
@@ -142,7 +142,7 @@ def test_the_whole_circle(tmp_path, monkeypatch):
     own = OwnDynamics.load(tmp_path / "own.yaml")
     assert max(own.fit["relative_residual"].values()) < 0.15
     moving = own.bodies["insertion"].mass - own.bodies["counterweight"].mass
-    published = inertia.psm(instrument("400006"))
+    published = arm_bodies.psm(instrument("400006"))
     assert moving == pytest.approx(published["insertion"].mass - published["counterweight"].mass, rel=0.2)
     assert own.joints["yaw"].viscous == pytest.approx(0.136, rel=0.05)
     MountedPsm.model_validate(

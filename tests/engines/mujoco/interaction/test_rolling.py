@@ -18,9 +18,9 @@ from hub.participant import Inputs, Setup
 from hub.testing import run_in_process
 from robots import rotation
 from robots.dvrk import held_needle, psm
+from robots.dvrk.end_effectors.rolling_jaw import PADS
 from robots.dvrk.held_needle import Needle
 from robots.dvrk.instruments import instrument
-from robots.dvrk.rolling_needle_driver import PADS
 
 TOOL, NEEDLE = instrument("ROLLING_NEEDLE_DRIVER"), Needle()
 START = np.array(psm.HOME)
@@ -37,7 +37,7 @@ def held(hold):
 def scene(hold=0.5, **more):
     """The needle between the pads, which all but touch it."""
     pose = held(hold).forward(np.append(START, 0.0))
-    touching = 2.0 * np.arcsin(TOOL.roller.wire_radius / TOOL.roller.distance)
+    touching = 2.0 * np.arcsin(TOOL.jaw.wire_radius / TOOL.jaw.distance)
     needle = {
         "kind": "needle",
         "position": pose[:3, 3].tolist(),

@@ -14,7 +14,7 @@ from engines.mujoco.model.dynamics import dynamics
 from engines.mujoco.params import MujocoParams, SceneParams
 from hub.participant import Inputs, Setup
 from robots import rotation
-from robots.dvrk import ecm, inertia, linkage, setup_joints
+from robots.dvrk import arm_bodies, ecm, linkage, setup_joints
 from robots.dvrk.dynamics import Dynamics, of_ecm, of_psm
 from robots.dvrk.ecm import JOINT_NAMES as ECM_JOINTS
 from robots.dvrk.instruments import instrument
@@ -56,7 +56,7 @@ def test_the_model_moves_as_the_closed_form_says(arm):
 
 
 def test_an_endoscope_arm_has_the_dynamics_of_its_file(tmp_path):
-    q, heavy = np.array([0.4, -0.5, 0.13, 0.7]), {**inertia.ecm()}
+    q, heavy = np.array([0.4, -0.5, 0.13, 0.7]), {**arm_bodies.ecm()}
     heavy["insertion"] = replace(heavy["insertion"], mass=2.0 * heavy["insertion"].mass)
     losses = {name: JointLosses(armature=0.0, stiffness=1e-3, offset=0.0, viscous=0.3) for name in ECM_JOINTS}
     bodies = {name: BodyInertia(mass=b.mass, centre=b.centre, tensor=b.tensor) for name, b in heavy.items()}

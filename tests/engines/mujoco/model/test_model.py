@@ -6,11 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engines.mujoco.model import FINGERS, build, first_sensor, probe_body
+from engines.mujoco.model import build, first_sensor, probe_body
 from engines.mujoco.model.tree import links
 from engines.mujoco.params import SceneParams
 from robots import rotation
 from robots.dvrk import setup_joints
+from robots.dvrk.end_effectors.jaw import FINGERS
 from robots.dvrk.linkage import LINKAGES
 from robots.dvrk.mounted import MountedEcm
 

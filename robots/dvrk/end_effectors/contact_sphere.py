@@ -15,7 +15,7 @@ from schemas.vectors import Vector
 __all__ = ["FINGER_HALF_WIDTH", "ContactSphere", "on_jaw"]
 
 FINGER_HALF_WIDTH = 0.0024
-"""Of a finger of a jaw (m): 4.8 mm is the bound of the jaws in unina-icaros/dvrk-vrep, and of
+"""Half width of a finger of a jaw (m): 4.8 mm is the bound of the jaws in unina-icaros/dvrk-vrep, and of
 tool_gripper1_link.STL in WPI-AIM/dvrk_env.
 """
 
@@ -34,7 +34,7 @@ class ContactSphere:
     link: str
     """The body that carries it."""
     position: tuple[float, float, float]
-    """Of its centre in the frame of that body, m."""
+    """Position of its centre in the frame of that body, m."""
     radius: float
     """m."""
 

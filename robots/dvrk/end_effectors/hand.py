@@ -20,10 +20,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
-from robots.dvrk.contact_spheres import ContactSphere
+from robots.dvrk.drive import Drive
+from robots.dvrk.end_effectors.contact_sphere import ContactSphere
+from robots.dvrk.end_effectors.end_effector import EndEffector, Motor, Mount
+from robots.dvrk.inertia import Inertia
+from robots.dvrk.link import Link, Spring
 from robots.limits import TOLERANCE, distinct
 from robots.serial_chain import Joint
 from schemas.errors import MotionError, did_you_mean
@@ -45,21 +50,21 @@ class Phalanx:
 
     name: str
     length: float
-    """From its joint to the next, of the last one to the centre of the fingertip, m."""
+    """Distance to the next joint, from the last joint to the centre of the fingertip, m."""
     lower: float
     upper: float
     """Stops, rad."""
     pulley: float
     """Radius over which the tendon runs, m."""
     stiffness: float
-    """Of the spring, N m/rad."""
+    """Spring stiffness, N m/rad."""
     rest: float
     """Where the spring would be at rest, rad; below `lower` it presses the joint to its stop.
 
-    Of the first phalanx: with the spread at 0.
+    For the first phalanx: with the spread at 0.
     """
     contact: float
-    """Of the contact sphere's centre along the phalanx, share of its length."""
+    """Place of the contact sphere's centre, share of the phalanx's length."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,7 @@ class HandLink:
     name: str
     parent: str
     pose: Vector
-    """In the hand's frame with every joint at 0, shape (4, 4)."""
+    """Pose in the hand's frame with every joint at 0, shape (4, 4)."""
     phalanx: Phalanx
 
 
@@ -88,21 +93,21 @@ class Mode:
 
 
 @dataclass(frozen=True)
-class Hand:
+class Hand(EndEffector):
     """Fingers about a shaft."""
 
     palm: float
-    """From the end of the shaft to the first joints, m."""
+    """Distance of the first joints from the end of the shaft, m."""
     offset: float
-    """Of the first joints from the axis of the shaft, m."""
+    """Distance of the first joints from the axis of the shaft, m."""
     radius: float
-    """Of the phalanges and of their contact spheres, m."""
+    """Radius of the phalanges and of their contact spheres, m."""
     azimuths: tuple[float, ...]
     """Where each finger stands about the axis, from x towards y, rad."""
     phalanges: tuple[Phalanx, ...]
-    """From the palm outwards."""
+    """Phalanges of each finger, from the palm outwards."""
     density: float
-    """Of the phalanges, round bars, kg/m^3."""
+    """Density of the phalanges, round bars, kg/m^3."""
     effort: float
     """Largest torque of a motor, of a tendon's at the first pulley, N m: that one pulls, and pushes nothing.
     """
@@ -111,6 +116,12 @@ class Hand:
     acceleration: float
     jerk: float
     modes: Mapping[str, Mode]
+
+    name: ClassVar[str] = "hand"
+    goal: ClassVar[str] = "goal of closings and spreads"
+    measured: ClassVar[str] = (
+        "closings of the fingers and positions of their first joints, and the torques of the motors"
+    )
 
     @property
     def fingers(self) -> tuple[str, ...]:
@@ -123,21 +134,21 @@ class Hand:
         return tuple(f"spread{i}" for i in range(1, len(self.azimuths) + 1))
 
     @cached_property
-    def links(self) -> tuple[HandLink, ...]:
+    def bones(self) -> tuple[HandLink, ...]:
         """The bodies of all phalanges, finger by finger, from the palm outwards."""
-        links: list[HandLink] = []
+        bones: list[HandLink] = []
         for finger, azimuth in zip(self.fingers, self.azimuths, strict=True):
             c, s = np.cos(azimuth), np.sin(azimuth)
             pose, parent = np.eye(4), _CARRIER
             pose[:3, 0], pose[:3, 1], pose[:3, 2] = (0.0, 0.0, 1.0), (-c, -s, 0.0), (s, -c, 0.0)
             pose[:3, 3] = self.offset * c, self.offset * s, self.palm
             for phalanx in self.phalanges:
-                links.append(HandLink(f"{finger}_{phalanx.name}", parent, pose, phalanx))
-                pose, parent = pose.copy(), links[-1].name
+                bones.append(HandLink(f"{finger}_{phalanx.name}", parent, pose, phalanx))
+                pose, parent = pose.copy(), bones[-1].name
                 pose[2, 3] += phalanx.length
-        return tuple(links)
+        return tuple(bones)
 
-    @cached_property
+    @property
     def joints(self) -> tuple[Joint, ...]:
         """Closings and spreads as joints: their ranges and what they can do."""
         first, ratios = self.phalanges[0], self._pulleys / self._pulleys[0]
@@ -151,19 +162,71 @@ class Hand:
             for name, lower, upper in ranges
         )
 
-    @cached_property
-    def spheres(self) -> tuple[ContactSphere, ...]:
-        """One contact sphere on each phalanx, in the order of `links`."""
+    @property
+    def motors(self) -> tuple[Motor, ...]:
+        """Finger by finger, the tendon that closes it, and the spread.
+
+        A closing is turned by a disc that winds a tendon up and lets it go; its friction stays with the
+        motor, as the springs that open a finger do not turn it. A spread moves the end of a spring, with the
+        friction of the first joints.
+        """
+        spring, friction = self.phalanges[0].stiffness, float(self.damping[0])
+        closing = Drive.of_disc(1.0, self.effort, self.velocity)
+        spreading = Drive(spring, friction, 0.0, 0.0, 0.0, 0.0, 0.0, self.effort, self.velocity)
+        motors: list[Motor] = []
+        for finger, spread in zip(self.fingers, self.spreads, strict=True):
+            bones = [f"{finger}_{phalanx.name}" for phalanx in self.phalanges]
+            ratios = [phalanx.pulley / self.phalanges[0].pulley for phalanx in self.phalanges]
+            moves = dict(zip(bones, ratios, strict=True))
+            motors.append(Motor(finger, finger, "tendon", closing, moves))
+            motors.append(Motor(spread, spread, "spring", spreading, {bones[0]: 1.0}))
+        return tuple(motors)
+
+    def links(self, mount: Mount, /) -> tuple[Link, ...]:
+        """Return the phalanges; in the first joint of a finger its spread is the spring."""
+        first, damping = self.phalanges[0], dict(zip(self.phalanges, self.damping.tolist(), strict=True))
+        return tuple(
+            Link(
+                bone.name,
+                bone.parent,
+                "revolute",
+                mount.pose @ bone.pose,
+                bone.phalanx.lower,
+                bone.phalanx.upper,
+                spring=None
+                if bone.phalanx is first
+                else Spring(bone.phalanx.stiffness, bone.phalanx.rest, damping[bone.phalanx]),
+                reading="phalanges",
+            )
+            for bone in self.bones
+        )
+
+    def positions(self, command: Vector) -> Mapping[str, float]:
+        """Return where the phalanges are at rest when they touch nothing."""
+        return dict(
+            zip((bone.name for bone in self.bones), self.unloaded(command).ravel().tolist(), strict=True)
+        )
+
+    def bodies(self, mount: Mount, /) -> Mapping[str, Inertia]:
+        """Return the phalanges, straight."""
+        bodies: dict[str, Inertia] = {}
+        for bone, mass in zip(self.bones, np.tile(self.masses, len(self.fingers)).tolist(), strict=True):
+            start, along = (mount.pose @ bone.pose)[:3, 3], (mount.pose @ bone.pose)[:3, 0]
+            bodies[bone.name] = Inertia.of_rod(mass, start, start + bone.phalanx.length * along, self.radius)
+        return bodies
+
+    def spheres(self, _tip: Vector, /) -> tuple[ContactSphere, ...]:
+        """Return one contact sphere on each phalanx, in the order of `bones`."""
         return tuple(
             ContactSphere(
-                link.name, link.name, (link.phalanx.contact * link.phalanx.length, 0.0, 0.0), self.radius
+                bone.name, bone.name, (bone.phalanx.contact * bone.phalanx.length, 0.0, 0.0), self.radius
             )
-            for link in self.links
+            for bone in self.bones
         )
 
     @property
     def reach(self) -> float:
-        """From the end of the shaft to the end of the straight fingers, m."""
+        """Distance of the end of the straight fingers from the end of the shaft, m."""
         return self.palm + plain_sum(phalanx.length for phalanx in self.phalanges) + self.radius
 
     @cached_property

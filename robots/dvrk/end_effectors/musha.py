@@ -14,21 +14,22 @@ from __future__ import annotations
 from math import pi, radians
 from types import MappingProxyType
 
-from robots.dvrk.hand import Hand, Mode, Phalanx
+from robots.dvrk.end_effectors.hand import Hand, Mode, Phalanx
+from robots.dvrk.inertia import STEEL_DENSITY
 from robots.serial_chain import jerk_limit
 
 __all__ = ["HAND", "TROCAR_RADIUS"]
 
 TROCAR_RADIUS = 0.012 / 2
-"""Of the cylinder into which the hand folds (Liu et al.)."""
+"""Radius of the cylinder into which the hand folds (Liu et al.)."""
 
 _RADIUS = 0.0024
-"""Of a phalanx: three of them, two opposed and one at right angles, fit into the trocar up to offset (1 + 1 /
-sqrt 2).
+"""Radius of a phalanx: three of them, two opposed and one at right angles, fit into the trocar up to offset
+(1 + 1 / sqrt 2).
 """
 _OFFSET = 0.0035
-"""From the shaft's axis to a finger's: sqrt 2 times this keeps neighbours apart, this plus the radius is
-under that of the trocar.
+"""Distance of a finger's axis from the shaft's: sqrt 2 times this keeps neighbours apart, this plus the
+radius is under that of the trocar.
 """
 
 _PHALANGES = (
@@ -80,8 +81,8 @@ parallel to each other all the way, the third finger is out of the way.
 """
 
 _VELOCITY, _ACCELERATION = radians(180.0), radians(720.0)
-"""Of a motor: the range of a finger in a second; the acceleration is that of wrist and jaw
-(`robots.dvrk.instruments`).
+"""Limits of a motor: the range of a finger in a second; the acceleration is that of wrist and jaw
+(`robots.dvrk.end_effectors.jaw`).
 """
 
 HAND = Hand(
@@ -90,7 +91,7 @@ HAND = Hand(
     radius=_RADIUS,
     azimuths=(0.0, pi, -pi / 2),
     phalanges=_PHALANGES,
-    density=7900.0,
+    density=STEEL_DENSITY,
     effort=0.16,
     velocity=_VELOCITY,
     acceleration=_ACCELERATION,
@@ -99,5 +100,5 @@ HAND = Hand(
 )
 """Two fingers stand opposed, as the caliper requires, the third one at right angles.
 
-Effort: that of the jaw of a needle driver. Density: of steel 1.4301, as of the palpation probe.
+Effort: that of the jaw of a needle driver.
 """

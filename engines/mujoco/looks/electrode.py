@@ -1,0 +1,23 @@
+"""The electrode of cautery hooks and spatulas."""
+
+from __future__ import annotations
+
+from engines.mujoco.looks.fingers import finger_frame
+from engines.mujoco.looks.part import STEEL, Looks
+from engines.mujoco.looks.solids import block, part, placed, rod, union
+from robots.dvrk.end_effectors.electrode import Electrode
+from robots.dvrk.end_effectors.end_effector import Mount
+
+__all__ = ["parts"]
+
+_LENGTH = 0.0155
+"""m; no public model states it: that of the Cadiere forceps, as for jaws in `robots.dvrk.instruments`."""
+
+
+def parts(_electrode: Electrode, _instrument: str, mount: Mount) -> Looks:
+    """Return a stem with a hooked end."""
+    pose = finger_frame(mount)
+    stem = rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.0130), 0.0008)
+    hook = block((-0.0006, -0.0018, 0.0125), (0.0006, 0.0008, _LENGTH))
+    solid = placed(union(stem, hook), pose[:3, :3], pose[:3, 3])
+    return {mount.link: (part("electrode", solid, STEEL),)}

@@ -1,0 +1,19 @@
+"""The electrode of cautery hooks and spatulas."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robots.dvrk.end_effectors.end_effector import EndEffector, Mount
+from robots.dvrk.end_effectors.probe import PROBE_RADIUS
+from robots.dvrk.inertia import Inertia
+
+__all__ = ["Electrode"]
+
+
+class Electrode(EndEffector):
+    """A rigid tip in place of jaws. No public model states its mass: that of a probe's sphere stands in."""
+
+    def bodies(self, mount: Mount, /) -> Mapping[str, Inertia]:
+        """Return the electrode, in place of the link that carries it."""
+        return {mount.link: Inertia.of_steel_ball(mount.pose[:3, 3], PROBE_RADIUS)}
