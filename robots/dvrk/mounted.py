@@ -264,7 +264,7 @@ class MountedEcm(MountedArm):
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start, self.end_effector, {})
+        check_start(self.chain, self.start)
         return self
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import repeat
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
@@ -96,11 +97,14 @@ def home(arm: dict[str, Any]) -> MountedPositions:
         return psm.HOME  # unused: the instrument is refused
 
 
+_RIGID = EndEffector()
+
+
 def check_start(
     chain: SerialChain,
     start: Sequence[float],
-    end_effector: EndEffector,
-    given: Mapping[str, Sequence[float]],
+    end_effector: EndEffector = _RIGID,
+    given: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> None:
     """Raise ValueError, as pydantic's validators do, for positions out of range.
 
