@@ -1,4 +1,4 @@
-"""The command `trocar organs`: the shapes and materials that a scenario may name, with their sources."""
+"""The command `trocar organs`: shapes and materials for scenarios, with their sources."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ app = typer.Typer(help="Shapes and materials of organs.")
 
 _WIDTH = 120
 _RADII_M = (2e-3, 5e-3)
-"""Of the spheres whose contact is shown."""
+"""Radii of the spheres in the table of contacts."""
 _LIMITS = (
     "What is mended is within 10 percent of converged finite elements for spheres of 2 to 5 mm on blocks, and"
     " of 5 mm on liver and kidney; nearer than 1.6 radii to a rim it is up to a quarter too stiff (decision"
@@ -25,7 +25,7 @@ _LIMITS = (
     "Bullet's tissue does not relax. Its damping is in proportion to its stiffness: with 1 ms its loss"
     " tangent is 0.001 at 0.1 Hz and 0.007 at 1 Hz; tissue that relaxed in a press has 0.16 and 0.10.",
 )
-"""What holds for all of them."""
+"""Limits of all materials."""
 
 
 @app.command()
@@ -36,9 +36,9 @@ def organs(
     ] = 250,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")] = False,
 ) -> None:
-    """Print the organs and the materials that a scenario may name.
+    """Print the organs and the materials for scenarios.
 
-    Organs come with their surfaces and meshes, materials with their sources; SI units.
+    Organs come with surfaces and meshes, materials with sources; SI units.
     """
     found = {"shapes": _shapes(nodes), "materials": _materials()}
     typer.echo(json.dumps(found, indent=2) if as_json else _text(found))
@@ -71,7 +71,7 @@ def _shapes(nodes: int) -> dict[str, Any]:
 
 
 def _contact(shape: str, nodes: int) -> list[dict[str, Any]]:
-    """Return for spheres of `_RADII_M` how far the mesh is from its tissue; empty where nothing mends it."""
+    """Return the error of the mesh under spheres of `_RADII_M`; empty: no correction."""
     from engines.bullet.organs.params import OrganParams
     from engines.bullet.probes.band import band
 

@@ -29,12 +29,12 @@ from schemas.vectors import Vector
 __all__ = ["BulletEngine"]
 
 _RAMP_S = 0.2
-"""Gravity grows over this time before time 0, or over two periods of the slowest organ if they are longer;
-half as long again the organs rest.
+"""Time of growing gravity before time 0, at least two periods of the slowest organ; then the organs rest for
+half of this time.
 """
 
 _GRAVITY_DIGITS = 6
-"""Digits to which the growing gravity is rounded: sines differ in their last bit between processors."""
+"""Digits of the growing gravity: sines differ in their last bit between processors."""
 
 _NO_CLIENT = -1
 
@@ -42,8 +42,8 @@ _NO_CLIENT = -1
 class BulletEngine(Stepped):
     """Soft organs in PyBullet; every probe is the force side of a bond.
 
-    The state hash covers the probes and their bonds at every step, and the nodes as they were last read,
-    every 8 ms and whenever they are output: reading them at every step would cost a quarter of its time.
+    The state hash covers the probes and their bonds at every step, and the nodes at their last reading, every
+    8 ms and at every output: reading the nodes at every step would cost a quarter of the step's time.
     """
 
     params_model: ClassVar[type[Params]] = BulletParams
@@ -63,11 +63,11 @@ class BulletEngine(Stepped):
         """Nodes of each organ at the start, m, shape (n, 3)."""
         self._at_start = False
         self._unused: dict[str, Value] = {}
-        """Outputs of the probes that might grasp, but are not bonded."""
+        """Outputs of grasping probes without a bond."""
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The nodes of every organ; of every probe with fingers, what they hold."""
+        """The nodes of every organ; for every probe with fingers, the grasp."""
         period_ns = self.params.node_period
         meaning = "positions of the nodes; the surface triangles come with the first"
         nodes = tuple(
@@ -80,13 +80,13 @@ class BulletEngine(Stepped):
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """Every probe: a frame, or the points that are its spheres."""
+        """Every probe: a frame, or the centres of the probe's spheres."""
         return tuple(self._bond(name, probe) for name, probe in self.params.probes.items())
 
     def configure(self, setup: Setup) -> Outputs:
-        """Load the organs, let them settle, and add a proxy for every bond.
+        """Load the organs, settle, and add a proxy for every bond.
 
-        Raises ScenarioError where a step is too long.
+        Raises ScenarioError for too long a step.
         """
         self._check_steps(setup.period_ns)
         dt = self.params.sub_step * 1e-9
@@ -110,7 +110,7 @@ class BulletEngine(Stepped):
         return self._begin()
 
     def _begin(self) -> Outputs:
-        """Add a proxy for every bond to organs that have settled; return the outputs at time 0."""
+        """Add a proxy for every bond to the settled organs; return the outputs at time 0."""
         for bond in self.bonds:
             if plan := self._bonded.get(bond.name):
                 probe = self.params.probes[bond.name]
@@ -179,7 +179,7 @@ class BulletEngine(Stepped):
         return self._start_mark
 
     def restore(self, state: bytes) -> None:
-        """Go back to the start, bit for bit; raises StateError if `state` marks that of other organs."""
+        """Go back to the start, bit for bit; raises StateError for a state of other organs."""
         if state != self._start_mark:
             raise StateError(self._no_state)
         for grasp in self._grasps:
@@ -225,7 +225,7 @@ class BulletEngine(Stepped):
         return [Surface(organ, self.params.organs[organ.name].elastic) for organ in self._organs]
 
     def _add_sub_grid(self) -> None:
-        """Give probes of one sphere the spring in series, where all organs are anchored and small enough."""
+        """Give probes of a single sphere the spring in series, if all organs are anchored and small."""
         for probe in self._probes:
             if self.params.has_sub_grid(probe.name):
                 probe.sub_grid = SubGrid(float(probe.radii[0]), self._coupling(probe.name), self._surfaces)
@@ -244,7 +244,7 @@ class BulletEngine(Stepped):
         return Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity)
 
     def _contact_stiffness(self, probe: ProbeParams) -> float:
-        """Return the largest stiffness (N/m) that one of the spheres may meet."""
+        """Return the largest contact stiffness (N/m) of the probe's spheres."""
         return max(
             organ.contact_stiffness(radius)
             for organ in self.params.organs.values()
@@ -295,10 +295,10 @@ class BulletEngine(Stepped):
             organ.sample(t)
 
     def _settle(self) -> None:
-        """Increase gravity as slowly as the organs can follow: applied at once, they would swing for long.
+        """Increase gravity slowly: applied at once, gravity would make the organs swing for long.
 
-        It grows like the integral of a Hann window, whose spectrum is below 3 % from two periods per window
-        on. What still moves then is stopped, so that the start can be restored, unless `standstill` is false.
+        Gravity grows like the integral of a Hann window, with a spectrum below 3 % from two periods per
+        window on. Remaining motion is stopped, so the start can be restored, unless `standstill` is false.
         """
         import pybullet as bullet
 

@@ -1,4 +1,4 @@
-"""Parameters of the tissue engine: organs, rigid parts, probes, and how they are stepped."""
+"""Parameters of the tissue engine: organs, rigid parts, probes, and steps."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from schemas.scenario import Name
 __all__ = ["BulletParams"]
 
 _LONGEST_NS, _HALVES = 1_000_000, 4
-"""Of a sub-step that nothing states, and how often it is halved; 62.5 us are far from real time."""
+"""Longest default sub-step, and most halvings; 62.5 us are far from real time."""
 
 
 class BulletParams(Params):
-    """Organs, the probes that may touch them, and the numerics."""
+    """Organs, probes, and numerics."""
 
     open_to_pages: ClassVar[bool] = True
 
@@ -64,7 +64,7 @@ class BulletParams(Params):
 
     @cached_property
     def sub_step(self) -> int:
-        """The sub-step, ns: as stated, or the longest of 1 ms and its halves at which organs are stable."""
+        """The sub-step, ns: as stated, or the longest stable sub-step among 1 ms and its halves."""
         if self.timestep is not None:
             return self.timestep
         limit = min(
@@ -74,14 +74,14 @@ class BulletParams(Params):
         return next((step for step in halves if step <= limit * 1e9), _LONGEST_NS >> _HALVES)
 
     def has_sub_grid(self, probe: str) -> bool:
-        """Return whether a probe feels the tissue's force: it is one sphere, and may press every organ so."""
+        """Return whether a probe of a single sphere feels the tissue's own force on every organ."""
         given = self.probes[probe]
         return (
             self.sub_grid and given.spheres in (None, 1) and given.grasp is None and self._is_compliance_known
         )
 
     def has_series(self, probe: str) -> bool:
-        """Return whether a spring is in series with a probe: under one sphere, or where a jaw holds."""
+        """Return whether a spring is in series with a probe: under a single sphere, or in a jaw's bite."""
         grasp = self.probes[probe].grasp
         return self.has_sub_grid(probe) or (grasp is not None and grasp.width is not None)
 

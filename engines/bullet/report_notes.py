@@ -1,4 +1,4 @@
-"""What the report of a session says about its tissue: how far a mesh's force is that of the tissue."""
+"""Notes on tissue in the report of a session: the error of the mesh's force."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["notes"]
 
 
 def notes(params: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what is noted of every probe on every organ, and its text.
+    """Yield subject and text of the note on every probe on every organ.
 
-    Files are not opened, as a recording may come from anywhere. Raises pydantic's ValidationError if the
-    parameters are not valid.
+    Files are not opened, as a recording may come from anywhere. Raises pydantic's ValidationError for invalid
+    parameters.
     """
     organs: Mapping[str, Mapping[str, Any]] = params.get("organs", {})
     if any(organ.get(key) for organ in organs.values() for key in ("mesh", "material_file")):

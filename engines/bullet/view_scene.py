@@ -20,7 +20,7 @@ _COLOURS: dict[str, Rgb] = {
     "kidney": (0.60, 0.24, 0.20),
     "liver": (0.52, 0.20, 0.15),
 }
-"""By the end of an organ's name: those of the endoscope's skins."""
+"""Colours of the endoscope's skins by the last word of an organ's name."""
 _TISSUE: Rgb = (0.80, 0.38, 0.33)
 
 

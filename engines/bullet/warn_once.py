@@ -1,4 +1,4 @@
-"""Warnings about a scene that are given once in a process."""
+"""Warnings about a scene, given once in a process."""
 
 from __future__ import annotations
 

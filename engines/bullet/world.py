@@ -1,4 +1,4 @@
-"""Worlds of Bullet, of which one process may have several side by side."""
+"""Worlds of Bullet; a process may have several side by side."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from schemas.errors import MissingExtraError, SessionError
 __all__ = ["COLLISION_MARGIN_M", "connect", "disconnect", "quiet"]
 
 COLLISION_MARGIN_M = 1e-4
-"""Distance at which Bullet lets contact begin; the spheres of probes are smaller by it."""
+"""Distance of first contact in Bullet; the spheres of probes are smaller by this distance."""
 
 
 @contextmanager
 def quiet(descriptor: int = 1) -> Generator[None]:
-    """Discard what Bullet prints on a file descriptor: stdout (1), which may carry JSON, or stderr (2).
+    """Discard Bullet's prints on a file descriptor: stdout (1), perhaps with JSON, or stderr (2).
 
-    Bullet prints through C's buffers, so they are flushed before the descriptor is restored.
+    Bullet prints through C's buffers, so the buffers are flushed before the descriptor is restored.
     """
     sys.stdout.flush()
     sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""The commands `trocar calibrate`: a material file from what the reader has measured."""
+"""The commands `trocar calibrate`: a material file from measurements."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ app = typer.Typer(help="Materials from your own measurements.", no_args_is_help=
 
 
 def _quantity(unit: str) -> Any:
-    """Return what reads an option such as `5 mm` as a float in `unit`."""
+    """Return the parser of an option such as `5 mm`, as a float in `unit`."""
 
     def parse(text: str | float) -> float:
         try:

@@ -1,4 +1,4 @@
-"""Modulus, stiffening, relaxation and friction that explain measured depths and forces, with deviations."""
+"""Modulus, stiffening, relaxation and friction from measured depths and forces, with deviations."""
 
 from __future__ import annotations
 
@@ -19,24 +19,25 @@ _LARGEST_STIFFENING, _NO_STIFFENING = 200.0, 1e-9
 _UNIFORM = float(np.sqrt(12.0))
 """Width over standard deviation of a uniform distribution."""
 _STARTS = ((0.02, 0.3), (0.1, 1.0), (0.3, 0.5))
-"""Of the time constants, as parts of the measured time: least squares may end beside the best."""
+"""Starts of the time constants, as fractions of the measured time: least squares may miss the best minimum.
+"""
 _MOST_STEPS = 200
 _SLIDING = 0.1
-"""Of the largest speed along the surface: above it the indenter slides."""
+"""Fraction of the largest speed along the surface; above, the indenter slides."""
 _PRESSING = 0.1
-"""Of the largest force: above it the indenter presses."""
+"""Fraction of the largest force; above, the indenter presses."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What was found, each with its standard deviation in `deviations` under the same name."""
+    """Result of a calibration; `deviations` has the standard deviations under the same names."""
 
     young_modulus: float
     """Pa, instantaneous."""
     stiffening: float | None
-    """Of `elastic_force`; None where it was not asked for."""
+    """Stiffening as in `elastic_force`; None: not fitted."""
     surface: float
-    """Depth (m) at which the indenter touches."""
+    """Depth of first contact, m."""
     relaxation: Prony
     friction: float | None
     """Coulomb's coefficient; None: nothing slid."""
@@ -44,16 +45,16 @@ class Calibration:
     predicted: Vector = field(repr=False)
     """Force (N) of these, shape (n,)."""
     residual: float
-    """Root mean square of the error over that of the measured force."""
+    """Root mean square of the error over root mean square of the measured force."""
 
 
 @dataclass(frozen=True)
 class _Model:
     """The measured force as a function of parameters.
 
-    They are: the logarithm of the modulus, the depth of the surface over the radius, the share that relaxes
-    and which part of it is the quick one, the logarithms of the quick time constant and of the ratio to the
-    slow one, and the stiffening.
+    Parameters: logarithm of the modulus, depth of the surface over the radius, relaxing share and the quick
+    part of the share, logarithms of the quick time constant and of the ratio of slow to quick, and
+    stiffening.
     """
 
     measured: Measured
@@ -70,7 +71,7 @@ class _Model:
         return self.prony(x).relaxed(self.measured.time, elastic)
 
     def named(self, x: Vector) -> Vector:
-        """Return what is reported, in the order of `_NAMES`."""
+        """Return the reported values, in the order of `_NAMES`."""
         found = self.prony(x)
         return np.array([np.exp(x[0]), x[6], x[1] * self.indenter.radius, *found.shares, *found.times])
 
@@ -79,14 +80,14 @@ _NAMES = ("young_modulus", "stiffening", "surface", "share_1", "share_2", "time_
 
 
 def calibrate(measured: Measured, indenter: Indenter, *, two_parameters: bool = False) -> Calibration:
-    """Return the material that explains `measured`.
+    """Return the material with the least error on `measured`.
 
     Args:
-        measured: a press, with a hold in which the tissue relaxes; then a slide where friction is asked for.
-        indenter: what pressed, and what it pressed.
+        measured: a press, with a hold for the relaxation; then a slide for friction.
+        indenter: indenter and tissue sample.
         two_parameters: fit a stiffening beside the modulus.
 
-    Raises RecordingError where no law holds for the depths, or the force does not grow with them.
+    Raises RecordingError if no law holds for the depths, or the force does not grow with depth.
     """
     indenter.check(measured.depth)
     scale = float(np.sqrt(np.mean(measured.force**2)))
@@ -152,10 +153,10 @@ def _solved(model: _Model, bounds: tuple[Vector, Vector], scale: float) -> tuple
 def _deviations(
     model: _Model, x: Vector, jacobian: Vector, error: Vector, bounds: tuple[Vector, Vector]
 ) -> dict[str, float]:
-    """Return the standard deviations of what is reported, from the linearised fit.
+    """Return the standard deviations of the reported values, from the linearised fit.
 
-    Errors that follow one another alike count for less: by (1 + r) / (1 - r), r their correlation from sample
-    to sample. A parameter that the data does not tell has a deviation as large as its range.
+    Correlated errors count for less: by (1 + r) / (1 - r), r the correlation from sample to sample. A
+    parameter not determined by the data has a deviation as large as its range.
     """
     correlation = float(np.corrcoef(error[:-1], error[1:])[0, 1]) if error.std() else 0.0
     alike = (1.0 + correlation) / (1.0 - correlation) if 0.0 < correlation < 1.0 else 1.0
@@ -169,7 +170,7 @@ def _deviations(
 
 
 def _friction(measured: Measured) -> tuple[float | None, float]:
-    """Return Coulomb's coefficient while the indenter slides, and its standard deviation."""
+    """Return Coulomb's coefficient while the indenter slides, and the standard deviation."""
     slide, drag = measured.slide, measured.tangential_force
     if slide is None or drag is None:
         return None, 0.0

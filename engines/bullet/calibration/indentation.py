@@ -1,4 +1,4 @@
-"""The force of an indenter on tissue that has no time to relax."""
+"""The force of an indenter on tissue without time to relax."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ _TABOR = 0.2
 _NO_DENSITY = 0.0
 """Nothing moves of itself here."""
 _LARGEST_CONTACT = 0.5
-"""Contact radius over thickness up to which the force on a layer is within 3 % of finite elements
+"""Largest contact radius over thickness for a force on a layer within 3 % of finite elements
 (docs/decisions/0073-calibrated-tissue.md).
 """
 
 
 @dataclass(frozen=True)
 class Indenter:
-    """What presses, and what is pressed; m."""
+    """Indenter and pressed sample; m."""
 
     shape: Shape
     radius: float
     thickness: float | None = None
-    """Of the layer, which is bonded to something rigid; None: as good as infinite."""
+    """Thickness of the layer, bonded to a rigid base; None: as good as infinite."""
     poisson_ratio: float = 0.4
 
     def check(self, depth: Vector) -> None:
@@ -63,9 +63,9 @@ class Indenter:
 def elastic_force(indenter: Indenter, depth: Vector, young_modulus: float, stiffening: float) -> Vector:
     """Return the force (N) at `depth` (m, below the unloaded surface), any shape.
 
-    A sphere's is that of a neo-Hookean half-space, a punch's that of a linear one (Johnson, Contact
-    Mechanics, 1985, section 3.4). `stiffening` b multiplies that of a sphere by exp(b (l^2 + 2/l - 3)) with
-    the representative stretch l = 1 - 0.2 a / R, a^2 = R d: as an indented Fung material stiffens (Lin et
+    For a sphere a neo-Hookean half-space, for a punch a linear half-space (Johnson, Contact Mechanics, 1985,
+    section 3.4). `stiffening` b multiplies the force of a sphere by exp(b (l^2 + 2/l - 3)) with the
+    representative stretch l = 1 - 0.2 a / R, a^2 = R d: the stiffening of an indented Fung material (Lin et
     al., Biomech. Model. Mechanobiol. 8, 2009, 345). 0 is neo-Hookean.
     """
     pressed = np.maximum(depth, 0.0)
@@ -81,7 +81,7 @@ def elastic_force(indenter: Indenter, depth: Vector, young_modulus: float, stiff
 
 
 def _of_layer(ratio: Vector, poisson_ratio: float) -> Vector:
-    """Return how much more force a bonded layer exerts; `ratio`: contact radius over its thickness.
+    """Return the factor on the force of a bonded layer; `ratio`: contact radius over thickness.
 
     Dimitriadis et al., Biophys. J. 82 (2002), 2798: a series for spheres and a linear layer.
     """

@@ -20,12 +20,12 @@ _FEWEST = 20
 
 @dataclass(frozen=True)
 class Measured:
-    """Samples of one press, each of shape (n,)."""
+    """Samples of a press, each of shape (n,)."""
 
     time: Vector
     """s, increasing."""
     depth: Vector
-    """m, below the unloaded surface; negative above it."""
+    """Depth below the unloaded surface, m; negative above."""
     force: Vector
     """N, along the depth; positive where the tissue pushes back."""
     slide: Vector | None = None
@@ -37,8 +37,8 @@ class Measured:
 def read(path: Path) -> Measured:
     """Return the samples of `path`, a CSV file with a line of names.
 
-    Columns in any order: `time` (s), `depth` (m), `force` (N); to tell the friction also `slide` (m) and
-    `tangential_force` (N). Raises RecordingError where one is missing or is not a number.
+    Columns in any order: `time` (s), `depth` (m), `force` (N); for friction also `slide` (m) and
+    `tangential_force` (N). Raises RecordingError for a missing column or an entry without a number.
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:

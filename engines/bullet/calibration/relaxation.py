@@ -18,7 +18,7 @@ __all__ = ["Prony"]
 
 @dataclass(frozen=True)
 class Prony:
-    """The shares g_i of the force that relax, and their time constants tau_i, s; both of length 2."""
+    """The relaxing shares g_i of the force, and their time constants tau_i, s; both of length 2."""
 
     shares: tuple[float, float]
     times: tuple[float, float]
@@ -43,8 +43,8 @@ class Prony:
     def at(self, frequency: float) -> tuple[float, float]:
         """Return storage modulus over instantaneous modulus, and loss over storage over w, s.
 
-        At `frequency` (Hz), w = 2 pi frequency: what a body with damping in proportion to its stiffness must
-        have as stiffness and as their ratio to answer a swing of that frequency alike.
+        At `frequency` (Hz), w = 2 pi frequency: stiffness and ratio of damping to stiffness of an equivalent
+        body with proportional damping at this frequency.
         """
         w = 2.0 * np.pi * frequency
         shares, turned = np.array(self.shares), w * np.array(self.times)

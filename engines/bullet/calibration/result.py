@@ -1,4 +1,4 @@
-"""From a calibration to the file that a scenario names."""
+"""Conversion of a calibration to a material file for scenarios."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ def material_file(
 ) -> MaterialFile:
     """Return the content of the file.
 
-    Bullet's material does not relax: its damping is in proportion to its stiffness. It gets the stiffness and
-    the loss that the tissue has at `frequency` (Hz).
+    Bullet's material does not relax, and its damping is proportional to its stiffness. The file has the
+    stiffness and the loss of the tissue at `frequency` (Hz).
 
     Args:
-        found: from the data.
-        indenter: what pressed.
+        found: the calibration.
+        indenter: the indenter.
         density: kg/m^3.
-        frequency: Hz, of the motions that the material is for.
-        data: the file's name.
+        frequency: frequency of the simulated motions, Hz.
+        data: name of the file of measurements.
 
-    Raises RecordingError if the material is none of tissue.
+    Raises RecordingError for a material unlike tissue.
     """
     storage, damping = found.relaxation.at(frequency)
     quick, slow = (

@@ -1,1 +1,1 @@
-"""The elastic material of tissue: constants, forces, and the time step they allow."""
+"""The elastic material of tissue: constants, forces, and the longest time step."""

@@ -1,9 +1,9 @@
-"""How far the surface of an anchored mesh gives way under a force: that of the mesh, and that of its body.
+"""Compliance of the surface of an anchored mesh under a force: of the mesh, and of the body itself.
 
-A coarse mesh gives way too little under a small sphere, and rightly where its whole body bends. So the body
-is taken as a half-space at the place of the force plus what its other boundaries change, and that is smooth
-enough for the coarse mesh: Boussinesq's field is cancelled at the free faces and at the anchored nodes (the
-method of superposition, as for image forces).
+A coarse mesh is too stiff under a small sphere, and right in the bending of the whole body. So the body is a
+half-space at the place of the force plus the effect of all other boundaries, smooth enough for the coarse
+mesh: Boussinesq's field is cancelled at the free faces and at the anchored nodes (the method of
+superposition, as for image forces).
 """
 
 from __future__ import annotations
@@ -22,30 +22,27 @@ from schemas.vectors import Vector
 __all__ = ["MOST_NODES", "SurfaceCompliance"]
 
 MOST_NODES = 1200
-"""The compliance of all nodes is a dense matrix: of so many it has 100 MB and takes some seconds."""
+"""Most nodes: the compliance is a dense matrix, of 100 MB and some seconds at this size."""
 
 _DIGITS = 6
-"""Significant digits that are kept, so that the rounding of a sum in another order does not matter."""
+"""Significant digits kept: the rounding of a sum in another order must not matter."""
 
 _SAME_SIDE = 0.9
-"""Cosine between the normals of two faces from which they are one side of a rim."""
+"""Least cosine between the normals of two faces on the same side of a rim."""
 
 _POINTS: Vector = np.array([[2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]])
-"""Barycentric coordinates of the points, of equal weight, that integrate a quadratic function over a face
-(Strang and Fix, An Analysis of the Finite Element Method, 1973).
+"""Barycentric coordinates of the points, of equal weight, for the integral of a quadratic function over a
+face (Strang and Fix, An Analysis of the Finite Element Method, 1973).
 """
 
 
 class SurfaceCompliance:
-    """Of the surface of an anchored mesh, linear, about its resting shape."""
+    """Linear compliance of the surface of an anchored mesh about the resting shape."""
 
     def __init__(
         self, mesh: TetMesh, anchored: NDArray[np.bool_], faces: Indices, material: Material
     ) -> None:
-        """Take the mesh, which nodes are anchored, shape (n,), and the faces that are free, shape (f, 3).
-
-        At most `MOST_NODES` nodes, of which some are anchored.
-        """
+        """`anchored`: shape (n,), some true; `faces`: free faces, (f, 3); at most `MOST_NODES` nodes."""
         stiffness = _stiffness(mesh, material)
         free, fixed = (np.flatnonzero(np.repeat(which, 3)) for which in (~anchored, anchored))
         inverse: Vector = np.zeros_like(stiffness)
@@ -58,7 +55,7 @@ class SurfaceCompliance:
         tied = stiffness[:, fixed]
 
         def body(node: int, inward: Vector) -> float:
-            """Return what the other boundaries add under 1 N along `inward` on a node, m."""
+            """Return the displacement by the other boundaries under 1 N along `inward` on a node, m."""
             if anchored[node]:
                 return 0.0
             held = -point_displacement(mesh.nodes[anchored] - mesh.nodes[node], inward, material).ravel()
@@ -74,9 +71,9 @@ class SurfaceCompliance:
         self._by_rim = self._without_mirror(mesh.nodes, material)
 
     def _sides(self, body: Callable[[int, Vector], float]) -> dict[int, list[tuple[Vector, float]]]:
-        """Return, for every node of a rim, the normals of its sides and what `of_body_at_rim` is there.
+        """Return, for every node of a rim, the normals of the sides and `of_body_at_rim`.
 
-        A force on a rim and its mirror image are at one place, so what cancels the one cancels the other.
+        A force on a rim and its mirror image are at the same place and are cancelled together.
         """
         found: dict[int, list[tuple[Vector, float]]] = {}
         for ends, sides in zip(self.rims.ends.tolist(), self.rims.outward, strict=True):
@@ -89,7 +86,7 @@ class SurfaceCompliance:
         return found
 
     def _without_mirror(self, nodes: Vector, material: Material) -> Vector:
-        """Return `_body` without what the nearest rim adds, which the mesh knows at nodes away from it."""
+        """Return `_body` without the effect of the nearest rim, which the mesh has at nodes off the rim."""
         if not len(self.rims.ends):
             return self._body
         ways = np.array([self.rims.vectors(nodes[node], nodes) for node in self._surface])
@@ -100,16 +97,16 @@ class SurfaceCompliance:
         return _rounded(self._body - mirrored)
 
     def of_mesh(self, nodes: Indices, inward: Vector) -> Vector:
-        """Return how far (m) 1 N on one of the surface's `nodes`, shape (k,), moves another one.
+        """Return the displacement (m) of surface `nodes`, (k,), under 1 N on each of them, shape (k, k).
 
-        Force and motion are those along `inward`, shape (3,). The result has the shape (k, k).
+        Force and motion are along `inward`, shape (3,).
         """
         at = self._place[nodes]
         between = self._between[np.ix_(at, at)].reshape(-1, 9) @ np.outer(inward, inward).ravel()
         return between.reshape(len(at), len(at))
 
     def on_surface(self, nodes: Indices) -> Indices:
-        """Return which of the `nodes` are on the surface."""
+        """Return the `nodes` on the surface."""
         return np.intersect1d(nodes, self._surface)
 
     def normals_at(self, nodes: Indices) -> Vector:
@@ -117,7 +114,7 @@ class SurfaceCompliance:
         return self._normals[self._place[nodes]]
 
     def between(self, nodes: Indices) -> Vector:
-        """Return how far (m) 1 N on the surface's `nodes` moves them, by node and axis, shape (3 k, 3 k)."""
+        """Return the displacement (m) of surface `nodes` under 1 N on each, by node and axis, (3 k, 3 k)."""
         at = self._place[nodes]
         return self._between[np.ix_(at, at)].transpose(0, 2, 1, 3).reshape(3 * len(at), -1)
 
@@ -130,9 +127,9 @@ class SurfaceCompliance:
         return float(parts @ self._body[self._place[nodes]])
 
     def of_body_at_rim(self, nodes: Indices, parts: Vector, outward: Vector) -> float:
-        """Return how much farther than a quarter-space the body gives way near a rim, in m.
+        """Return the body's compliance near a rim in excess of a quarter-space, in m.
 
-        Arguments as for `of_body`; outward: normal of the face that is pressed, shape (3,).
+        Arguments as for `of_body`; outward: normal of the pressed face, shape (3,).
         """
         values = self._by_rim[self._place[nodes]]
         for i, node in enumerate(nodes.tolist()):
@@ -142,7 +139,7 @@ class SurfaceCompliance:
 
 
 def _rounded(values: Vector) -> Vector:
-    """Return values rounded to `_DIGITS` of the largest one."""
+    """Return values rounded to `_DIGITS` of the largest value."""
     largest = float(np.abs(values).max(initial=0.0))
     return values if largest == 0.0 else np.round(values / largest, _DIGITS) * largest
 
@@ -174,9 +171,9 @@ def _normals(mesh: TetMesh, faces: Indices, surface: Indices) -> Vector:
 
 
 def _cancelling(nodes: Vector, faces: Indices, node: int, inward: Vector, material: Material) -> Vector:
-    """Return the forces (N) that free the faces of the stress of 1 N along `inward` on a node, shape (n, 3).
+    """Return the forces (N), shape (n, 3), against the stress on the faces of 1 N along `inward` on a node.
 
-    Those of the faces around the node itself are left out: they are the surface of the half-space.
+    Faces around the node itself are left out: they are the surface of the half-space.
     """
     others = faces[(faces != node).all(axis=1)]
     corners = nodes[others]

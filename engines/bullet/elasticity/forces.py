@@ -13,7 +13,7 @@ __all__ = ["Elasticity"]
 
 
 class Elasticity:
-    """What the tetrahedra around a node exert on it.
+    """Elastic forces of the tetrahedra around a node.
 
     Energy density of Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation (ACM Trans. Graph. 37, 2018),
     equation 14: with a = 1 + 3 mu / (4 lambda), the stress is P = mu (1 - 1 / (tr F^T F + 1)) F + lambda (J -
@@ -31,9 +31,9 @@ class Elasticity:
         self._alpha = 1.0 + 0.75 * self._mu / self._lambda
 
     def forces(self, nodes: Vector, at: NDArray[np.bool_]) -> Vector:
-        """Return the elastic force (N) on every node that `at`, shape (n,), marks, and zeros for the others.
+        """Return the elastic force (N) on every node marked in `at`, shape (n,), and zeros elsewhere.
 
-        nodes: deformed, m, shape (n, 3).
+        nodes: deformed nodes, m, shape (n, 3).
         """
         around = at[self._tetrahedra].any(axis=1)
         tetrahedra: Indices = self._tetrahedra[around]

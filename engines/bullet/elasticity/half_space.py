@@ -1,9 +1,9 @@
-"""What a half-space of tissue does: pressed by a sphere, deep too, and by a force at a point.
+"""A half-space of tissue under a sphere, also deep, and under a point force.
 
-The law of the sphere is Hertz's (Johnson, Contact Mechanics, 1985, section 4.2) times a share, which is the
-force of converged finite elements of Bullet's neo-Hookean material, without friction, over Hertz's: it falls
-as the contact is no longer small beside the sphere. `python bench/tissue_truth.py law` computes the shares
-from 1.2 radii on; those for smaller depths are of an earlier study, and it is within 0.4 percent of them.
+The law of the sphere is Hertz's (Johnson, Contact Mechanics, 1985, section 4.2) times a share: the force of
+converged finite elements of Bullet's neo-Hookean material, without friction, over Hertz's. The share falls as
+the contact is no longer small beside the sphere. `python bench/tissue_truth.py law` computes the shares from
+1.2 radii on; shares for smaller depths are from an earlier study, within 0.4 percent of the bench.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ __all__ = [
 ]
 
 DEEPEST = 2.5
-"""Depth in radii up to which the law is known; the material itself gives way under a sphere not far beyond
+"""Largest depth of the law, in radii; the material itself gives way under a sphere not far beyond
 (docs/decisions/0095-converged-truth.md).
 """
 
 POISSON_RATIOS = (0.3, 0.4, 0.45)
-"""Of the table; between them shares are interpolated, beyond them taken from the nearest."""
+"""Poisson ratios of the table; shares are interpolated in between, and taken from the nearest beyond."""
 
 _TABLE: Vector = np.array(
     [
@@ -61,8 +61,8 @@ _TABLE: Vector = np.array(
 _DEPTHS, _SHARES = _TABLE[:, 0], _TABLE[:, 1:].T
 
 _HIGHEST_OVER_PLANE = -0.5
-"""Height over the tangent plane, in distances from the point, where the fields of a force at a point end:
-they are singular on the axis above it.
+"""Upper end of the fields of a point force: height over the tangent plane, in distances from the point. The
+fields are singular on the axis above the point.
 """
 
 
@@ -78,10 +78,10 @@ def sphere_force(depth: Vector, radius: float, material: Material) -> Vector:
 
 
 def patch_compliance(radius: float, material: Material) -> tuple[float, float]:
-    """Return how far (m) a round patch that is held gives way to 1 N: along its normal, and across.
+    """Return the displacement (m) of a held round patch under 1 N: along the normal, and across.
 
-    Along: (1 - 2 nu) / (4 G a log(3 - 4 nu)), of a punch that sticks (Spence, Proceedings of the Royal
-    Society A 305, 1968); across: (2 - nu) / (8 G a) (Johnson, Contact Mechanics, 1985, section 7.2).
+    Along: (1 - 2 nu) / (4 G a log(3 - 4 nu)), a sticking punch (Spence, Proceedings of the Royal Society A
+    305, 1968); across: (2 - nu) / (8 G a) (Johnson, Contact Mechanics, 1985, section 7.2).
     """
     nu, shear = material.poisson_ratio, material.lame[0]
     along = (1.0 - 2.0 * nu) / (4.0 * shear * radius * np.log(3.0 - 4.0 * nu))
@@ -91,8 +91,8 @@ def patch_compliance(radius: float, material: Material) -> tuple[float, float]:
 def point_displacement(away: Vector, inward: Vector, material: Material) -> Vector:
     """Return the displacement (m) by 1 N at a point of the surface of a half-space, shape (n, 3).
 
-    Boussinesq's solution: Johnson, Contact Mechanics (1985), section 3.2. away: from that point, m, shape
-    (n, 3). inward: the direction of the force, into the half-space, shape (3,).
+    Boussinesq's solution: Johnson, Contact Mechanics (1985), section 3.2. away: displacement from the point,
+    m, shape (n, 3). inward: direction of the force, into the half-space, shape (3,).
     """
     nu, shear = material.poisson_ratio, material.lame[0]
     R, depth, across, above = _cylindrical(away, inward)
@@ -104,7 +104,7 @@ def point_displacement(away: Vector, inward: Vector, material: Material) -> Vect
 def point_stress(away: Vector, inward: Vector, material: Material) -> Vector:
     """Return the stress (Pa) by 1 N at a point of the surface of a half-space, shape (n, 3, 3).
 
-    Arguments and source are those of `point_displacement`.
+    Arguments and source: see `point_displacement`.
     """
     free = 1.0 - 2.0 * material.poisson_ratio
     R, depth, across, above = _cylindrical(away, inward)

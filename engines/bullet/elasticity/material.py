@@ -1,4 +1,4 @@
-"""Elastic constants: from Young's modulus to what Bullet's neo-Hookean model takes."""
+"""Elastic constants: from Young's modulus to the constants of Bullet's neo-Hookean model."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Material:
 
     @property
     def bullet_lame(self) -> tuple[float, float]:
-        """What Bullet must be given for as mu and lambda (Pa) so that small strains obey `lame`.
+        """Bullet's mu and lambda (Pa) for small strains obeying `lame`.
 
         Bullet has the energy of Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation (ACM Trans. Graph.
-        37, 2018), whose section 3.4 shows that its linearisation needs 4/3 mu and lambda + 5/6 mu.
+        37, 2018); by section 3.4 the linearisation needs 4/3 mu and lambda + 5/6 mu.
         """
         mu, lambda_ = self.lame
         return 4.0 / 3.0 * mu, lambda_ + 5.0 / 6.0 * mu
@@ -38,7 +38,7 @@ class Material:
     def contact_stiffness(self, radius: float) -> float:
         """Return the stiffness (N/m) against a flat round punch of `radius` (m) on a half-space.
 
-        It is 2 E radius / (1 - nu^2): Johnson, Contact Mechanics (1985), section 3.4. For a sphere it is the
-        tangent stiffness where the contact has that radius.
+        2 E radius / (1 - nu^2): Johnson, Contact Mechanics (1985), section 3.4. For a sphere this is the
+        tangent stiffness at a contact of this radius.
         """
         return 2.0 * self.young_modulus * radius / (1.0 - self.poisson_ratio**2)

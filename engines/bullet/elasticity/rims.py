@@ -1,8 +1,8 @@
-"""The sharp edges of a body, and what they take from the force of a half-space.
+"""The sharp edges of a body, and their share of the force of a half-space.
 
-A sphere near a rim presses a quarter-space. At equal depth its force is the half-space's times a share, of
+A sphere near a rim presses a quarter-space. At equal depth the force is the half-space's times a share, from
 converged finite elements of Bullet's material (`python bench/tissue_truth.py rim`): two faces at a right
-angle, no friction, the force along the normal of the face that is pressed.
+angle, no friction, the force along the normal of the pressed face.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from schemas.vectors import Vector
 __all__ = ["MIRRORED", "Rims", "mirror_displacement", "rim_share", "rims_of"]
 
 _LEAST_TURN = np.pi / 3
-"""Angle between the normals of two faces from which their edge is a rim; the facets of round organs with 250
-nodes turn by less.
+"""Least angle between the normals of two faces at a rim; the facets of round organs with 250 nodes turn by
+less.
 """
 
 MIRRORED = 1.49
-"""What a rim adds to the displacement by a point force is about that by so many at its mirror image
-(Guilbault, Journal of Tribology 133, 2011, 031402, for a right angle and Poisson ratio 0.4).
+"""Effect of a rim on the displacement by a point force, as a number of forces at the mirror image (Guilbault,
+Journal of Tribology 133, 2011, 031402, for a right angle and Poisson ratio 0.4).
 """
 
 _AWAY = np.array([0.0, 0.3, 0.6, 1.0])
-"""Of the sphere's axis from the rim, in radii."""
+"""Distance of the sphere's axis from the rim, in radii."""
 _DEPTHS = np.array([0.2, 0.4, 0.6, 0.8, 1.0, 1.2])
-"""In radii."""
+"""Depths, in radii."""
 _SHARES: Vector = np.array(
     [
         [0.4468, 0.4665, 0.4840, 0.4966, 0.4966, 0.4966],
@@ -39,15 +39,15 @@ _SHARES: Vector = np.array(
         [0.8025, 0.7629, 0.7437, 0.7355, 0.7336, 0.7352],
     ]
 )
-"""Of the half-space's force, by distance from the rim, then by depth; Poisson ratio 0.4. On the rim it was
-computed up to 0.8 radii, and is taken as the same beyond.
+"""Share of the half-space's force, by distance from the rim, then by depth; Poisson ratio 0.4. On the rim
+computed up to 0.8 radii, and constant beyond.
 """
 
 
 def rim_share(away: float, depths: Vector) -> Vector:
-    """Return the share of the half-space's force that is left near a rim, at every depth.
+    """Return the share of the half-space's force near a rim, at every depth.
 
-    `away`, of the sphere's axis from the rim, and `depths` are in radii.
+    `away`, the distance of the sphere's axis from the rim, and `depths` are in radii.
     """
     row = float(np.interp(away, _AWAY, range(len(_AWAY))))
     low = min(int(row), len(_AWAY) - 2)
@@ -56,10 +56,10 @@ def rim_share(away: float, depths: Vector) -> Vector:
 
 
 def mirror_displacement(away: Vector, material: Material) -> Vector:
-    """Return how far (m) the rim lets a point give way under 1 N on it, beyond the half-space's own.
+    """Return the displacement (m) of a point under 1 N by the rim, in excess of the half-space's.
 
-    away: of the point from the rim, m; the mirror image is twice as far. Boussinesq's solution: Johnson,
-    Contact Mechanics (1985), section 3.2.
+    away: displacement of the point from the rim, m; the mirror image is twice as far. Boussinesq's solution:
+    Johnson, Contact Mechanics (1985), section 3.2.
     """
     plane_strain = material.young_modulus / (1.0 - material.poisson_ratio**2)
     return MIRRORED / (np.pi * plane_strain * 2.0 * away)
@@ -67,14 +67,14 @@ def mirror_displacement(away: Vector, material: Material) -> Vector:
 
 @dataclass(frozen=True)
 class Rims:
-    """The sharp edges of a surface; each has two sides, the faces that meet there."""
+    """The sharp edges of a surface; the sides of an edge are the two adjacent faces."""
 
     ends: Indices
     """Two nodes of each, shape (k, 2)."""
     outward: Vector
     """Normal of the face on each side, shape (k, 2, 3)."""
     across: Vector
-    """In the plane of that face, out over the rim, shape (k, 2, 3)."""
+    """Unit vectors in the plane of each face, out over the rim, shape (k, 2, 3)."""
 
     def vectors(self, point: Vector, nodes: Vector) -> Vector:
         """Return the way from `point` (m) to the nearest point of each rim, shape (k, 3).
@@ -89,16 +89,16 @@ class Rims:
     def near(
         self, centre: Vector, inward: Vector, nodes: Vector, reach: float
     ) -> tuple[float, Vector] | None:
-        """Return how far (m) a sphere's axis is from the nearest rim, and the direction in which it presses.
+        """Return the distance (m) of a sphere's axis from the nearest rim, and the direction of pressing.
 
-        Below 0 it is beyond the rim, and presses from its centre to there; before, as the face does. None if
-        none is within `reach` (m).
+        Negative: beyond the rim, pressing from the centre towards the rim; positive: pressing along the
+        face's normal. None: no rim within `reach`.
 
         Args:
-            centre: of the sphere, m, shape (3,).
-            inward: about into the pressed face, shape (3,).
-            nodes: m, shape (n, 3).
-            reach: m.
+            centre: centre of the sphere, m, shape (3,).
+            inward: approximate direction into the pressed face, shape (3,).
+            nodes: nodes of the mesh, m, shape (n, 3).
+            reach: largest distance, m.
         """
         ways, facing = self.vectors(centre, nodes), -self.outward @ inward
         sides = facing.argmax(axis=1)

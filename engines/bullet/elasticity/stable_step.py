@@ -1,4 +1,4 @@
-"""The natural frequencies of a mesh, and the longest time step that they allow in Bullet."""
+"""The natural frequencies of a mesh, and the longest time step in Bullet."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["ACCURATE_PHASE", "face_loss", "highest_frequency", "longest_step", "
 _POWER_ITERATIONS = 200
 
 _SAG_ITERATIONS, _SAG_TOLERANCE = 300, 0.1
-"""Of conjugate gradients for the sag: enough to know the lowest frequency to one percent."""
+"""Limits of conjugate gradients for the sag: enough for the lowest frequency to one percent."""
 
 _LARGEST_PHASE = 4.0
 """Largest timestep x highest frequency.
@@ -26,28 +26,28 @@ A block pressed at a node is stable at 4.0 and chatters at 4.7 (elasticity/test_
 
 
 ACCURATE_PHASE = 1.7
-"""Timestep x highest frequency up to which the force of contacts is within 10 %."""
+"""Largest timestep x highest frequency for a contact force within 10 %."""
 _FACE_COMPLIANCE = 0.042
-"""How much deeper a sphere sinks into a face than the tissue gives way, at a phase of 1; it grows with the
-square of the phase. On coarse meshes; on those of 250 nodes it is 0.031 (`bench/tissue_step.py`).
+"""Extra relative sinking of a sphere into a face at a phase of 1, growing with the square of the phase. On
+coarse meshes; with 250 nodes 0.031 (`bench/tissue_step.py`).
 """
 
 
 def face_loss(phase: float) -> float:
-    """Return the largest share of the force that a contact in a face of the mesh loses.
+    """Return the largest relative loss of force of a contact in a face of the mesh.
 
-    `phase`: timestep x highest frequency. Contacts at nodes lose next to nothing, what is held nothing.
+    `phase`: timestep x highest frequency. Contacts at nodes lose next to nothing, held nodes nothing.
     """
     sinking = _FACE_COMPLIANCE * phase**2
     return sinking / (1.0 + sinking)
 
 
 def highest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
-    """Return the highest natural frequency (rad/s) of the mesh about its resting shape.
+    """Return the highest natural frequency (rad/s) of the mesh about the resting shape.
 
     Args:
-        mesh: the body; as in Bullet, all its nodes have the same mass.
-        free: 1 for nodes that can move, 0 for anchored ones, shape (n,).
+        mesh: the body; as in Bullet, all nodes have the same mass.
+        free: 1 for free nodes, 0 for anchored nodes, shape (n,).
         material: linearised.
     """
     stiffness = _stiffness_per_mass(mesh, free, material)
@@ -60,14 +60,14 @@ def highest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
 
 
 def lowest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
-    """Return the lowest natural frequency (rad/s) that weight along z excites.
+    """Return the lowest natural frequency (rad/s) excited by weight along z.
 
-    By Rayleigh's quotient of the sag under weight, which conjugate gradients find; where they have not
-    converged, the result is too high.
+    Rayleigh's quotient of the sag under weight, by conjugate gradients; without convergence the result is too
+    high.
 
     Args:
-        mesh: the body; as in Bullet, all its nodes have the same mass.
-        free: 1 for nodes that can move, 0 for anchored ones, of which there is at least one, shape (n,).
+        mesh: the body; as in Bullet, all nodes have the same mass.
+        free: 1 for free nodes, 0 for anchored nodes (at least one), shape (n,).
         material: linearised.
     """
     stiffness = _stiffness_per_mass(mesh, free, material)
@@ -89,7 +89,7 @@ def lowest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
 def _stiffness_per_mass(mesh: TetMesh, free: Vector, material: Material) -> Callable[[Vector], Vector]:
     """Return the map from displacements, shape (n, 3), to elastic forces divided by the mass of a node.
 
-    It multiplies by 1/s^2; arguments as in `highest_frequency`.
+    In 1/s^2; arguments as in `highest_frequency`.
     """
     edges = mesh.nodes[mesh.tetrahedra[:, 1:]] - mesh.nodes[mesh.tetrahedra[:, :1]]  # (m, 3, 3)
     inverse = np.linalg.inv(edges)  # (m, 3, 3): the columns are the gradients of the shape functions 1 to 3
@@ -125,9 +125,9 @@ def _stiffness_per_mass(mesh: TetMesh, free: Vector, material: Material) -> Call
 def longest_step(frequency: float, damping: float) -> float:
     """Return the longest stable time step (s) of Bullet's integration scheme.
 
-    The scheme is explicit in elasticity and implicit in damping, then it moves the positions. For a mode of
-    angular frequency w it reads v' = (v - h w^2 x) / (1 + h d w^2), x' = x + h v'. Its roots leave the unit
-    circle where h^2 w^2 > 4 + 2 h d w^2, so d >= h / 2 keeps any frequency stable. Contacts are solved before
-    the damping, and chatter where h w is too large.
+    The scheme is explicit in elasticity and implicit in damping, then moves the positions. For a mode of
+    angular frequency w: v' = (v - h w^2 x) / (1 + h d w^2), x' = x + h v'. The roots leave the unit circle at
+    h^2 w^2 > 4 + 2 h d w^2, so d >= h / 2 keeps any frequency stable. Contacts are solved before the damping,
+    and chatter at too large an h w.
     """
     return min(damping + sqrt(damping**2 + 4.0 / frequency**2), _LARGEST_PHASE / frequency)

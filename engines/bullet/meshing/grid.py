@@ -15,14 +15,14 @@ FEWEST_NODES = 18
 """Nodes of the smallest symmetric block, 2 x 2 x 1 cells."""
 
 _COUNT_TOLERANCE = 0.05
-"""Of all grids whose node count is this near to the requested one, the one with the most cubic cells is
-taken.
+"""Tolerance of the node count: among the grids within the tolerance, the grid with the most cubic cells is
+used.
 """
 
 # (8, 3): corner number 4 i + 2 j + k stands at (i, j, k)
 _CORNERS = np.array(list(product((0, 1), repeat=3)))
 _CELL = np.array([[0, 4, 2, 1], [6, 2, 4, 7], [5, 4, 1, 7], [3, 1, 2, 7], [4, 2, 1, 7]])
-"""Five positively oriented tetrahedra of a cube, four at the corners and one in the middle."""
+"""Five positively oriented tetrahedra of a cube, four at the corners and the last in the middle."""
 _MIRRORED_CELL = (_CELL ^ 4)[:, [0, 2, 1, 3]]
 """The same, mirrored in x: neighbouring cells must alternate for their diagonals to meet."""
 
@@ -30,9 +30,9 @@ _MIRRORED_CELL = (_CELL ^ 4)[:, [0, 2, 1, 3]]
 def block(size: Vector, nodes: int) -> TetMesh:
     """Return a box of edge lengths `size` (m), shape (3,), with about `nodes` nodes.
 
-    The origin is in the middle of its top face. The cells of a regular grid are cut into five tetrahedra
+    The origin is in the middle of the top face. The cells of a regular grid are cut into five tetrahedra
     each, the fewest possible, mirrored from cell to cell. With an even number of cells along x and y the mesh
-    is its own mirror image in both, so it has no preferred diagonal.
+    is symmetric in both, without a preferred diagonal.
     """
     cells = block_cells(size, nodes)
     points = (_grid(cells[0] + 1, cells[1] + 1, cells[2] + 1) / cells - [0.5, 0.5, 1.0]) * size
@@ -45,9 +45,8 @@ def tetrahedra_of_cells(cells: tuple[int, int, int], *, closed: bool = False) ->
     The nodes of the grid are numbered with the last index the fastest.
 
     Args:
-        cells: along the three directions, which must be right-handed.
-        closed: the second direction runs around: its last cells, of which there must be an even number, end
-            on the first nodes.
+        cells: numbers of cells along three right-handed directions.
+        closed: the second direction runs around: the last cells (an even number) end on the first nodes.
     """
     rows = cells[1] + (0 if closed else 1)
     origins = _grid(*cells)  # (c, 3)

@@ -1,7 +1,7 @@
-"""Tetrahedra that fill a smooth body, by isosurface stuffing.
+"""Tetrahedra for a smooth body, by isosurface stuffing.
 
-A body-centred cubic lattice covers the body; vertices near its surface are moved onto it, and the
-tetrahedra that the surface still cuts are cut there (Labelle, Shewchuk, Isosurface Stuffing, ACM Trans.
+A body-centred cubic lattice covers the body; vertices near the surface are moved onto the surface, and
+tetrahedra still crossed by the surface are cut there (Labelle, Shewchuk, Isosurface Stuffing, ACM Trans.
 Graph. 26, 2007).
 """
 
@@ -17,25 +17,25 @@ from schemas.vectors import Vector
 __all__ = ["Field", "fill"]
 
 Field = Callable[[Vector], Vector]
-"""Of points, shape (n, 3), m: positive inside the body, negative outside, about the depth (m) near the
-surface.
+"""Field over points, shape (n, 3), m: positive inside the body, negative outside, about the depth (m) near
+the surface.
 """
 
 _SNAP_LONG, _SNAP_SHORT = 0.24999, 0.41189
-"""A lattice vertex moves onto the surface that cuts an edge nearer to it than this share of the edge (Labelle
-and Shewchuk, table 2).
+"""Largest distance, as a fraction of the edge, of a lattice vertex moved onto the surface (Labelle and
+Shewchuk, table 2).
 """
 
 _BISECTIONS = 20
 
 
 def fill(field: Field, low: Vector, high: Vector, spacing: float) -> TetMesh:
-    """Return the body where `field` is positive.
+    """Return the body of positive `field`.
 
     Args:
-        field: of the body.
+        field: field of the body.
         low: corner of a box around the body, m, shape (3,).
-        high: its opposite corner.
+        high: opposite corner of the box, m, shape (3,).
         spacing: edge length (m) of the lattice's cubes; the body gets about two nodes per cube.
     """
     points, tetrahedra = _lattice(low, high, spacing)
@@ -48,9 +48,9 @@ def fill(field: Field, low: Vector, high: Vector, spacing: float) -> TetMesh:
 
 
 def _lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices]:
-    """Return vertices and tetrahedra of a body-centred lattice that covers a box.
+    """Return vertices and tetrahedra of a body-centred lattice over a box.
 
-    Corners and centres of its cubes lie symmetrically about the middle of the box.
+    Corners and centres of the cubes are symmetric about the middle of the box.
     """
     cubes = np.ceil((high - low) / spacing).astype(np.int64) + 2
     shape = 2 * cubes + 1  # places at half the spacing; corners of cubes are at even, centres at odd ones
@@ -79,10 +79,10 @@ def _grid(start: Indices, stop: Indices, step: int) -> Indices:
 def _snapped(
     field: Field, points: Vector, signs: Indices, tetrahedra: Indices, spacing: float
 ) -> tuple[Vector, Indices, Indices, Vector]:
-    """Move vertices onto the surface where it is near.
+    """Move vertices near the surface onto the surface.
 
-    Returns the points, their signs (0 on the surface), the edges that the surface still cuts, shape (e, 2),
-    and the points where it cuts them, shape (e, 3).
+    Returns the points, their signs (0 on the surface), the edges still cut by the surface, shape (e, 2), and
+    the points of the cuts, shape (e, 3).
     """
     pairs = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
     edges = np.unique(np.sort(tetrahedra[:, pairs].reshape(-1, 2), axis=1), axis=0)
@@ -120,9 +120,9 @@ _STENCILS: dict[tuple[int, int], list[str]] = {
     (1, 1): ["abPR"],
     (1, 0): ["aPQR"],
 }
-"""What is kept of a tetrahedron by its numbers of vertices inside and on the surface. Its vertices a to d are
-sorted, those inside first; capital letters are cuts, named in `_CUTS`. A square face is halved from its inner
-vertex of the lowest number, on both sides alike.
+"""Kept parts of a tetrahedron by the numbers of vertices inside and on the surface. The vertices a to d are
+sorted, inner vertices first; capital letters are cuts, named in `_CUTS`. A square face is halved from the
+inner vertex of the lowest number, on both sides alike.
 """
 
 _CUTS: dict[tuple[int, int], dict[str, str]] = {
@@ -138,7 +138,7 @@ _CUTS: dict[tuple[int, int], dict[str, str]] = {
 def _cut(
     points: Vector, signs: Indices, tetrahedra: Indices, edges: Indices, cuts: Vector
 ) -> tuple[Vector, Indices]:
-    """Return points and the tetrahedra of what is inside."""
+    """Return points and the inner tetrahedra."""
     count = len(points)
     keys = edges[:, 0] * count + edges[:, 1]  # ascending, as the edges are sorted
     order = np.argsort(-signs[tetrahedra] * 2 * count + tetrahedra, axis=1)

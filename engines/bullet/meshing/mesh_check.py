@@ -1,4 +1,4 @@
-"""Checks of a user's mesh: everything that makes it unusable, with the remedy."""
+"""Checks of a user's mesh: every obstacle to its use, with the remedy."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SHOWN = 5
 
 
 def checked_mesh(nodes: Vector, tetrahedra: Indices) -> TetMesh:
-    """Return the mesh. Raises ValueError with all that is wrong with it.
+    """Return the mesh. Raises ValueError with all problems of the mesh.
 
     Args:
         nodes: shape (n, 3), m.
@@ -50,7 +50,7 @@ def _some(indices: Indices) -> str:
 
 
 def _numbers(nodes: Vector, tetrahedra: Indices) -> list[str]:
-    """Return the problems that prevent any further check."""
+    """Return the problems preventing any further check."""
     if not 4 <= len(nodes) <= MOST_NODES or not len(tetrahedra):
         return [
             f"it has {len(nodes)} nodes and {len(tetrahedra)} tetrahedra; 4 to {MOST_NODES} nodes are"
@@ -106,7 +106,7 @@ def _shapes(nodes: Vector, tetrahedra: Indices) -> list[str]:
 
 
 def _surface(nodes: Vector, mesh: TetMesh) -> list[str]:
-    """Return the problems of the surface: not closed, not simple, or in more than one piece."""
+    """Return the problems of the surface: not closed, not simple, or in several pieces."""
     problems: list[str] = []
     crowded = mesh.crowded
     if len(crowded):
@@ -142,7 +142,7 @@ def _surface(nodes: Vector, mesh: TetMesh) -> list[str]:
 
 
 def _pieces(mesh: TetMesh) -> int:
-    """Return into how many parts that share no face the mesh falls."""
+    """Return the number of parts of the mesh without a common face."""
     face = mesh.face_numbers
     label = np.arange(len(face))
     while True:

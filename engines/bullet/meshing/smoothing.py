@@ -1,4 +1,4 @@
-"""Better shaped tetrahedra: nodes are moved, those of the surface along it, until slivers are gone.
+"""Better shaped tetrahedra: nodes are moved (surface nodes along the surface) until slivers are gone.
 
 Slivers would make the tissue unstable.
 """
@@ -17,13 +17,13 @@ _SMOOTHINGS = 40
 """Steps of smoothing; the least shape quality of the organs rises by less than 1 % from 20 to 160."""
 
 _DIFFERENCE_M = 1e-6
-"""Step of the differences that give a field's gradient."""
+"""Step of the differences for a field's gradient, m."""
 
 
 def smoothed(mesh: TetMesh, field: Field, spacing: float) -> TetMesh:
     """Return a mesh with better shaped tetrahedra.
 
-    Nodes move down the gradient of their distortion, those of the surface along the surface of `field`.
+    Nodes move down the gradient of the distortion, surface nodes along the surface of `field`.
     """
     nodes, surface = mesh.nodes.copy(), np.unique(mesh.triangles)
     step = 0.02 * spacing
@@ -49,11 +49,11 @@ _REGULAR = np.linalg.inv(np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 
 
 
 def _distortion(nodes: Vector, tetrahedra: Indices) -> tuple[float, Vector]:
-    """Return the distortion of all tetrahedra, and its gradient by the nodes, shape (n, 3).
+    """Return the distortion of all tetrahedra, and the gradient by the nodes, shape (n, 3).
 
-    The distortion is the sum of (|F|^2 / (3 det F^(2/3)))^4, F from a regular tetrahedron; inf where one is
-    inverted. It is the inverse of the mean ratio: Knupp, Algebraic Mesh Quality Metrics, SIAM J. Sci. Comput.
-    23 (2001).
+    The distortion is the sum of (|F|^2 / (3 det F^(2/3)))^4, F from a regular tetrahedron; inf for an
+    inverted tetrahedron. The base is the inverse of the mean ratio: Knupp, Algebraic Mesh Quality Metrics,
+    SIAM J. Sci. Comput. 23 (2001).
     """
     edges = (nodes[tetrahedra[:, 1:]] - nodes[tetrahedra[:, :1]]).transpose(0, 2, 1)  # (m, 3, 3), columns
     deformation = edges @ _REGULAR

@@ -1,4 +1,4 @@
-"""Tetrahedral meshes of organs: surface, quality, and the .vtk file that Bullet reads."""
+"""Tetrahedral meshes of organs: surface, quality, and the .vtk file for Bullet."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Indices", "TetMesh", "compact", "cross", "dihedral_angles", "shape_q
 Indices = NDArray[np.int64]
 
 _SECOND, _THIRD = [1, 2, 0], [2, 0, 1]
-"""Of the coordinates, in the products that make a cross product."""
+"""Order of the coordinates in the products of a cross product."""
 
 _FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 """Faces of a positively oriented tetrahedron, counter-clockwise seen from outside."""
@@ -36,13 +36,13 @@ class TetMesh:
     def triangles(self) -> Indices:
         """The surface, shape (f, 3), counter-clockwise seen from outside.
 
-        It has the faces that belong to one tetrahedron only.
+        The faces belong to a single tetrahedron each.
         """
         return self._faces[self._shared == 1]
 
     @property
     def crowded(self) -> Indices:
-        """Faces that belong to more than two tetrahedra, shape (f, 3): there are none in a sound mesh."""
+        """Faces of more than two tetrahedra, shape (f, 3): empty for a sound mesh."""
         return self._faces[self._shared > 2]
 
     @cached_property
@@ -67,7 +67,7 @@ class TetMesh:
         return np.bincount(numbers)[numbers]
 
     def write_vtk(self, path: Path) -> None:
-        """Write a legacy ASCII .vtk file, the only tetrahedral format that Bullet reads.
+        """Write a legacy ASCII .vtk file, Bullet's only tetrahedral format.
 
         The nodes read back bit for bit.
         """
@@ -103,7 +103,7 @@ def volumes(nodes: Vector, tetrahedra: Indices) -> Vector:
 
 
 def compact(nodes: Vector, tetrahedra: Indices) -> TetMesh:
-    """Return a mesh of the nodes that tetrahedra use, in their order."""
+    """Return a mesh of the nodes in tetrahedra, in the same order."""
     used, renumbered = np.unique(tetrahedra, return_inverse=True)
     return TetMesh(nodes[used], renumbered.reshape(-1, 4))
 
@@ -111,7 +111,7 @@ def compact(nodes: Vector, tetrahedra: Indices) -> TetMesh:
 def shape_quality(nodes: Vector, tetrahedra: Indices) -> Vector:
     """Return the mean ratio of every tetrahedron, shape (m,): 1 is regular, 0 flat, negative inverted.
 
-    It is 12 (3 volume)^(2/3) / sum of squared edges: Liu, Joe, Relationship between tetrahedron shape
+    12 (3 volume)^(2/3) / sum of squared edges: Liu, Joe, Relationship between tetrahedron shape
     measures, BIT 34 (1994).
     """
     corners = nodes[tetrahedra]  # (m, 4, 3)

@@ -24,7 +24,7 @@ _TYPES = {
     "vtktypeint64": ">i8",
     "vtktypeint32": ">i4",
 }
-"""Numbers of binary files, which are big-endian (The VTK User's Guide, 11th edition, file formats)."""
+"""Number types of binary files, big-endian (The VTK User's Guide, 11th edition, file formats)."""
 
 _LARGEST_FILE = 64_000_000
 """Bytes; a mesh of a few thousand nodes has less than a hundredth."""
@@ -33,7 +33,7 @@ _LARGEST_FILE = 64_000_000
 def read_vtk(path: Path) -> tuple[Vector, Indices]:
     """Return the nodes, shape (n, 3), in the file's unit, and the tetrahedra, shape (m, 4), as in the file.
 
-    Raises ValueError, naming the file, where it contains no tetrahedral mesh.
+    Raises ValueError, naming the file, for a file without a tetrahedral mesh.
     """
     try:
         if path.stat().st_size > _LARGEST_FILE:
@@ -99,7 +99,7 @@ class _Reader:
         return nodes, np.array(cells, np.int64).reshape(-1, 4)
 
     def _cells(self, words: list[str]) -> list[Indices]:
-        """Return the nodes of every cell; since version 5 a list of where they begin stands before them."""
+        """Return the nodes of every cell; since version 5 a list of offsets precedes the nodes."""
         count, size = self._count(words, 1), self._count(words, 2)
         if self._content[self._at : self._at + 40].lstrip().startswith(b"OFFSETS"):
             offsets = self._integers(count, self._kind("OFFSETS"))
@@ -117,9 +117,9 @@ class _Reader:
         return line.decode("ascii", "replace").strip()
 
     def _kind(self, keyword: str) -> str:
-        """Return the type of the numbers after the next line that is not blank.
+        """Return the type of the numbers after the next non-blank line.
 
-        Raises ValueError unless that line begins with `keyword`.
+        Raises ValueError unless the line begins with `keyword`.
         """
         while self._at < len(self._content):
             words = self._line().split()
