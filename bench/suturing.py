@@ -28,7 +28,6 @@ from typing import Any
 
 import numpy as np
 
-from controllers.expert.hand import framed, pose_of
 from controllers.stitching.geometry import stitch_between
 from controllers.stitching.stage import Stage
 from controllers.stitching.way_on import way_on
@@ -40,6 +39,7 @@ from hub.planning.scenario_file import load
 from hub.planning.wiring import make_plan
 from hub.session.launch import in_one_host
 from robots.training.needles import NEEDLES
+from robots.transform import matrix_to_pose, pose_to_matrix
 from schemas.errors import MotionError
 from schemas.ros import Header, Point, PointStamped, StringMessage
 from schemas.vectors import Vector
@@ -270,7 +270,7 @@ def _guided(seed: int) -> dict[str, Any]:
         if not trial.time_ns % 10_000_000:
             said += [message.data for message in trial.out["lead"]["status"]]
             begun = begun or bool(said)
-            needle = framed(trial.out["robot"]["needle/pose"])
+            needle = pose_to_matrix(trial.out["robot"]["needle/pose"])
             tips.append(needle[:3, :3] @ shape.marks[2] + needle[:3, 3])
     said += [message.data for message in trial.out["lead"]["status"]]
     crossed = _crossings(np.array(tips))
@@ -305,7 +305,7 @@ def plans(args: argparse.Namespace) -> None:
     surgeon.sense(np.array([*thing.position, *thing.orientation]), 0.0)
     for number, hand in enumerate(surgeon.hands):
         start = np.array(file.params["lead"].arms.driven[hand.arm].start)
-        hand.measured[:] = surgeon.state.park[number] = pose_of(hand.base @ hand.chain.forward(start))
+        hand.measured[:] = surgeon.state.park[number] = matrix_to_pose(hand.base @ hand.chain.forward(start))
     rng, took, plain = np.random.default_rng(0), list[float](), 0
     found: Counter[tuple[bool, bool, int]] = Counter()
     for _ in range(args.stitches):

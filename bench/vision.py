@@ -26,10 +26,10 @@ import trocar
 from bench.vision_goals import CAMERA, CHAIN, features, random_goal, servo
 from bench.vision_needle import AUTHORS, OURS, Trouble, track
 from bench.vision_pictures import PICTURED, track_pictures
-from controllers.needle_tracker.pose import vector_of
 from controllers.visual_servoing.controller import VisualServoing
 from controllers.visual_servoing.params import ServoingParams
 from hub.participant import Inputs, Setup
+from robots.transform import matrix_to_pose
 
 Row = dict[str, float | str]
 _SECOND = 25
@@ -105,7 +105,7 @@ def _steered(reached: np.ndarray, start: np.ndarray, target: np.ndarray, lost: r
     from engines.mujoco.pictures.endoscope import Endoscope
     from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 
-    box = vector_of(target @ np.diag([1.0, -1.0, -1.0, 1.0])).tolist()  # its z axis points to the camera
+    box = matrix_to_pose(target @ np.diag([1.0, -1.0, -1.0, 1.0])).tolist()  # its z axis points to the camera
     scene = {
         "arms": {"ECM": {"start": start.tolist()}},
         "fixtures": {"box": {"kind": "disc-box", "position": box[:3], "orientation": box[3:]}},

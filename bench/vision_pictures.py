@@ -17,13 +17,14 @@ import numpy as np
 
 from controllers.needle_tracker.controller import NeedleTracker
 from controllers.needle_tracker.params import TrackerParams
-from controllers.needle_tracker.pose import difference, framed, inverse, moved, vector_of
+from controllers.needle_tracker.pose import difference, moved
 from engines.mujoco.model import build, place
 from engines.mujoco.pictures.endoscope import Endoscope
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
 from robots import rotation
 from robots.training.needles import NEEDLES
+from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
 from schemas.vectors import Vector
 
 __all__ = ["PICTURED", "track_pictures"]
@@ -69,12 +70,12 @@ class _Scene:
         self._needle = int(model.joint("needle").qposadr[0])
         for finger in ("jaw_left", "jaw_right"):
             self._qpos[model.joint(f"PSM1/{finger}").qposadr[0]] = _FINGER
-        self._base = framed(np.array([*tracker.holder.position, *tracker.holder.orientation]))
+        self._base = pose_to_matrix(np.array([*tracker.holder.position, *tracker.holder.orientation]))
 
     def qpos(self, q: Vector, held: Vector) -> Vector:
         """Return all joint positions with the arm at `q` and the needle at `held` (4, 4) in the gripper."""
         self._qpos[self._arm] = q
-        x, y, z, *turn = vector_of(self._base @ self._chain.forward(q) @ held).tolist()
+        x, y, z, *turn = matrix_to_pose(self._base @ self._chain.forward(q) @ held).tolist()
         self._qpos[self._needle : self._needle + 7] = x, y, z, turn[3], *turn[:3]
         return self._qpos.copy()
 
@@ -103,7 +104,7 @@ def track_pictures(changes: Mapping[str, Any], seed: int, pictures: int = 60) ->
     scene, deviations = _Scene(looked_at, params), np.repeat([1.5e-3, 0.1], 3)
     start, camera = np.array(params.holder.start), np.array(params.arms.ECM.start)
     held = _visible(params, rng)
-    guess = vector_of(moved(held, deviations * rng.normal(size=6))).tolist()
+    guess = matrix_to_pose(moved(held, deviations * rng.normal(size=6))).tolist()
     params = TrackerParams.model_validate(
         params.model_dump() | {"overlay": False, "grasp": {"position": guess[:3], "orientation": guess[3:]}}
     )
@@ -121,7 +122,7 @@ def track_pictures(changes: Mapping[str, Any], seed: int, pictures: int = 60) ->
             }
             out = tracker.step(i * _H, _H, Inputs(values, events=events))
             in_base = params.holder.chain.forward(q)
-            estimate = inverse(in_base) @ framed(out["kalmanOutput"])
+            estimate = inverse_transform(in_base) @ pose_to_matrix(out["kalmanOutput"])
             if i:
                 rows.append(_errors(estimate, held, out["covariance"].reshape(6, 6)))
             shown = endoscope.step(i * _H, _H, Inputs({"qpos": scene.qpos(q, held)}))
@@ -134,7 +135,7 @@ def _visible(params: TrackerParams, rng: np.random.Generator) -> Vector:
     """Return a grasp of which the arc is not seen edge-on when the arms are where they start."""
     while True:
         held = _grasp(rng)
-        guess = vector_of(held).tolist()
+        guess = matrix_to_pose(held).tolist()
         grasp = {"position": guess[:3], "orientation": guess[3:]}
         model = TrackerParams.model_validate(params.model_dump() | {"grasp": grasp})
         at = NeedleTracker("probe", model).configure(Setup(_H, Path()))["Tcn_hat"].reshape(3, 4)

@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from controllers.motion.frames import base_in_world, pose
+from controllers.motion.frames import base_in_world
 from controllers.motion.params import Arms, MotionParams, PsmParams, SetupJoints
 from hub.participant import (
     Controller,
@@ -31,10 +31,10 @@ from hub.participant import (
     signal_out,
 )
 from robots import rotation
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import Mounting
 from robots.dvrk.inverse import inverse
 from robots.dvrk.parameters import ArmName
+from robots.transform import inverse_transform, matrix_to_pose, rigid_transform
 from schemas.errors import MotionError, ScenarioError
 from schemas.ports import Port
 from schemas.quantity import Angle, Duration, Length
@@ -114,10 +114,10 @@ class _Hand:
         self.arm, self.chain, self.params = arm, held.chain, params
         corners = np.array(params.workspace)
         self.low, self.high = corners.min(axis=0), corners.max(axis=0)
-        self._into_base = inverse_pose(self.base)
+        self._into_base = inverse_transform(self.base)
         self.state = now = _HandState(joints=len(held.chain.joints))
         now.start[:] = now.end[:] = now.command[:] = held.start
-        now.goal[:] = pose(self.base @ self.chain.frames(now.start)[-1])
+        now.goal[:] = matrix_to_pose(self.base @ self.chain.frames(now.start)[-1])
         now.jaw[0] = now.jaw_start = now.jaw_end = held.jaw
 
     def act(self, action: Vector) -> None:
@@ -132,8 +132,7 @@ class _Hand:
             orientation = rotation.product(now.goal[3:], rotation.exp(about))
         now.jaw_start = float(now.jaw[0])
         now.jaw_end = params.opening if action[4] >= 0.0 else params.closing
-        tip = np.eye(4)
-        tip[:3, :3], tip[:3, 3] = rotation.matrix(orientation), position
+        tip = rigid_transform(rotation.matrix(orientation), position)
         now.start[:] = now.command
         try:
             now.end[:] = inverse(self.chain, self._into_base @ tip, now.command)

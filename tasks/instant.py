@@ -14,6 +14,7 @@ from robots import rotation
 from robots.dvrk import setup_joints
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
+from robots.transform import pose_to_matrix, rigid_transform
 from schemas.ros import BoolMessage
 from schemas.vectors import Vector
 from tasks.params import TaskParams
@@ -142,9 +143,7 @@ class Reader:
             self._look(inputs[f"{self._ecm}/measured_cp"], now)
 
     def _look(self, pose: Vector, now: Instant) -> None:
-        tip = np.eye(4)
-        tip[:3, :3], tip[:3, 3] = rotation.matrix(pose[3:]), pose[:3]
-        optical = self._view_base @ tip @ self._optical_in_tip
+        optical = self._view_base @ pose_to_matrix(pose) @ self._optical_in_tip
         now.tips_seen = self._frustum.sees(optical, now.tips)
         now.things_seen = self._frustum.sees(optical, now.poses[:, :3])
 
@@ -159,6 +158,4 @@ def base_pose(params: TaskParams, arm: CartArm) -> Vector:
         positions = params.setup_joints.get(arm, setup_joints.SIMULATED[arm])
         return setup_joints.base_pose(arm, np.array(positions))
     mounted: MountedPsm | MountedEcm = params.arms[arm]
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation.matrix(np.array(mounted.orientation)), mounted.position
-    return pose
+    return rigid_transform(rotation.matrix(np.array(mounted.orientation)), mounted.position)

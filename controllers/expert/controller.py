@@ -8,7 +8,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from controllers.expert.chore import Chore
-from controllers.expert.hand import HandPhase, RobotHand, framed
+from controllers.expert.hand import HandPhase, RobotHand
 from controllers.expert.params import ExpertParams
 from controllers.expert.peg_board import PegBoard
 from controllers.expert.pick_and_place import PickAndPlace
@@ -21,6 +21,7 @@ from controllers.motion.params import MotionParams, PsmParams
 from hub.participant import Controller, Inputs, Outputs, Params, Setup
 from robots.dvrk.parameters import ArmName
 from robots.training.fixtures import DishParams
+from robots.transform import pose_to_matrix
 from schemas.errors import SessionError
 from schemas.ports import Port
 from schemas.ros import StringMessage
@@ -158,7 +159,9 @@ class Expert(Controller):
             each.hand.sense(inputs[f"{arm}/local/measured_cp"], float(inputs[f"{arm}/jaw/measured_js"][0]))
         for i, name in enumerate(self._chore.objects):
             holder = float(inputs[f"objects/{name}/held_by"][0])
-            self._seen.observe(i, framed(inputs[f"objects/{name}/pose"]), holder, self._hands[0].hand.period)
+            self._seen.observe(
+                i, pose_to_matrix(inputs[f"objects/{name}/pose"]), holder, self._hands[0].hand.period
+            )
 
 
 def _chore(params: ExpertParams) -> Chore:

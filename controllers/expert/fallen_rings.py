@@ -15,6 +15,7 @@ import numpy as np
 from controllers.expert.grasps import AMPLE_ROOM, FINGER_SIZE, LEAST_ROOM, RING_OPENING, Grasps
 from robots.dvrk.instruments import WRIST_RADIUS
 from robots.training.boards import Ring
+from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
 __all__ = ["BESIDE", "Around", "grasps_of_fallen_ring"]
@@ -73,10 +74,8 @@ def grasps_of_fallen_ring(ring: Ring, pose: Vector, reach: float, around: Around
                 continue
             away = (ends - middle)[:2]
             for way in (1.0, -1.0):
-                tip = np.eye(4)
-                tip[:3, :3] = np.column_stack([np.cross(way * normal, fingers), way * normal, fingers])
-                tip[:3, 3] = ends - reach * fingers
-                poses.append(tip)
+                turn = np.column_stack([np.cross(way * normal, fingers), way * normal, fingers])
+                poses.append(rigid_transform(turn, ends - reach * fingers))
                 outwards.append(away)
                 ups.append(out)
     return Grasps(

@@ -16,6 +16,7 @@ import numpy as np
 from controllers.expert.outlines import gap
 from robots.training.boards import Ring
 from robots.training.dishes import PIECE
+from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
 __all__ = [
@@ -217,10 +218,7 @@ def _grasps(
 
 def _reaching(origin: Vector, fingers: Vector, opening: Vector) -> Vector:
     """Return the tip's pose (4, 4) at `origin` (m) with unit vectors along the fingers and their opening."""
-    pose = np.eye(4)
-    pose[:3, :3] = np.column_stack([np.cross(opening, fingers), opening, fingers])
-    pose[:3, 3] = origin
-    return pose
+    return rigid_transform(np.column_stack([np.cross(opening, fingers), opening, fingers]), origin)
 
 
 def _downwards(point: Vector, over: float, turn: float, lean: float) -> Vector:

@@ -14,14 +14,14 @@ import numpy as np
 
 from hub.participant import Record, array, choice, flag, integer, number
 from robots import rotation
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import base_frame
 from robots.dvrk.instruments import Jaw
 from robots.serial_chain import SerialChain
+from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
 from schemas.ros import Header, JointState, Point, Pose, PoseStamped, Quaternion
 from schemas.vectors import Vector
 
-__all__ = ["HandPhase", "HandRole", "HandState", "RobotHand", "framed", "pose_of"]
+__all__ = ["HandPhase", "HandRole", "HandState", "RobotHand"]
 
 _ACCELERATION, _TURN = 1.0, 12.0
 """Largest acceleration on a line, m/s^2 and rad/s^2."""
@@ -117,7 +117,7 @@ class RobotHand:
         self.period = 0.0
         """Period of steps, s."""
         self.state = HandState()
-        self._into_base = inverse_pose(base)
+        self._into_base = inverse_transform(base)
         self.measured = np.zeros(7)
         """Measured pose of the tip in the world."""
         self.angle = 0.0
@@ -150,11 +150,11 @@ class RobotHand:
 
     def stand(self, base: Vector) -> None:
         """Set the transform from the arm's base to the world, shape (4, 4)."""
-        self.base, self._into_base = base, inverse_pose(base)
+        self.base, self._into_base = base, inverse_transform(base)
 
     def sense(self, tip: Vector, angle: float) -> None:
         """Store measurements: the tip's pose in the arm's base, shape (7,), and the jaw opening, rad."""
-        self.measured[:] = pose_of(self.base @ framed(tip))
+        self.measured[:] = matrix_to_pose(self.base @ pose_to_matrix(tip))
         self.angle = angle
 
     def stay(self) -> None:
@@ -211,7 +211,7 @@ class RobotHand:
             np.clip(state.correction, -_MOST, _MOST, out=state.correction)
         wanted = self.line()
         wanted[:3] += state.correction
-        x, y, z, i, j, k, w = pose_of(self._into_base @ framed(wanted)).tolist()
+        x, y, z, i, j, k, w = matrix_to_pose(self._into_base @ pose_to_matrix(wanted)).tolist()
         pose = Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=i, y=j, z=k, w=w))
         return PoseStamped(header=Header(frame_id=base_frame(self.arm)), pose=pose)
 
@@ -220,15 +220,3 @@ class RobotHand:
         commands = tuple(JointState(position=np.array([angle])) for angle in self._angles)
         self._angles.clear()
         return commands
-
-
-def framed(pose: Vector) -> Vector:
-    """Return a pose, shape (7,), as a homogeneous transform, shape (4, 4)."""
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = rotation.matrix(pose[3:]), pose[:3]
-    return frame
-
-
-def pose_of(frame: Vector) -> Vector:
-    """Return a homogeneous transform, shape (4, 4), as a pose, shape (7,)."""
-    return np.concatenate([frame[:3, 3], rotation.from_matrix(frame)])

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.expert.grasps import AMPLE_ROOM, Grasps
-from controllers.expert.hand import RobotHand, pose_of
+from controllers.expert.hand import RobotHand
 from controllers.expert.reach import links, margins, ways
 from robots import rotation
+from robots.transform import matrix_to_pose
 from schemas.vectors import Vector
 
 __all__ = ["Plan", "plan", "plan_leaning", "upright"]
@@ -75,7 +76,7 @@ def plan(
     best = int(score.argmax())
     if score[best] == -np.inf:
         return None
-    pose = pose_of(found.poses[best])
+    pose = matrix_to_pose(found.poses[best])
     return Plan(pose, float(found.opening[best]), found.ups[best], leans=False, upright=pose[3:])
 
 
@@ -109,7 +110,9 @@ def plan_leaning(hand: RobotHand, found: Grasps, middle: Vector, lift: float, re
         return None
     k = int(few[i])
     turned = rotation.from_matrix(tips[i, j, 3])
-    return Plan(pose_of(found.poses[k]), float(found.opening[k]), found.ups[k], leans=True, upright=turned)
+    return Plan(
+        matrix_to_pose(found.poses[k]), float(found.opening[k]), found.ups[k], leans=True, upright=turned
+    )
 
 
 def upright(axis: Vector) -> Vector:
@@ -137,5 +140,5 @@ def _pose_after_carrying(tip: Vector, middle: Vector, turn: Vector, to: Vector) 
 def _turns(hand: RobotHand, tips: Vector) -> Vector:
     """Return the rotation angle from the commanded pose to each tip pose, rad."""
     now = rotation.conjugate(hand.line()[3:])
-    turns = [rotation.log(rotation.product(pose_of(tip)[3:], now)) for tip in tips]
+    turns = [rotation.log(rotation.product(matrix_to_pose(tip)[3:], now)) for tip in tips]
     return np.linalg.norm(turns, axis=1)

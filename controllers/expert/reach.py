@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS
 from robots.dvrk.inverse import branches
 from robots.serial_chain import SerialChain
+from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
 __all__ = ["LINK_RADII", "links", "margins", "ways"]
@@ -29,7 +29,7 @@ def ways(chain: SerialChain, base: Vector, tips: Vector) -> tuple[Vector, Vector
         base: transform from the arm's base to the world, shape (4, 4), m.
         tips: in the world, shape (n, poses, 4, 4), m.
     """
-    q = branches(chain, inverse_pose(base) @ tips)  # (4, n, poses, 6)
+    q = branches(chain, inverse_transform(base) @ tips)  # (4, n, poses, 6)
     free = 2.0 * np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)
     least: Vector = free.min(axis=(-2, -1))
     best = least.argmax(axis=0)

@@ -11,8 +11,9 @@ import numpy as np
 
 from controllers.expert.errand import GENTLE, PATIENCE, TURNING, Errand
 from controllers.expert.grasps import UPRIGHT_COSINE, Grasps
-from controllers.expert.hand import HandPhase, HandRole, framed
+from controllers.expert.hand import HandPhase, HandRole
 from controllers.expert.plans import Plan, plan, plan_leaning
+from robots.transform import pose_to_matrix
 
 __all__ = ["Taking"]
 
@@ -120,7 +121,7 @@ class Taking(Errand):
     def _plan(self, index: int) -> Plan | None:
         """Return the best plan for an object; None: no feasible grasp."""
         other = self.team.other(self) if self.state.role is HandRole.TAKER else None
-        held = None if other is None else framed(other.hand.measured)
+        held = None if other is None else pose_to_matrix(other.hand.measured)
         ways = self._chore.grasps(index, self._seen.poses, self.hand.jaw.length, held)
         return next((found for found in (self._best(index, each) for each in ways) if found), None)
 

@@ -14,10 +14,10 @@ from controllers.motion import goals
 from controllers.motion.drives import Drives, WrenchFrame
 from controllers.motion.frames import BaseFrame, turned
 from robots.dvrk.cannula import Cannula
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import tip_frame
 from robots.dvrk.inverse import inverse as inverse_kinematics
 from robots.dvrk.setup_joints import CartArm
+from robots.transform import inverse_transform
 from schemas.crtk import CartesianImpedance, CartesianState
 from schemas.errors import MotionError
 from schemas.ros import BoolMessage, PoseStamped, WrenchStamped
@@ -132,7 +132,7 @@ class CartesianCommands:
         An empty name is the reference's.
         """
         named = goals.check_frame(frame_id, self._base.reference, self._base.local)
-        return _IDENTITY if named == self._base.local else inverse_pose(self._base.pose)
+        return _IDENTITY if named == self._base.local else inverse_transform(self._base.pose)
 
     def _inverse(self, tip: Vector) -> Vector:
         """Return the joint positions, shape (n,), of a pose in the arm's base frame, shape (4, 4).

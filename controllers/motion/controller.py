@@ -14,8 +14,8 @@ from controllers.motion.ports import arm_ports, setup_joint_ports
 from controllers.motion.setup_joints import SetupJoints
 from controllers.motion.telemetry import Telemetry
 from hub.participant import Controller, Inputs, Outputs, Params, Setup
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import CART_FRAME
+from robots.transform import inverse_transform
 from schemas.errors import MissingExtraError
 from schemas.ports import Port
 from schemas.vectors import Vector
@@ -92,7 +92,9 @@ class MotionController(Controller):
         position = self._arms["ECM"].position
         if (seen := position.tobytes()) != self._camera_seen:
             self._camera_seen = seen
-            self._world_seen = inverse_pose(self._camera_stand @ self._arms["ECM"].chain.forward(position))
+            self._world_seen = inverse_transform(
+                self._camera_stand @ self._arms["ECM"].chain.forward(position)
+            )
         return self._world_seen
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:

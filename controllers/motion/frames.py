@@ -1,4 +1,4 @@
-"""Poses as (4, 4) matrices and as ROS has them, and the frames of an arm's Cartesian ports.
+"""The frames of an arm's Cartesian ports.
 
 On the real system (jhu-dvrk/sawIntuitiveResearchKit) the base frame of a PSM in the camera's is inv(cart ->
 camera) (cart -> RCM), both through the setup joints. Without setup joints a client sets where an arm stands.
@@ -14,22 +14,17 @@ from controllers.motion.params import MotionParams
 from robots import rotation
 from robots.dvrk import crtk, setup_joints
 from robots.dvrk.setup_joints import CartArm
+from robots.transform import rigid_transform
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
 __all__ = [
     "BaseFrame",
     "base_in_world",
-    "pose",
     "reference_frame",
     "setup_positions",
     "turned",
 ]
-
-
-def pose(frame: Vector) -> Vector:
-    """Return (x, y, z, qx, qy, qz, qw) of a rigid transformation, shape (4, 4)."""
-    return np.concatenate([frame[:3, 3], rotation.from_matrix(frame)])
 
 
 def turned(rotation_matrix: Vector, vector: Vector) -> Vector:
@@ -47,9 +42,7 @@ def base_in_world(arm: CartArm, params: MotionParams) -> Vector:
     if params.mounting == "cart":
         return setup_joints.base_pose(arm, setup_positions(arm, params))
     stands = params.arms.driven[arm]
-    base = np.eye(4)
-    base[:3, :3], base[:3, 3] = rotation.matrix(np.array(stands.orientation)), stands.position
-    return base
+    return rigid_transform(rotation.matrix(np.array(stands.orientation)), stands.position)
 
 
 def reference_frame(arm: CartArm, params: MotionParams) -> str:

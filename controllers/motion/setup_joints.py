@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from controllers.motion.frames import pose, setup_positions
+from controllers.motion.frames import setup_positions
 from controllers.motion.messages import Messages
 from controllers.motion.operating_state import Repeats, State, refusal
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import setup_joint_event_names
 from hub.participant import Inputs, Record, choice, flag, number
 from robots.dvrk import crtk, setup_joints
+from robots.transform import matrix_to_pose
 from schemas.crtk import StringStamped
 from schemas.vectors import Vector
 
@@ -61,7 +62,7 @@ class SetupJoints:
             positions = setup_positions(arm, params)
             outputs |= {
                 f"SUJ/{arm}/measured_js": positions,
-                f"SUJ/{arm}/local/measured_cp": pose(setup_joints.base_pose(arm, positions)),
+                f"SUJ/{arm}/local/measured_cp": matrix_to_pose(setup_joints.base_pose(arm, positions)),
             }
 
     def step(self, t: int, h: int, inputs: Inputs) -> None:

@@ -21,7 +21,6 @@ from controllers.needle_tracker.noise import Noise
 from controllers.needle_tracker.overlay import drawn
 from controllers.needle_tracker.params import TrackerParams
 from controllers.needle_tracker.ports import tracker_ports
-from controllers.needle_tracker.pose import framed, inverse, vector_of
 from controllers.needle_tracker.segmentation import Region, detected, region_about
 from controllers.needle_tracker.tracking import Belief, Settings, followed
 from controllers.opencv import opencv, pixels
@@ -43,6 +42,7 @@ from hub.participant import (
 from robots.dvrk import crtk
 from robots.dvrk.endoscope import EYES, Eye, left_camera
 from robots.training.needles import NEEDLES
+from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
 from schemas.ports import Port
 from schemas.ros import (
     CameraInfo,
@@ -140,7 +140,7 @@ class NeedleTracker(Controller):
         """Start with the grasp that the parameters state. Raises MissingExtraError without OpenCV."""
         self._cv2 = opencv(f"participant '{self.name}' (kind needle-tracker)")
         grasp, now = self.params.grasp, self._now
-        now.pose[:] = framed(np.array([*grasp.position, *grasp.orientation]))
+        now.pose[:] = pose_to_matrix(np.array([*grasp.position, *grasp.orientation]))
         deviations = np.repeat([grasp.position_deviation, grasp.angle_deviation], 3)
         now.covariance[:] = np.diag(deviations**2)
         now.doubts = Belief(Estimate(now.pose, now.covariance)).doubts
@@ -170,7 +170,7 @@ class NeedleTracker(Controller):
     def _in_camera(self, in_base: Vector, camera_joints: Vector) -> Vector:
         """Return the gripper's pose in the left camera's frame, shape (4, 4), by its pose in its base."""
         camera = self._camera_base @ self._camera.forward(camera_joints)
-        return inverse(camera) @ self._base @ in_base
+        return inverse_transform(camera) @ self._base @ in_base
 
     def _calibrate(self, inputs: Inputs) -> None:
         for i, eye in enumerate(self._eyes):
@@ -255,7 +255,7 @@ class NeedleTracker(Controller):
         now = self._now
         needle = in_base @ now.pose
         outputs: dict[str, Value] = {
-            "kalmanOutput": vector_of(needle),
+            "kalmanOutput": matrix_to_pose(needle),
             "Tcn_hat": (in_camera @ now.pose)[:3].reshape(-1),
             "pose_with_covariance": (self._with_covariance(t, needle),),
             "covariance": now.covariance.reshape(-1),
@@ -268,7 +268,7 @@ class NeedleTracker(Controller):
 
     def _with_covariance(self, t: int, needle: Vector) -> PoseWithCovarianceStamped:
         turn = np.kron(np.eye(2), needle[:3, :3])
-        x, y, z, *quaternion = vector_of(needle).tolist()
+        x, y, z, *quaternion = matrix_to_pose(needle).tolist()
         return PoseWithCovarianceStamped(
             header=Header(stamp=Time.from_ns(t), frame_id=crtk.base_frame(self.params.arm)),
             pose=PoseWithCovariance(

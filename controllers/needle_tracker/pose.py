@@ -11,7 +11,7 @@ import numpy as np
 from robots import rotation
 from schemas.vectors import Vector
 
-__all__ = ["difference", "framed", "inverse", "moved", "turned_about", "vector_of"]
+__all__ = ["difference", "moved", "turned_about"]
 
 
 def moved(pose: Vector, error: Vector) -> Vector:
@@ -34,23 +34,3 @@ def turned_about(point: Vector) -> Vector:
     """Return the errors, shape (6, 3), of rotations about the axes through `point` (3,) of the own frame."""
     x, y, z = point.tolist()
     return np.vstack([np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), np.eye(3)])
-
-
-def inverse(pose: Vector) -> Vector:
-    """Return the inverse of `pose`, shape (4, 4)."""
-    result = np.eye(4)
-    result[:3, :3] = pose[:3, :3].T
-    result[:3, 3] = -result[:3, :3] @ pose[:3, 3]
-    return result
-
-
-def framed(vector: Vector) -> Vector:
-    """Return the pose, shape (4, 4), of position and quaternion, shape (7,)."""
-    result = np.eye(4)
-    result[:3, :3], result[:3, 3] = rotation.matrix(vector[3:]), vector[:3]
-    return result
-
-
-def vector_of(pose: Vector) -> Vector:
-    """Return position and quaternion (x, y, z, w), shape (7,), of `pose`, shape (4, 4)."""
-    return np.concatenate([pose[:3, 3], rotation.from_matrix(pose)])

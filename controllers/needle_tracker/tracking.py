@@ -18,6 +18,7 @@ from controllers.needle_tracker.arc_fit import Arc
 from controllers.needle_tracker.filter import Estimate, Update, View, predicted, updated
 from controllers.needle_tracker.noise import Noise
 from controllers.needle_tracker.pose import difference, moved, turned_about
+from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
 __all__ = ["Belief", "Settings", "followed", "mirrored"]
@@ -140,10 +141,8 @@ def _starts(pose: Vector, held: Vector, views: Sequence[View]) -> Iterator[Vecto
     turns = turned_about(held)
     for axis in range(3):
         for angle in _TURNS:
-            turned = np.eye(4)
-            turned[:3, :3] = moved(np.eye(4), angle * turns[:, axis])[:3, :3]
-            turned[:3, 3] = held - turned[:3, :3] @ held
-            yield pose @ turned
+            turn = moved(np.eye(4), angle * turns[:, axis])[:3, :3]
+            yield pose @ rigid_transform(turn, held - turn @ held)
 
 
 def mirrored(pose: Vector, projection: Vector) -> Vector:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import Arms, MotionParams, SetupJoints
-from controllers.needle_tracker.pose import difference, framed
+from controllers.needle_tracker.pose import difference
 from hub.participant import (
     Controller,
     Inputs,
@@ -26,6 +26,7 @@ from robots.dvrk import crtk
 from robots.dvrk.crtk import Mounting
 from robots.dvrk.parameters import ArmName
 from robots.training.needles import DEFAULT, NEEDLES, NeedleName
+from robots.transform import pose_to_matrix
 from schemas.ports import Port
 from schemas.ros import Float64Message, PoseStamped
 from schemas.vectors import Vector
@@ -102,7 +103,7 @@ class TrackingError(Controller):
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Compare the newest values."""
-        truth, estimate = framed(inputs["truth"]), self._base @ framed(inputs["estimate"])
+        truth, estimate = pose_to_matrix(inputs["truth"]), self._base @ pose_to_matrix(inputs["estimate"])
         covariance = inputs["covariance"].reshape(6, 6)
         now = self._now
         now.error[:] = difference(estimate, truth)

@@ -6,9 +6,9 @@ from math import degrees, pi
 
 import numpy as np
 
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.inverse import branches
 from robots.serial_chain import SerialChain
+from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
 __all__ = ["Reach", "reach", "room"]
@@ -84,7 +84,7 @@ def _free(chain: SerialChain, q: Vector) -> Vector:
 
 def _two(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
     """Return the joint positions of both branches that an arm has, shape (2, poses, 6)."""
-    return branches(chain, inverse_pose(base) @ tips)[:2]
+    return branches(chain, inverse_transform(base) @ tips)[:2]
 
 
 def _wound(q: Vector, turn: float) -> Vector:

@@ -15,8 +15,8 @@ from math import asin, cos, hypot, pi, sin, sqrt
 
 import numpy as np
 
-from controllers.expert.hand import pose_of
 from robots.training.needles import NeedleShape
+from robots.transform import matrix_to_pose
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -118,6 +118,6 @@ def grip_pose(grip: Grip, needle: NeedleShape, reach: float) -> Vector:
 
 def before(tip: Vector, away: float) -> Vector:
     """Return a pose of the tip, shape (7,), `away` metres against its fingers from `tip`, shape (4, 4)."""
-    pose = pose_of(tip)
+    pose = matrix_to_pose(tip)
     pose[:3] -= away * tip[:3, 2]
     return pose

@@ -8,7 +8,6 @@ from typing import ClassVar, cast
 import numpy as np
 from pydantic import Field
 
-from controllers.expert.hand import framed, pose_of
 from controllers.stitching import path_markers
 from controllers.stitching.guided_ports import SOURCES, guided_ports
 from controllers.stitching.guided_surgeon import GuidedSurgeon
@@ -19,6 +18,7 @@ from controllers.stitching.two_hands import TwoHands
 from hub.participant import Inputs, Outputs, Params, Record, Setup, array, integer
 from robots.dvrk import endoscope
 from robots.dvrk.endoscope import BASELINE, StereoCamera
+from robots.transform import matrix_to_pose, pose_to_matrix
 from schemas.errors import MotionError
 from schemas.ports import Port
 from schemas.quantity import Angle, Length
@@ -95,7 +95,9 @@ class GuidedStitching(TwoHands):
             hand.period = self._period
         surgeon.sure = self._sense(self._surgeon, inputs)
         for number, hand in enumerate(self._hands):
-            setpoints[number] = pose_of(hand.base @ framed(inputs[f"{hand.arm}/local/setpoint_cp"]))
+            setpoints[number] = matrix_to_pose(
+                hand.base @ pose_to_matrix(inputs[f"{hand.arm}/local/setpoint_cp"])
+            )
             for message in cast("tuple[BoolMessage, ...]", inputs.events(f"{hand.arm}/following")):
                 seen.led[number] = message.data
         surgeon.measure(setpoints, led=bool(seen.led.any()))

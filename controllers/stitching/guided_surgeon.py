@@ -13,7 +13,7 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from controllers.expert.hand import RobotHand, framed
+from controllers.expert.hand import RobotHand
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.handing import Handing, Hold
 from controllers.stitching.params import StitchParams
@@ -23,7 +23,7 @@ from controllers.stitching.procedure import Procedure
 from controllers.stitching.stage import COMMANDS, Stage
 from controllers.stitching.way_on import WayOn, behind_tip, is_inside, way_on
 from hub.participant import Record, array, choice, flag, integer, number
-from robots.dvrk.cart import inverse_pose
+from robots.transform import inverse_transform, pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -93,7 +93,7 @@ class GuidedSurgeon(Procedure):
         guided, phantom = self.guided, self.params.phantom
         if guided.stage in (Stage.RUNNING, Stage.PAUSED):
             raise MotionError("a stitch is being made: pause and cancel it before the next one is picked")
-        where = (inverse_pose(phantom.pose) @ [*point, 1.0])[:3]
+        where = (inverse_transform(phantom.pose) @ [*point, 1.0])[:3]
         if abs(where[2]) > _ABOVE:
             raise MotionError(
                 f"the point is {where[2] * 1e3:.1f} mm above the skin, allowed are {_ABOVE * 1e3:.0f} either"
@@ -206,7 +206,7 @@ class GuidedSurgeon(Procedure):
         """How the needle is held, by which hand. Raises MotionError if it is another one."""
         for hand in self.hands:
             if hand.number == self.state.holder:
-                grip = inverse_pose(self.state.needle) @ framed(hand.measured)
+                grip = inverse_transform(self.state.needle) @ pose_to_matrix(hand.measured)
                 return Hold(hand, grip, behind_tip(grip, hand, self.stitch))
         if self.state.holder:
             super()._way_on()  # says that it is neither

@@ -10,12 +10,12 @@ from math import ceil
 
 import numpy as np
 
-from controllers.expert.hand import RobotHand, framed
+from controllers.expert.hand import RobotHand
 from controllers.stitching.feasibility import reach
 from controllers.stitching.geometry import before
 from controllers.stitching.rejoin import BACK
 from robots import rotation
-from robots.dvrk.cart import inverse_pose
+from robots.transform import inverse_transform, pose_to_matrix
 from schemas.vectors import Vector
 
 __all__ = ["Itinerary"]
@@ -29,7 +29,7 @@ class Itinerary:
 
     def __init__(self, hand: RobotHand) -> None:
         self.hand = hand
-        self._tips = [framed(hand.measured)[None]]
+        self._tips = [pose_to_matrix(hand.measured)[None]]
         self._carrying = list[tuple[Vector, Vector]]()
 
     def copy(self) -> Itinerary:
@@ -60,7 +60,7 @@ class Itinerary:
         """Go back along the fingers, and to where it rests, shape (7,)."""
         self.go(_away(self._tips[-1][-1]))
         if rest is not None:
-            self.go(framed(rest))
+            self.go(pose_to_matrix(rest))
 
     @property
     def margin(self) -> float:
@@ -69,13 +69,15 @@ class Itinerary:
 
     def distance(self, place: Vector) -> float:
         """Return how near tip or needle come to a place, shape (3,), while the needle is carried."""
-        ways = [way[:, :3, 3] for tips, grip in self._carrying for way in (tips, tips @ inverse_pose(grip))]
+        ways = [
+            way[:, :3, 3] for tips, grip in self._carrying for way in (tips, tips @ inverse_transform(grip))
+        ]
         return min((float(np.linalg.norm(way - place, axis=1).min()) for way in ways), default=np.inf)
 
 
 def _away(tip: Vector) -> Vector:
     """Return the pose (4, 4) from which a tip comes to `tip`, and to which it goes back."""
-    return framed(before(tip, BACK))
+    return pose_to_matrix(before(tip, BACK))
 
 
 def _line(a: Vector, b: Vector) -> Vector:

@@ -13,7 +13,7 @@ from math import radians
 
 import numpy as np
 
-from controllers.expert.hand import RobotHand, framed, pose_of
+from controllers.expert.hand import RobotHand
 from controllers.stitching.geometry import Stitch, before
 from controllers.stitching.params import StitchParams
 from controllers.stitching.parts import Parts
@@ -22,7 +22,7 @@ from controllers.stitching.plan import BEFORE, BEYOND
 from controllers.stitching.rejoin import BACK, OPEN, OPENED, SHUT, Rejoin
 from controllers.stitching.way_on import WayOn, way_on
 from robots import rotation
-from robots.dvrk.cart import inverse_pose
+from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -112,7 +112,7 @@ class Procedure(Parts, ABC):
     def sense(self, needle: Vector, holder: float) -> None:
         """Take the measured pose of the needle, shape (7,), and the number of the arm that holds it."""
         state = self.state
-        state.needle[:], state.holder = framed(needle), holder
+        state.needle[:], state.holder = pose_to_matrix(needle), holder
         state.unheld = 0.0 if holder else state.unheld + self.driver.period
 
     def step(self) -> None:
@@ -161,7 +161,7 @@ class Procedure(Parts, ABC):
                 f"{hand.arm} has lost the needle while it was to {state.phase.name.lower()}: its middle is at"
                 f" {place} mm, its tip {side}"
             )
-        now = inverse_pose(state.needle) @ framed(hand.measured)
+        now = inverse_transform(state.needle) @ pose_to_matrix(hand.measured)
         share = hand.period / _LEARNING
         state.grip[:3, 3] += share * (now[:3, 3] - state.grip[:3, 3])
         turn = rotation.log(rotation.from_matrix(now[:3, :3] @ state.grip[:3, :3].T))
@@ -186,12 +186,12 @@ class Procedure(Parts, ABC):
 
     def _lead(self, hand: RobotHand, needle: Vector, share: float = 1.0) -> None:
         """Send a hand, on a line, where the needle that it holds comes to a pose, shape (4, 4)."""
-        hand.go(pose_of(needle @ self.state.grip), share)
+        hand.go(matrix_to_pose(needle @ self.state.grip), share)
 
     def _track(self, hand: RobotHand, angle: float) -> None:
         """Bring the needle to an angle of its way, at once."""
         state, wanted = self.state, self.stitch.pose(angle)
-        goal = pose_of(wanted @ state.grip)
+        goal = matrix_to_pose(wanted @ state.grip)
         hand.state.start[:] = hand.state.goal[:] = goal
         hand.state.duration = hand.state.elapsed = 0.0
         state.angle[0] = angle
@@ -240,7 +240,7 @@ class Procedure(Parts, ABC):
 
     def _grasped(self, hand: RobotHand) -> None:
         """Take how the needle lies in the jaw of a hand for how it holds it."""
-        self.state.grip[:] = inverse_pose(self.state.needle) @ framed(hand.measured)
+        self.state.grip[:] = inverse_transform(self.state.needle) @ pose_to_matrix(hand.measured)
         self.state.free = False
 
     def _lift(self) -> None:
@@ -295,7 +295,7 @@ class Procedure(Parts, ABC):
     def _let_go(self) -> None:
         self.state.waited += self.driver.period
         if self.state.waited >= OPENED:
-            self.driver.go(before(framed(self.driver.line()), BACK))
+            self.driver.go(before(pose_to_matrix(self.driver.line()), BACK))
             self._enter(Phase.STEP_BACK)
 
     def _step_back(self) -> None:
@@ -352,7 +352,7 @@ class Procedure(Parts, ABC):
         if hand.angle <= _HELD_OPEN:
             raise MotionError(f"{hand.arm} has lost the needle as {other.arm} let go")
         self._grasped(hand)
-        other.go(before(framed(other.line()), BACK))
+        other.go(before(pose_to_matrix(other.line()), BACK))
         self._enter(after)
 
     def _leave(self) -> None:

@@ -9,11 +9,12 @@ from enum import IntEnum
 
 import numpy as np
 
-from controllers.expert.hand import RobotHand, framed, pose_of
+from controllers.expert.hand import RobotHand
 from controllers.stitching.geometry import before
 from controllers.stitching.phase import Phase
 from controllers.stitching.way_on import WayOn
 from hub.participant import Record, array, choice, number
+from robots.transform import matrix_to_pose, pose_to_matrix
 from schemas.vectors import Vector
 
 __all__ = ["BACK", "OPEN", "OPENED", "SHUT", "Rejoin"]
@@ -74,7 +75,7 @@ class Rejoin:
             hand.move_jaw(SHUT if hand is plan.holder else OPEN)
         state.goals[:] = park
         if plan.holder is not None:
-            state.goals[self._hands.index(plan.holder)] = pose_of(plan.needle @ grip)
+            state.goals[self._hands.index(plan.holder)] = matrix_to_pose(plan.needle @ grip)
         driver = int(plan.exchanged)
         puller = driver if plan.alone else 1 - driver
         if plan.phase is Phase.HOVER:
@@ -98,7 +99,7 @@ class Rejoin:
             for hand in hands:
                 near = float(np.linalg.norm(hand.measured[:3] - needle[:3, 3])) < _CLEAR
                 if hand.number != state.holder and near:
-                    hand.go(before(framed(hand.line()), BACK))
+                    hand.go(before(pose_to_matrix(hand.line()), BACK))
             state.going = Going.CLEAR
         elif state.going is Going.CLEAR and all(hand.has_arrived for hand in hands):
             for hand, goal in zip(hands, state.goals, strict=True):

@@ -11,16 +11,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from controllers.expert.hand import framed
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import MotionParams
 from controllers.stitching.params import StitchParams
 from hub.participant import Inputs, signal_in
 from robots.dvrk import crtk
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.ecm import tip
 from robots.dvrk.endoscope import EYES, Eye, StereoCamera, optical_in_roll
 from robots.dvrk.mounted import MountedEcm
+from robots.transform import inverse_transform, pose_to_matrix, translation
 from schemas.errors import MotionError, did_you_mean
 from schemas.ports import Port
 from schemas.ros import PointStamped, PoseStamped
@@ -84,7 +83,7 @@ class SceneFrames:
         projection = self._camera.projection(eye)
         ahead = np.linalg.solve(projection[:, :3], [*pixel, 1.0])
         start = -np.linalg.solve(projection[:, :3], projection[:, 3])
-        from_skin = inverse_pose(self._skin) @ left
+        from_skin = inverse_transform(self._skin) @ left
         origin, ray = from_skin[:3, :3] @ start + from_skin[:3, 3], from_skin[:3, :3] @ ahead
         if origin[2] * ray[2] >= 0.0:
             raise MotionError(f"pixel {pixel.tolist()} of the {eye} eye does not look at the pad")
@@ -94,9 +93,9 @@ class SceneFrames:
         if (fixed := self._fixed.get(frame)) is not None:
             return fixed
         if frame in self._bases:
-            return self._bases[frame] @ framed(inputs[f"{frame}/local/measured_cp"])
+            return self._bases[frame] @ pose_to_matrix(inputs[f"{frame}/local/measured_cp"])
         if frame == self._needle:
-            return framed(inputs[f"objects/{frame}/pose"])
+            return pose_to_matrix(inputs[f"objects/{frame}/pose"])
         if self._left is not None and frame == self._optical:
             return self._pose("ECM", inputs) @ self._left
         raise MotionError(
@@ -107,6 +106,5 @@ class SceneFrames:
 
 def _left_in_tip(arm: MountedEcm, baseline: float) -> Vector:
     """Return the left camera's optical frame in that of the ECM's tip, shape (4, 4), as on /tf."""
-    left = np.eye(4)
-    left[0, 3] = -0.5 * baseline
-    return inverse_pose(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left
+    left = translation(-0.5 * baseline, 0.0, 0.0)
+    return inverse_transform(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left

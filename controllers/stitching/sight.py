@@ -13,8 +13,8 @@ from math import radians, sqrt
 import numpy as np
 
 from hub.participant import Record, array, flag
-from robots.dvrk.cart import inverse_pose
 from robots.serial_chain import SerialChain
+from robots.transform import inverse_transform
 from schemas.ros import PoseWithCovarianceStamped
 from schemas.vectors import Vector
 
@@ -68,7 +68,7 @@ class Sight:
             for one in seen:
                 self._learn(q, one)
         state.last[:] = there[:3, 3]
-        return self._base @ self._chain.forward(self._off(q)) @ inverse_pose(there)
+        return self._base @ self._chain.forward(self._off(q)) @ inverse_transform(there)
 
     def _off(self, q: Vector) -> Vector:
         true = q.copy()

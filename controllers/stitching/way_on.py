@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.expert.hand import RobotHand, framed
+from controllers.expert.hand import RobotHand
 from controllers.stitching.feasibility import Reach
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.params import StitchParams
@@ -22,7 +22,7 @@ from controllers.stitching.plan import (
     pulling,
     require_room,
 )
-from robots.dvrk.cart import inverse_pose
+from robots.transform import inverse_transform, pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -117,7 +117,7 @@ def way_on(
         return WayOn(Phase.PULL, puller, stitch.pose(angle), angle, np.eye(4), grip, margin)
     taking, pull_margin = _from_a_side(puller, params.taken, stitch, [pull])
     if holding is driver:
-        grip = inverse_pose(needle) @ framed(driver.measured)
+        grip = inverse_transform(needle) @ pose_to_matrix(driver.measured)
         require_room(behind_tip(grip, driver, stitch), stitch, emerge)
         drive = driving(stitch, emerge, lift, angle if inside else None)
         grip, margin = _kept(driver, needle, [drive] if inside else [[up], drive])
@@ -148,7 +148,7 @@ def _pulls(
 ) -> bool:
     """Say whether a hand holds a needle in the tissue as one that pulls it."""
     if driver is puller:
-        behind = behind_tip(inverse_pose(needle) @ framed(holding.measured), holding, stitch)
+        behind = behind_tip(inverse_transform(needle) @ pose_to_matrix(holding.measured), holding, stitch)
         return behind < (params.grip + params.taken) / 2.0
     return holding is puller
 
@@ -199,7 +199,7 @@ def _from_a_side(
 
 def _kept(hand: RobotHand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
     """Return how the hand holds the needle now, and the margin with which it goes like that."""
-    return _chosen(hand, [inverse_pose(needle) @ framed(hand.measured)], ways)
+    return _chosen(hand, [inverse_transform(needle) @ pose_to_matrix(hand.measured)], ways)
 
 
 def _chosen(hand: RobotHand, grips: list[Vector], ways: list[list[Vector]]) -> tuple[Vector, float]:

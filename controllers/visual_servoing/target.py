@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
 __all__ = ["Sight", "recognised"]
@@ -88,8 +89,7 @@ def _pose(cv2: Any, features: Vector, points: Vector, misfit: float) -> Vector |
     if not works:
         return None
     turn, shift = cv2.solvePnPRefineLM(points, features, np.eye(3), None, turn, shift)
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = cv2.Rodrigues(turn)[0], shift.ravel()
+    pose = rigid_transform(cv2.Rodrigues(turn)[0], shift.ravel())
     seen = points @ pose[:3, :3].T + pose[:3, 3]
     if not np.isfinite(pose).all() or (seen[:, 2] <= 0.0).any():
         return None

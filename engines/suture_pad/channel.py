@@ -24,10 +24,10 @@ from math import acos, atan2, ceil, hypot, pi
 
 import numpy as np
 
-from engines.suture_pad.three_points import cross
 from engines.suture_pad.tissue import TissueParams
 from hub.participant import Record, array, choice, flag, integer, number
 from robots.training.needles import NeedleShape
+from robots.vector3 import cross
 from schemas.vectors import Vector
 
 __all__ = ["SPACING", "Channel", "ChannelState", "Phase"]

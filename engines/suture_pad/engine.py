@@ -11,7 +11,7 @@ from engines.suture_pad.drawn_thread import DrawnThread
 from engines.suture_pad.params import SuturePadParams
 from engines.suture_pad.ports import BOND, SKIN, THREAD_NUMBERS, bond_side, pad_ports
 from engines.suture_pad.skin import Skin
-from engines.suture_pad.three_points import ThreePoints, cross
+from engines.suture_pad.three_points import ThreePoints
 from hub.participant import (
     ForceSide,
     Inputs,
@@ -25,8 +25,9 @@ from hub.participant import (
     restore_arrays,
     state_hash,
 )
-from robots.dvrk.cart import inverse_pose
 from robots.training.threads import THREAD
+from robots.transform import inverse_transform
+from robots.vector3 import cross
 from schemas.errors import ScenarioError
 from schemas.ports import BondSide, Port
 from schemas.ros import Header, Time
@@ -60,7 +61,7 @@ class SuturePad(Stepped):
     def __init__(self, name: str, params: SuturePadParams) -> None:
         super().__init__(name, params)
         self._pad_in_world = params.phantom.pose
-        self._world_in_pad = inverse_pose(self._pad_in_world)
+        self._world_in_pad = inverse_transform(self._pad_in_world)
         self._thing, needle = params.needle
         self._shape = needle.shape
         self._channel = Channel(self._shape, params.tissue)

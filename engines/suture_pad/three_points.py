@@ -13,17 +13,7 @@ import numpy as np
 from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
-__all__ = ["ThreePoints", "cross"]
-
-_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    """Return the cross products of `a` and `b`, shape (..., 3), at a fifth of the cost of np.cross."""
-    if a.ndim == b.ndim == 1:
-        (u, v, w), (x, y, z) = a.tolist(), b.tolist()
-        return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
-    return a.take(_YZX, -1) * b.take(_ZXY, -1) - a.take(_ZXY, -1) * b.take(_YZX, -1)
+__all__ = ["ThreePoints"]
 
 
 class ThreePoints:

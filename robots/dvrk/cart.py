@@ -9,17 +9,10 @@ the camera's frame (jhu-dvrk/sawIntuitiveResearchKit, core/components/code/mtsIn
 from __future__ import annotations
 
 from robots.dvrk.setup_joints import CartArm, base_pose
+from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
-__all__ = ["base_in_view", "camera_pose", "inverse_pose"]
-
-
-def inverse_pose(pose: Vector) -> Vector:
-    """Return the inverse of homogeneous transforms, shape (..., 4, 4)."""
-    inverse = pose.copy()
-    inverse[..., :3, :3] = pose[..., :3, :3].swapaxes(-1, -2)
-    inverse[..., :3, 3:] = -inverse[..., :3, :3] @ pose[..., :3, 3:]
-    return inverse
+__all__ = ["base_in_view", "camera_pose"]
 
 
 def camera_pose(endoscope_tip: Vector, setup_positions: Vector) -> Vector:
@@ -37,4 +30,4 @@ def base_in_view(arm: CartArm, setup_positions: Vector, camera: Vector) -> Vecto
 
     It takes setup joint positions, shape (6,), and `camera_pose`.
     """
-    return inverse_pose(camera) @ base_pose(arm, setup_positions)
+    return inverse_transform(camera) @ base_pose(arm, setup_positions)

@@ -15,6 +15,7 @@ import numpy as np
 
 from robots.dvrk.ecm import JOINTS, Endoscope, tip
 from robots.serial_chain import SerialChain
+from robots.transform import translation
 from schemas.vectors import Vector
 
 __all__ = [
@@ -85,6 +86,5 @@ def left_camera(endoscope: Endoscope, baseline: float) -> SerialChain:
 
     `baseline` is the distance of the two cameras, m.
     """
-    aside = np.eye(4)
-    aside[0, 3] = -0.5 * baseline
+    aside = translation(-0.5 * baseline, 0.0, 0.0)
     return SerialChain(JOINTS, optical_in_roll(endoscope) @ aside)

@@ -23,10 +23,10 @@ import numpy as np
 
 from robots.dvrk import inverse as six
 from robots.dvrk import psm
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
 from robots.dvrk.instruments import Instrument
 from robots.serial_chain import SerialChain
+from robots.transform import inverse_transform
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -96,7 +96,7 @@ def solutions(tool: Instrument, seven: SerialChain, pose: Vector, roll: Vector) 
     ahead = np.eye(4)  # the wrist yaw link of the seven joints in that of the arm's six
     ahead[:2, :2] = [[0.0, -1.0], [1.0, 0.0]]
     six_joints = psm.chain(tool)
-    to_tip = inverse_pose(ahead @ grip @ turns @ seven.tip) @ six_joints.tip  # (m, 4, 4)
+    to_tip = inverse_transform(ahead @ grip @ turns @ seven.tip) @ six_joints.tip  # (m, 4, 4)
     return six.branches(six_joints, pose[..., None, :, :] @ to_tip)
 
 

@@ -29,9 +29,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.dvrk import ecm, psm
-from robots.dvrk.cart import inverse_pose
 from robots.limits import ANGLE_TOLERANCE, distinct
 from robots.serial_chain import Joint, SerialChain, compiled
+from robots.transform import inverse_transform
+from robots.vector3 import cross
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -54,7 +55,6 @@ _POINT = 1e-9
 """m: two axes that pass each other so closely meet."""
 _RCM_ROWS = tuple((joint.kind, joint.alpha, joint.a, joint.theta) for joint in psm.ARM_JOINTS)
 _BOTTOM, _ONE = np.array([0.0, 0.0, 0.0, 1.0]), np.eye(3)
-_YZX_ZXY, _ZXY_YZX = np.array([1, 2, 0, 2, 0, 1]), np.array([2, 0, 1, 1, 2, 0])
 """Whose products are those of a cross product: the first three less the last three."""
 _TURN = 2.0 * pi
 _BRANCH_SIGNS = (
@@ -87,7 +87,7 @@ class _Form:
 @lru_cache(maxsize=_CHAINS)
 def _form(chain: SerialChain) -> _Form:
     _require(chain, ecm.JOINTS[3:] if len(chain.joints) == len(ecm.JOINTS) else chain.joints[3:])
-    from_tip, theta = inverse_pose(chain.tip), np.array([joint.theta for joint in chain.joints[3:]])
+    from_tip, theta = inverse_transform(chain.tip), np.array([joint.theta for joint in chain.joints[3:]])
     lowest, highest = chain.lower - ANGLE_TOLERANCE, chain.upper + ANGLE_TOLERANCE
     middle = (chain.lower + chain.upper) / 2
     offsets = np.array([chain.joints[3].d, chain.joints[2].d, chain.joints[-1].a])
@@ -172,7 +172,7 @@ def _first_unrigid(poses: Vector) -> int | None:
     rotation = poses[:, :3, :3]
     away = np.abs(rotation.swapaxes(-1, -2) @ rotation - _ONE) > _RIGID
     below = np.abs(poses[:, 3] - _BOTTOM) > _RIGID
-    mirrored = _dot(_cross(rotation[:, :, 0], rotation[:, :, 1]), rotation[:, :, 2]) < 0.0
+    mirrored = _dot(cross(rotation[:, :, 0], rotation[:, :, 1]), rotation[:, :, 2]) < 0.0
     if not (_any(away) or _any(below) or _any(mirrored)):
         return None
     return int((away.any(axis=(-2, -1)) | below.any(axis=-1) | mirrored).argmax())
@@ -247,13 +247,13 @@ def _psm_branches(chain: SerialChain, ends: Vector, near: Vector) -> Vector:
     else:
         x5 = across / distance
     x5 = x5 * _BRANCH_SIGNS[0]  # (4, N, 3)
-    z5 = _cross(x5, yaw_axis)
+    z5 = cross(x5, yaw_axis)
     wrist = centre - yaw.a * x5
     shaft = _shaft(chain, wrist, x5, z5, near) * _BRANCH_SIGNS[1]
     q = np.empty((4, len(ends), 6))
     x3, y3 = _shaft_joints(chain, shaft, _dot(shaft, wrist), q)
     np.arctan2(-_dot(z5, x3), _dot(z5, y3), out=q[..., 3])
-    np.arctan2(-_dot(x5, shaft), _dot(x5, _cross(z5, shaft)), out=q[..., 4])
+    np.arctan2(-_dot(x5, shaft), _dot(x5, cross(z5, shaft)), out=q[..., 4])
     np.arctan2(-_dot(y6, x5), _dot(x6, x5), out=q[..., 5])
     q[..., 3:] -= _form(chain).theta
     return q
@@ -269,7 +269,7 @@ def _shaft(chain: SerialChain, wrist: Vector, x5: Vector, z5: Vector, near: Vect
     if _any(distance <= _POINT):
         yaw, pitch = near[:, 0], near[:, 1]
         old = np.stack([np.cos(pitch) * np.sin(yaw), -np.sin(pitch), -np.cos(pitch) * np.cos(yaw)], axis=-1)
-        y5 = _cross(z5, x5)
+        y5 = cross(z5, x5)
         joint = chain.joints[4]
         bend = np.clip(np.arctan2(-_dot(old, y5), _dot(old, x5)), joint.lower, joint.upper)[..., None]
         shaft = np.where(distance > _POINT, shaft, np.cos(bend) * x5 - np.sin(bend) * y5)
@@ -291,7 +291,7 @@ def _shaft_joints(chain: SerialChain, shaft: Vector, depth: Vector, q: Vector) -
     s1, c1, s2, c2 = sines[..., 0], cosines[..., 0], sines[..., 1], cosines[..., 1]
     x3 = np.empty_like(shaft)
     x3[..., 0], x3[..., 1], x3[..., 2] = -s1 * s2, -c2, c1 * s2
-    return x3, _cross(shaft, x3)
+    return x3, cross(shaft, x3)
 
 
 def _length(a: Vector) -> Vector:
@@ -302,11 +302,6 @@ def _length(a: Vector) -> Vector:
 def _dot(a: Vector, b: Vector) -> Vector:
     product: Vector = np.vecdot(a, b)
     return product
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    products = a.take(_YZX_ZXY, -1) * b.take(_ZXY_YZX, -1)  # a fifth of the cost of np.cross
-    return products[..., :3] - products[..., 3:]
 
 
 def _unwind(chain: SerialChain, branches: Vector, near: Vector) -> Vector:

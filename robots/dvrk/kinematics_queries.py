@@ -21,6 +21,7 @@ from robots import rotation
 from robots.dvrk.cannula import Cannula
 from robots.dvrk.inverse import inverse
 from robots.serial_chain import SerialChain
+from robots.transform import matrix_to_pose, rigid_transform
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -67,7 +68,7 @@ class KinematicsQueries:
             )
         if base is not None:
             frame = _frame(base) @ frame
-        return Answer(np.concatenate([frame[:3, 3], rotation.from_matrix(frame)]), True, "")
+        return Answer(matrix_to_pose(frame), True, "")
 
     def inverse(self, cp: Vector, jp: Vector) -> Answer:
         """Return the joint positions, shape (n,), inside the ranges, with the tip at `cp`.
@@ -94,6 +95,4 @@ def _frame(pose: Vector) -> Vector:
         raise MotionError(
             f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}"
         )
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = rotation.matrix(pose[3:] / norm), pose[:3]
-    return frame
+    return rigid_transform(rotation.matrix(pose[3:] / norm), pose[:3])

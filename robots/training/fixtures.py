@@ -11,6 +11,7 @@ from robots import rotation
 from robots.dvrk.parameters import UnitQuaternion
 from robots.training.boards import BOARDS, Board
 from robots.training.phantoms import PHANTOMS, Phantom, PhantomName
+from robots.transform import rigid_transform
 from schemas.quantity import Length
 from schemas.vectors import Vector
 
@@ -31,10 +32,7 @@ class _Fixture(BaseModel):
     @property
     def pose(self) -> Vector:
         """Pose of the fixture in the world, shape (4, 4), m."""
-        pose = np.eye(4)
-        pose[:3, :3] = rotation.matrix(np.array(self.orientation))
-        pose[:3, 3] = self.position
-        return pose
+        return rigid_transform(rotation.matrix(np.array(self.orientation)), self.position)
 
 
 class BoardParams(_Fixture):

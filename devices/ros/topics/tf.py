@@ -9,11 +9,10 @@ import numpy as np
 
 from devices.ros.params import GatewayParams
 from devices.ros.topics.publications import State
-from robots import rotation
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.ecm import tip
 from robots.dvrk.endoscope import BASELINE, optical_in_roll
 from robots.dvrk.mounted import MountedArm, MountedEcm
+from robots.transform import inverse_transform, matrix_to_pose, translation
 from schemas.codec import encode
 from schemas.ros import Header, Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3
 from schemas.vectors import Vector
@@ -108,10 +107,9 @@ def _base(name: str, arm: MountedArm, params: GatewayParams, states: Mapping[str
 
 def _left_camera(arm: MountedEcm) -> Vector:
     """Return the left camera's optical frame in the frame of the ECM's tip, as a pose, shape (7,)."""
-    left = np.eye(4)
-    left[0, 3] = -0.5 * BASELINE
-    frame = inverse_pose(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left
-    return np.concatenate([frame[:3, 3], rotation.from_matrix(frame)])
+    left = translation(-0.5 * BASELINE, 0.0, 0.0)
+    frame = inverse_transform(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left
+    return matrix_to_pose(frame)
 
 
 def _newest(state: State) -> Callable[[], Vector | None]:

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.bullet.elasticity.material import Material
-from engines.bullet.meshing.tet_mesh import Indices, TetMesh, cross
+from engines.bullet.meshing.tet_mesh import Indices, TetMesh
+from robots.vector3 import cross
 from schemas.vectors import Vector
 
 __all__ = ["Elasticity"]

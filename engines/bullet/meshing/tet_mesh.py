@@ -12,12 +12,9 @@ from numpy.typing import NDArray
 
 from schemas.vectors import Vector
 
-__all__ = ["Indices", "TetMesh", "compact", "cross", "dihedral_angles", "shape_quality", "volumes"]
+__all__ = ["Indices", "TetMesh", "compact", "dihedral_angles", "shape_quality", "volumes"]
 
 Indices = NDArray[np.int64]
-
-_SECOND, _THIRD = [1, 2, 0], [2, 0, 1]
-"""Order of the coordinates in the products of a cross product."""
 
 _FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 """Faces of a positively oriented tetrahedron, counter-clockwise seen from outside."""
@@ -84,16 +81,6 @@ class TetMesh:
         lines.append(f"CELL_TYPES {len(self.tetrahedra)}")
         lines += ["10"] * len(self.tetrahedra)
         path.write_text("\n".join(lines) + "\n", encoding="ascii")
-
-
-def cross(one: Vector, other: Vector) -> Vector:
-    """Return the cross products of vectors, shapes (n, 3): `np.cross` with less overhead.
-
-    The result is contiguous whatever the arguments are, as einsum's rounding depends on the order in memory.
-    """
-    return one.take(_SECOND, axis=1) * other.take(_THIRD, axis=1) - (
-        one.take(_THIRD, axis=1) * other.take(_SECOND, axis=1)
-    )
 
 
 def volumes(nodes: Vector, tetrahedra: Indices) -> Vector:

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engines.bullet.meshing.tet_mesh import Indices, cross
+from engines.bullet.meshing.tet_mesh import Indices
+from robots.vector3 import cross
 from schemas.vectors import Vector
 
 __all__ = ["NearFaces", "closest_points", "near_faces"]

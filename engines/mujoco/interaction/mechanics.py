@@ -1,4 +1,4 @@
-"""Moments of forces, and the least mass that a force on the model meets."""
+"""The least mass that a force on the model meets."""
 
 from __future__ import annotations
 
@@ -7,22 +7,10 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["TURNED", "effective_mass", "moment"]
+__all__ = ["TURNED", "effective_mass"]
 
-_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
-TURNED = np.array([_YZX, _ZXY])
+TURNED = np.array([[1, 2, 0], [2, 0, 1]])
 """Axes y, z, x and z, x, y: a cross product is a(yzx) b(zxy) - a(zxy) b(yzx)."""
-
-
-def moment(arms: Vector, forces: Vector) -> Vector:
-    """Return the moments of `forces` at the ends of `arms`, shapes (..., 3).
-
-    The cross product, at a quarter of the cost of np.cross.
-    """
-    if arms.ndim == forces.ndim == 1:
-        (u, v, w), (x, y, z) = arms.tolist(), forces.tolist()
-        return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
-    return arms.take(_YZX, -1) * forces.take(_ZXY, -1) - arms.take(_ZXY, -1) * forces.take(_YZX, -1)
 
 
 def effective_mass(jacobian: Vector, model: mujoco.MjModel, data: mujoco.MjData) -> float:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.mujoco.interaction.collisions import Collisions
-from engines.mujoco.interaction.mechanics import moment
 from engines.mujoco.model import instrument_body
+from robots.vector3 import cross
 from schemas.vectors import Vector
 
 __all__ = ["RigidContact"]
@@ -98,7 +98,7 @@ class RigidContact:
         if not self._means[i].any():
             return
         at_tip = wrench.copy()
-        at_tip[3:] -= moment(self._data.sensordata[self._tips[i]], wrench[:3])
+        at_tip[3:] -= cross(self._data.sensordata[self._tips[i]], wrench[:3])
         part = self._to_base[i] @ at_tip
         self._means[i] -= part
         to += part
@@ -126,9 +126,9 @@ class RigidContact:
         if self.collisions is not None:
             self.collisions.add(self._kinds, loads[:, :3])
         loads.reshape(-1, 2, 3)[:] = loads.reshape(-1, 2, 3) @ contact.frame[found].reshape(-1, 3, 3)
-        loads[:, 3:] += moment(contact.pos[found], loads[:, :3])
+        loads[:, 3:] += cross(contact.pos[found], loads[:, :3])
         total = self._sides.T @ loads
-        total[:, 3:] -= moment(data.sensordata[self._tips], total[:, :3])
+        total[:, 3:] -= cross(data.sensordata[self._tips], total[:, :3])
         self._sums += total
 
     def _add_weld(self, weld: int, owner: int) -> None:
@@ -149,7 +149,7 @@ class RigidContact:
         )
         arm = data.xpos[thing] - data.sensordata[self._tips[owner]]
         self._sums[owner, :3] -= force
-        self._sums[owner, 3:] -= torque + moment(arm, force)
+        self._sums[owner, 3:] -= torque + cross(arm, force)
 
 
 def _owners(model: mujoco.MjModel, arms: list[str]) -> NDArray[np.intp]:

@@ -10,11 +10,11 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from engines.mujoco.interaction.mechanics import moment
 from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.ports import WIRE
 from hub.participant import Inputs, MotionSide
 from robots.training.needles import NeedleShape
+from robots.vector3 import cross
 from schemas.vectors import Vector
 
 __all__ = ["Wire"]
@@ -79,7 +79,7 @@ class Wire:
         arms = self._marks @ self._axes.T
         self._position.reshape(3, 3)[:] = self._place + arms
         spin = self._axes @ self._speed[3:]
-        self._velocity.reshape(3, 3)[:] = self._speed[:3] + moment(spin, arms)
+        self._velocity.reshape(3, 3)[:] = self._speed[:3] + cross(spin, arms)
         self._last[:] = self._position
 
     @staticmethod
@@ -100,12 +100,12 @@ class Wire:
         self._force = self.motion.force(tau, self._position, self._velocity)
         forces, points = self._force.reshape(3, 3), self._position.reshape(3, 3)
         self._load[:3] = forces.sum(axis=0)
-        self._load[3:] = moment(points - self._centre, forces).sum(axis=0)
+        self._load[3:] = cross(points - self._centre, forces).sum(axis=0)
 
     def _move(self) -> None:
         """Record the work and the wrench of a sub-step."""
         self.wrench[:3] += self._load[:3]
-        self.wrench[3:] += self._load[3:] + moment(self._centre, self._load[:3])
+        self.wrench[3:] += self._load[3:] + cross(self._centre, self._load[:3])
         self._substeps += 1
         before = self._last.copy()
         self.refresh()

@@ -18,6 +18,7 @@ from robots.dvrk import psm as psm_arm
 from robots.dvrk.end_effectors.end_effector import Mount
 from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS, Instrument
 from robots.dvrk.setup_joints import CartArm
+from robots.transform import translation
 
 __all__ = ["cart", "ecm", "instrument", "psm", "setup_joint"]
 
@@ -83,6 +84,5 @@ def _hull(name: str, shown: tuple[Part, ...]) -> Part:
 
 def _upright(name: str, radius: float, low: float, high: float) -> Primitive:
     """Return a capsule along the z axis between two heights."""
-    pose = np.eye(4)
-    pose[2, 3] = (low + high) / 2.0
+    pose = translation(0.0, 0.0, (low + high) / 2.0)
     return Primitive(name, "capsule", (radius, max((high - low) / 2.0 - radius, radius)), pose)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engines.mujoco.params import SceneParams
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import CART_FRAME, WORLD_FRAME
 from robots.dvrk.ecm import tip
 from robots.dvrk.endoscope import BASELINE, optical_in_roll
 from robots.dvrk.mounted import MountedEcm
+from robots.transform import inverse_transform, translation
 from schemas.errors import SessionError
 from schemas.vectors import Vector
 
@@ -79,6 +79,5 @@ class SceneFrames:
 
 def _left_in_tip(arm: MountedEcm) -> Vector:
     """Return the left camera's optical frame in that of the ECM's tip, shape (4, 4), as on /tf."""
-    left = np.eye(4)
-    left[0, 3] = -0.5 * BASELINE
-    return inverse_pose(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left
+    left = translation(-0.5 * BASELINE, 0.0, 0.0)
+    return inverse_transform(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left

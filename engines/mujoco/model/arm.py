@@ -15,12 +15,12 @@ from engines.mujoco.model.sensors import add_arm_sensors, add_sphere_sensors
 from engines.mujoco.model.servo import add_joint_drive
 from engines.mujoco.model.shapes import Bodies
 from engines.mujoco.model.tree import BASE, links
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.drive import Disc
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
 from robots.dvrk.link import Link
 from robots.dvrk.mounted import MountedArm
 from robots.dvrk.setup_joints import CartArm
+from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
 __all__ = ["add"]
@@ -40,7 +40,7 @@ def add(spec: mujoco.MjSpec, name: CartArm, params: MountedArm, base_pose: Vecto
     for link in links(name, params):
         above, above_pose = bodies[link.parent]
         body = above.add_body(
-            name=f"{name}/{link.name}", gravcomp=1.0, **placed(inverse_pose(above_pose) @ link.pose)
+            name=f"{name}/{link.name}", gravcomp=1.0, **placed(inverse_transform(above_pose) @ link.pose)
         )
         bodies[link.name] = body, link.pose
         _add_joint(spec, body, name, link)

@@ -13,6 +13,7 @@ from engines.mujoco.params import SceneParams
 from robots import rotation
 from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
+from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
 __all__ = ["build", "place", "spec"]
@@ -82,7 +83,4 @@ def _has_springs(params: MountedArm) -> bool:
 
 
 def _free_pose(params: MountedArm) -> Vector:
-    pose = np.eye(4)
-    pose[:3, :3] = rotation.matrix(np.array(params.orientation))
-    pose[:3, 3] = params.position
-    return pose
+    return rigid_transform(rotation.matrix(np.array(params.orientation)), params.position)

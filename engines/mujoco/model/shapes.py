@@ -17,10 +17,10 @@ import numpy as np
 
 from engines.mujoco import looks
 from engines.mujoco.model.poses import placed
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
+from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
 __all__ = ["Bodies", "add", "add_arm"]
@@ -98,7 +98,7 @@ def _add_collision(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *
                     type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, contype=0, conaffinity=_THINGS, **common
                 )
             else:
-                place = placed(inverse_pose(pose) @ shape.pose)
+                place = placed(inverse_transform(pose) @ shape.pose)
                 body.add_geom(
                     type=_KINDS[shape.kind],
                     size=[*shape.size, 0.0, 0.0][:3],

@@ -19,6 +19,7 @@ from engines.mujoco.pictures.stereo import StereoRenderer
 from robots import rotation
 from robots.dvrk.endoscope import FAR, optical_in_roll
 from robots.dvrk.mounted import MountedEcm
+from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
 __all__ = ["EndoscopeScene", "look_at"]
@@ -100,10 +101,8 @@ class EndoscopeScene:
         """Return the optical frame midway between the cameras, in the world, shape (4, 4)."""
         if self._carrier < 0:
             return self._mounting
-        pose = np.eye(4)
-        pose[:3, :3] = self._data.xmat[self._carrier].reshape(3, 3)
-        pose[:3, 3] = self._data.xpos[self._carrier]
-        return pose @ self._mounting
+        turn, position = self._data.xmat[self._carrier].reshape(3, 3), self._data.xpos[self._carrier]
+        return rigid_transform(turn, position) @ self._mounting
 
 
 def look_at(view: ViewParams) -> Vector:
@@ -117,9 +116,7 @@ def look_at(view: ViewParams) -> Vector:
     if np.linalg.norm(right) < 1e-9:
         right = np.array([1.0, 0.0, 0.0])
     right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3] = np.column_stack([right, np.cross(ahead, right), ahead, position])
-    return pose
+    return rigid_transform(np.column_stack([right, np.cross(ahead, right), ahead]), position)
 
 
 def _overview(model: mujoco.MjModel) -> ViewParams:

@@ -8,13 +8,14 @@ from pydantic import ValidationError
 
 from controllers.expert import outlines
 from controllers.expert.controller import Expert
-from controllers.expert.hand import HandPhase, RobotHand, framed, pose_of
+from controllers.expert.hand import HandPhase, RobotHand
 from controllers.expert.params import ExpertParams
 from controllers.expert.peg_board import PegBoard
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
 from robots.dvrk.instruments import instrument
 from robots.dvrk.psm import chain
+from robots.transform import matrix_to_pose, pose_to_matrix
 from schemas.errors import SessionError
 from schemas.ros import StringMessage
 
@@ -31,7 +32,9 @@ class World:
         given = load(name, []).params["lead"]
         self.expert = Expert("lead", ExpertParams.model_validate(given.model_dump() | params))
         self.outputs = self.expert.configure(Setup(PERIOD, ".")) or {}
-        self.objects = {index: framed(np.array(pose)) for index, pose in starts(name).items()} | (poses or {})
+        self.objects = {index: pose_to_matrix(np.array(pose)) for index, pose in starts(name).items()} | (
+            poses or {}
+        )
         self.held, self.jaws, self.tips, self.grips, self.t = {}, {}, {}, {}, 0
         for each in self.expert._team.hands:
             hand = each.hand
@@ -42,12 +45,14 @@ class World:
         values = {}
         for each in self.expert._team.hands:
             arm = each.hand.arm
-            values[f"{arm}/local/measured_cp"] = pose_of(np.linalg.inv(each.hand.base) @ self.tips[arm])
+            values[f"{arm}/local/measured_cp"] = matrix_to_pose(
+                np.linalg.inv(each.hand.base) @ self.tips[arm]
+            )
             wide = 0.1 if arm in self.grips and self.jaws[arm] < 0 else self.jaws[arm]
             values[f"{arm}/jaw/measured_js"] = np.array([wide, 0, 0])
         for index, pose in self.objects.items():
             holders = [float(arm[-1]) for arm, (name, _) in self.grips.items() if name == index]
-            values[f"objects/{index}/pose"] = pose_of(pose)
+            values[f"objects/{index}/pose"] = matrix_to_pose(pose)
             values[f"objects/{index}/held_by"] = np.array([min(holders, default=0.0)])
         out = self.expert.step(self.t, PERIOD, Inputs(values, events=events))
         self.t += PERIOD
@@ -74,7 +79,7 @@ class World:
                     self.grips[arm] = near[0], np.linalg.inv(self.tips[arm]) @ self.objects[near[0]]
         for message in out[f"{arm}/servo_cp"]:
             p, q = message.pose.position, message.pose.orientation
-            self.tips[arm] = hand.base @ framed(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
+            self.tips[arm] = hand.base @ pose_to_matrix(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
         if arm in self.grips:
             index, grip = self.grips[arm]
             self.objects[index] = self.tips[arm] @ grip
@@ -107,7 +112,7 @@ def test_what_is_lost_on_its_way_is_taken_up_again():
     carrying = world.expert._team.hands[0]
     world.run(20, until=lambda _: carrying.state.phase is HandPhase.CARRY)
     index, _ = world.grips.pop("PSM1")
-    world.objects[index] = framed(np.array(starts("peg-board-surrol")[index]))
+    world.objects[index] = pose_to_matrix(np.array(starts("peg-board-surrol")[index]))
     world.run(120)
     assert world.outputs["dropped"][0] == 1
     assert world.outputs["placed"][0] == len(world.objects)
@@ -150,11 +155,11 @@ def test_a_hand_that_comes_down_on_something_backs_off_and_leaves_the_thing_afte
 def test_a_ring_is_put_down_clear_of_those_beside_it():
     params = load("peg-board-fls", []).params["lead"]
     board = PegBoard(params.rings[:2], params.board)
-    turned = framed(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]))
-    beside = framed(np.array([*board.place(0, np.stack([turned, turned]), 1), 0.0, 0.0, 0.0, 1.0]))
+    turned = pose_to_matrix(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]))
+    beside = pose_to_matrix(np.array([*board.place(0, np.stack([turned, turned]), 1), 0.0, 0.0, 0.0, 1.0]))
     beside[:2, 3] += 2e-3
     for angle in np.linspace(0.0, 2.0, 9):
-        carried = framed(np.array([*beside[:3, 3], 0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2)]))
+        carried = pose_to_matrix(np.array([*beside[:3, 3], 0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2)]))
         place = board.place(0, np.stack([carried, beside]), 1)
         carried[:3, 3] = place
         ring = params.board.measures.ring

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from controllers.needle_tracker.arc_fit import Arc
 from controllers.needle_tracker.controller import _TIP_AHEAD, NeedleTracker
 from controllers.needle_tracker.params import TrackerParams
-from controllers.needle_tracker.pose import difference, framed, inverse, moved, vector_of
+from controllers.needle_tracker.pose import difference, moved
 from controllers.needle_tracker.segmentation import Region, detected, region_about
 from controllers.needle_tracker.tracking_error import TrackingError, TrackingErrorParams
 from engines.mujoco.pictures.endoscope import camera_info
@@ -19,6 +19,7 @@ from hub.planning.scenario_file import load
 from hub.testing import check_engine
 from robots.dvrk.endoscope import EYES, StereoCamera, left_camera
 from robots.training.needles import NEEDLES
+from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
 from schemas.ros import Header, Image, PoseWithCovarianceStamped, Time
 from tests.controllers.visual_servoing.test_servoing import image
 
@@ -51,7 +52,7 @@ class Session:
         self.joints = np.array(self.params.holder.start)
         self.camera_joints = np.array(self.params.arms.driven["ECM"].start)
         self.grasp = moved(
-            framed(np.array([*self.params.grasp.position, *self.params.grasp.orientation])),
+            pose_to_matrix(np.array([*self.params.grasp.position, *self.params.grasp.orientation])),
             np.array([1e-3, -1e-3, 1.5e-3, 0.05, -0.1, 0.08]),
         )
         self.t, self.states, self.warnings, self.before = 0, [], [], self.in_camera()
@@ -59,9 +60,11 @@ class Session:
     def in_camera(self):
         ecm, psm = self.params.arms.driven["ECM"], self.params.holder
         chain = left_camera(ecm.endoscope, self.params.baseline)
-        camera = framed(np.array([*ecm.position, *ecm.orientation])) @ chain.forward(self.camera_joints)
-        base = framed(np.array([*psm.position, *psm.orientation]))
-        return inverse(camera) @ base @ psm.chain.forward(self.joints) @ self.grasp
+        camera = pose_to_matrix(np.array([*ecm.position, *ecm.orientation])) @ chain.forward(
+            self.camera_joints
+        )
+        base = pose_to_matrix(np.array([*psm.position, *psm.orientation]))
+        return inverse_transform(camera) @ base @ psm.chain.forward(self.joints) @ self.grasp
 
     def step(self, count=1, *, dark=False, covered=False, move=True):
         for _ in range(count):
@@ -107,7 +110,7 @@ def test_it_starts_follows_and_says_where_the_needle_is():
         [stated.pose.pose.position.x, stated.pose.pose.position.y, stated.pose.pose.position.z],
         session.outputs["kalmanOutput"][:3],
     )
-    turn = framed(session.outputs["kalmanOutput"])[:3, :3]
+    turn = pose_to_matrix(session.outputs["kalmanOutput"])[:3, :3]
     own = session.outputs["covariance"].reshape(6, 6)
     assert np.allclose(stated.pose.covariance.reshape(6, 6)[:3, :3], turn @ own[:3, :3] @ turn.T)
     assert np.linalg.eigvalsh(own).min() > 0.0
@@ -206,8 +209,8 @@ def test_the_error_is_what_lies_between_truth_and_estimate():
     given = load("needle-tracking", []).params["check"]
     checker = TrackingError("check", TrackingErrorParams.model_validate(given.model_dump(exclude_unset=True)))
     checker.configure(Setup(H, Path()))
-    base = framed(np.array([0, 0, 0.13264, 0, 0, 0, 1.0]))
-    estimate = framed(np.array([0.01, 0.0, -0.1, 0.0, 0.0, 0.0, 1.0]))
+    base = pose_to_matrix(np.array([0, 0, 0.13264, 0, 0, 0, 1.0]))
+    estimate = pose_to_matrix(np.array([0.01, 0.0, -0.1, 0.0, 0.0, 0.0, 1.0]))
     off = np.array([1e-3, 0, 2e-3, 0, 0.1, 0.05])
     covariance = np.diag(np.full(6, 1e-2))
     outputs = checker.step(
@@ -215,8 +218,8 @@ def test_the_error_is_what_lies_between_truth_and_estimate():
         H,
         Inputs(
             {
-                "truth": vector_of(base @ moved(estimate, off)),
-                "estimate": vector_of(estimate),
+                "truth": matrix_to_pose(base @ moved(estimate, off)),
+                "estimate": matrix_to_pose(estimate),
                 "covariance": covariance.reshape(-1),
             }
         ),
@@ -228,5 +231,9 @@ def test_the_error_is_what_lies_between_truth_and_estimate():
     check_engine(
         lambda: TrackingError("check", checker.params),
         period_ns=H,
-        inputs={"truth": vector_of(base), "estimate": vector_of(estimate), "covariance": covariance.ravel()},
+        inputs={
+            "truth": matrix_to_pose(base),
+            "estimate": matrix_to_pose(estimate),
+            "covariance": covariance.ravel(),
+        },
     )

@@ -9,10 +9,11 @@ from bench.vision_needle import ARC, AUTHORS, NEEDLE, OURS, Carried, Trouble, tr
 from controllers.needle_tracker.arc_fit import Detection, fit
 from controllers.needle_tracker.filter import Estimate, View, predicted, updated
 from controllers.needle_tracker.noise import Noise
-from controllers.needle_tracker.pose import difference, inverse, moved, turned_about
+from controllers.needle_tracker.pose import difference, moved, turned_about
 from controllers.needle_tracker.tracking import Belief, Settings, followed, mirrored
 from robots import rotation
 from robots.dvrk.endoscope import EYES
+from robots.transform import inverse_transform
 
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 SOON = 25
@@ -30,7 +31,7 @@ def pose(rng, depth=0.09):
 def test_differences_undo_motions(rng):
     at, error = pose(rng), rng.uniform(-0.5, 0.5, 6)
     assert np.allclose(difference(at, moved(at, error)), error, atol=1e-9)
-    assert np.allclose(inverse(at) @ at, np.eye(4), atol=1e-12)
+    assert np.allclose(inverse_transform(at) @ at, np.eye(4), atol=1e-12)
     point = rng.normal(size=3)
     turn = moved(np.eye(4), 1e-6 * turned_about(point) @ rng.normal(size=3))
     assert np.allclose(turn[:3, :3] @ point + turn[:3, 3], point, atol=1e-10)

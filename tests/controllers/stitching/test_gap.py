@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.expert.hand import framed
 from controllers.stitching.gap import gap
 from robots import rotation
+from robots.transform import pose_to_matrix
 from tests.controllers.stitching.test_guided import Guided
 
 HANDS = Guided().lead._hands
@@ -16,7 +16,7 @@ tips = st.tuples(numbers, numbers, numbers, *[st.floats(-2.0, 2.0)] * 3)
 
 
 def framed_tip(tip):
-    return framed(np.concatenate([tip[:3], rotation.exp(np.array(tip[3:]))]))
+    return pose_to_matrix(np.concatenate([tip[:3], rotation.exp(np.array(tip[3:]))]))
 
 
 def points(hand, tip):

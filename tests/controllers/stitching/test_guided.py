@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 
-from controllers.expert.hand import pose_of
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import MotionParams
 from controllers.stitching.guided_controller import GuidedStitching, GuidedStitchingParams
@@ -13,9 +12,9 @@ from controllers.stitching.phase import Phase
 from controllers.stitching.stage import Stage
 from hub.planning.scenario_file import load
 from robots import rotation
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.endoscope import EYES, StereoCamera, left_camera
 from robots.training.needles import NEEDLES
+from robots.transform import inverse_transform, matrix_to_pose
 from schemas.ros import BoolMessage, Header, Point, PointStamped, StringMessage
 from schemas.visualization import MarkerAction
 from tests.controllers.stitching.test_surgeon import World, drop
@@ -30,7 +29,7 @@ class Guided(World):
     def make(self, given, params):
         given = load("suturing-by-hand", []).params["lead"]
         ecm = given.arms.ECM
-        self.camera = pose_of(ecm.chain.forward(np.array(ecm.start)))
+        self.camera = matrix_to_pose(ecm.chain.forward(np.array(ecm.start)))
         return GuidedStitching("lead", GuidedStitchingParams.model_validate(given.model_dump() | params))
 
     def __init__(self, **params):
@@ -161,7 +160,7 @@ def test_points_may_be_in_any_frame():
         ("PSM1", world.tips["PSM1"]),
         ("needle", world.needle),
     ):
-        x, y, z = (inverse_pose(pose) @ entry)[:3].tolist()
+        x, y, z = (inverse_transform(pose) @ entry)[:3].tolist()
         world.pick(x, y, frame, z)
         assert world.lead._surgeon.guided.points[0] == pytest.approx(entry[:3])
         world.say("cancel")
@@ -178,7 +177,7 @@ def test_a_pixel_of_a_picture_is_the_point_of_the_pad_under_it(eye):
     ecm = params.arms.ECM
     stands = base_in_world("ECM", MotionParams(arms=params.arms))
     left = stands @ left_camera(ecm.endoscope, camera.baseline).forward(np.array(ecm.start))
-    there = inverse_pose(left) @ params.phantom.pose @ [*entry, 1.0]
+    there = inverse_transform(left) @ params.phantom.pose @ [*entry, 1.0]
     x, y, ahead = camera.projection(eye) @ there
     world.pick(x / ahead, y / ahead, f"endoscope_{eye}_image")
     assert world.lead._surgeon.guided.points[0] == pytest.approx(entry, abs=1e-9)

@@ -7,8 +7,8 @@ from controllers.stitching.controller import Stitching
 from controllers.tip_tracker import TipTracker
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.inverse import inverse
+from robots.transform import inverse_transform
 from schemas.errors import SessionError
 
 PERIOD = 40_000_000
@@ -42,7 +42,7 @@ def test_a_resting_tip_is_known_after_some_pictures_and_the_arm_stands_where_it_
     hand, eyes = Stitching("lead", scene.params["lead"])._hands[0], tracker(scene)
     over = hand.base @ hand.chain.forward(np.array([-0.14, 0.14, 0.11, 0, 0, 0]))
     over[:3, 3] = 0.0, 0.0, 0.03
-    true = inverse(hand.chain, inverse_pose(hand.base) @ over, np.array([-0.14, 0.14, 0.11, 0, 0, 0]))
+    true = inverse(hand.chain, inverse_transform(hand.base) @ over, np.array([-0.14, 0.14, 0.11, 0, 0, 0]))
     tip = hand.chain.forward(true)
     pictures = 0
     while not sight.is_known:

@@ -5,15 +5,14 @@ import re
 import numpy as np
 import pytest
 
-from controllers.expert.hand import framed, pose_of
 from controllers.stitching.controller import Stitching
 from controllers.stitching.params import StitchingParams
 from controllers.stitching.phase import Phase
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.inverse import inverse
 from robots.training.needles import NEEDLES
+from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
 from schemas.errors import SessionError
 from schemas.ros import StringMessage
 
@@ -29,7 +28,7 @@ class World:
         self.lead = self.make(given, params)
         self.lead.configure(Setup(PERIOD, "."))
         thing = file.params["robot"].objects["needle"]
-        self.needle = framed(np.array([*thing.position, *thing.orientation]))
+        self.needle = pose_to_matrix(np.array([*thing.position, *thing.orientation]))
         self.tips = {
             hand.arm: hand.base @ hand.chain.forward(np.array(given.arms.driven[hand.arm].start))
             for hand in self.lead._hands
@@ -53,11 +52,11 @@ class World:
         values = {}
         for hand in self.lead._hands:
             arm = hand.arm
-            values[f"{arm}/local/measured_cp"] = pose_of(inverse_pose(hand.base) @ self.tips[arm])
+            values[f"{arm}/local/measured_cp"] = matrix_to_pose(inverse_transform(hand.base) @ self.tips[arm])
             values[f"{arm}/measured_js"] = np.concatenate([self.joints[arm], np.zeros(12)])
             wide = 0.1 if arm in self.grips and self.jaws[arm] < 0 else self.jaws[arm]
             values[f"{arm}/jaw/measured_js"] = np.array([wide, 0, 0])
-        values["objects/needle/pose"] = pose_of(self.needle)
+        values["objects/needle/pose"] = matrix_to_pose(self.needle)
         holders = sorted(float(arm[-1]) for arm in self.grips)
         values["objects/needle/held_by"] = np.array([holders[0] if holders else 0.0])
         return values
@@ -78,10 +77,10 @@ class World:
             at = self.tips[arm][:3, 3] + 9.2e-3 * self.tips[arm][:3, 2]
             places = self.wire @ self.needle[:3, :3].T + self.needle[:3, 3]
             if self.jaws[arm] < 0 and np.linalg.norm(places - at, axis=1).min() < 0.5e-3:
-                self.grips[arm] = inverse_pose(self.tips[arm]) @ self.needle
+                self.grips[arm] = inverse_transform(self.tips[arm]) @ self.needle
         for message in out[f"{arm}/servo_cp"]:
             p, q = message.pose.position, message.pose.orientation
-            tip = framed(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
+            tip = pose_to_matrix(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
             self.tips[arm] = hand.base @ tip
             joints = inverse(hand.chain, tip, self.joints[arm])
             self.fastest = max(self.fastest, float(np.abs(joints - self.joints[arm]).max()))
