@@ -1,8 +1,8 @@
-"""The archive of an FMU, which may come from a stranger: it is checked before anything in it is read.
+"""The archive of an FMU, perhaps from a stranger: checked before anything inside is read.
 
-An FMU is a program: its library runs with all rights of the process that loads it, and no check here changes
-that. The checks keep the steps before that harmless: a scenario that is only listed, validated or drawn reads
-modelDescription.xml and loads nothing.
+An FMU is a program: its library runs with all rights of the loading process, in spite of any check here. The
+checks keep the earlier steps harmless: listing, validating or drawing a scenario reads modelDescription.xml
+and loads nothing.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from schemas.errors import ScenarioError
 __all__ = ["opened_archive", "unpack"]
 
 LARGEST_FILE = 1 << 30
-"""Bytes of one unpacked file."""
+"""Most bytes of an unpacked file."""
 LARGEST_TOTAL = 2 << 30
 """Bytes of all unpacked files together."""
 LARGEST_XML = 128 << 20
@@ -28,17 +28,17 @@ LARGEST_XML = 128 << 20
 MOST_FILES = 100_000
 
 _READ_XML = ("modelDescription.xml", "sources/buildDescription.xml")
-"""The files that FMPy parses."""
+"""Files parsed by FMPy."""
 _ENCRYPTED = 1
 """Bit of a ZIP entry's flags (APPNOTE.TXT 4.4.4)."""
 
 
 @contextmanager
 def opened_archive(path: Path) -> Generator[tuple[IO[bytes], zipfile.ZipFile]]:
-    """Open the FMU at `path` as a file and as an archive that passed all checks.
+    """Open the FMU at `path` as a file and as a checked archive.
 
-    Raises ScenarioError if it could write outside the directory it is unpacked to, is larger than the limits
-    or brings XML entities, and what `zipfile` raises if it is no archive.
+    Raises ScenarioError if the archive could write outside its directory, is larger than the limits or brings
+    XML entities, and the errors of `zipfile` for other files.
     """
     with path.open("rb") as file, zipfile.ZipFile(file) as archive:
         problem = _problem(archive.infolist()) or _xml_problem(archive)
@@ -51,7 +51,7 @@ def opened_archive(path: Path) -> Generator[tuple[IO[bytes], zipfile.ZipFile]]:
 def unpack(path: Path, directory: Path) -> None:
     """Unpack the FMU at `path` into `directory`.
 
-    Raises ScenarioError, with nothing written, if it is refused.
+    Raises ScenarioError, with nothing written, for a refused archive.
     """
     with opened_archive(path) as (_, archive):
         try:
@@ -61,7 +61,7 @@ def unpack(path: Path, directory: Path) -> None:
 
 
 def _problem(entries: Iterable[zipfile.ZipInfo]) -> str:
-    """Return what is wrong with the entries of an archive, as a clause; empty if nothing is."""
+    """Return the problem of an archive's entries, as a clause; empty: no problem."""
     total, seen = 0, set[str]()
     for count, entry in enumerate(entries, start=1):
         name = entry.orig_filename  # `filename` is cut at a NUL
@@ -100,7 +100,7 @@ def _kind_problem(entry: zipfile.ZipInfo) -> str:
 
 
 def _xml_problem(archive: zipfile.ZipFile) -> str:
-    """Return what is wrong with the XML that FMPy parses: a document type could declare entities.
+    """Return the problem of the XML parsed by FMPy: a document type could declare entities.
 
     Entities expand without bound, or bring in files of this machine. FMI uses none.
     """
@@ -122,7 +122,7 @@ class _DocumentTypeError(Exception):
 
 
 def _prolog_problem(stream: IO[bytes]) -> str:
-    """Return what is wrong with an XML file before its root element; the rest is left to FMPy."""
+    """Return the problem of an XML file before the root element; the rest is left to FMPy."""
 
     def reached(*_: object) -> None:
         raise _RootReachedError

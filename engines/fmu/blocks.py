@@ -1,4 +1,4 @@
-"""Variables of one FMI type, set or got in one call through buffers that are prepared once."""
+"""Variables of an FMI type, set or got in a single call through prepared buffers."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from schemas.vectors import Vector
 __all__ = ["WARNING", "Access", "Block", "grouped", "prepared"]
 
 WARNING = 1
-"""The highest FMI status that lets a simulation go on (fmi2Status, fmi3Status: ok 0, warning 1, discard 2,
-error 3, fatal 4).
+"""Highest FMI status of a running simulation (fmi2Status, fmi3Status: ok 0, warning 1, discard 2, error 3,
+fatal 4).
 """
 
 Access = Callable[[str, Sequence[int], NDArray[Any]], Callable[[], int]]
-"""From a function's name such as `GetReal`, value references and a buffer to the prepared call, which returns
-the FMI status.
+"""Maps a function's name such as `GetReal`, value references and a buffer to the prepared call, returning the
+FMI status.
 """
 
 
@@ -38,7 +38,7 @@ def prepared(
 ) -> Callable[[], int]:
     """Return the call of an FMI set or get function on buffer `raw`.
 
-    `counted`: it takes the number of values as well (FMI 3).
+    `counted`: the function takes the number of values as well (FMI 3).
     """
     pointer = raw.ctypes.data_as(ctypes.POINTER(np.ctypeslib.as_ctypes_type(raw.dtype)))
     count = len(references)
@@ -53,9 +53,9 @@ def prepared(
 
 
 def grouped(variables: Iterable[Variable]) -> Iterator[list[Variable]]:
-    """Yield the variables that can go through one call.
+    """Yield groups of variables for a common call.
 
-    They have the same type, and all change at events only, or all at any time.
+    The variables of a group have the same type, and all change at events only, or all at any time.
     """
     groups: dict[tuple[str, bool], list[Variable]] = {}
     for variable in variables:
@@ -64,7 +64,7 @@ def grouped(variables: Iterable[Variable]) -> Iterator[list[Variable]]:
 
 
 class Block:
-    """Some variables of one type, all inputs or all outputs."""
+    """Some variables of a type, all inputs or all outputs."""
 
     def __init__(self, verb: str, variables: Sequence[Variable], access: Access) -> None:
         """Prepare the calls on the variables; `verb` is `Set` or `Get`."""
@@ -84,9 +84,9 @@ class Block:
         }
         self._names = {variable.port: variable.name for variable in variables}
         self.function = function = verb + self.type.access
-        """The FMI function without its prefix."""
+        """Name of the FMI function without prefix."""
         self.call = access(function, [variable.reference for variable in variables], self.raw)
-        """Set or get all of them."""
+        """Set or get all variables."""
         self._single = {
             v.name: access(function, [v.reference], self.raw[self.parts[v.port]]) for v in variables
         }
@@ -97,16 +97,16 @@ class Block:
         return ", ".join(self._names.values())
 
     def refused(self) -> str:
-        """Return the name of the first variable that the FMU refuses to set or get.
+        """Return the name of the first variable refused by the FMU.
 
-        Called after the FMU has discarded a call on all of them.
+        Called after the FMU has discarded a call on all variables.
         """
         return next((name for name, call in self._single.items() if call() > WARNING), self.names)
 
-    def take(self, inputs: Inputs, tau: float) -> None:
-        """Take the inputs as they are `tau` seconds after the start of the step.
+    def store(self, inputs: Inputs, tau: float) -> None:
+        """Store the inputs at `tau` seconds after the start of the step.
 
-        Inputs that change at events only are taken at the start of the step.
+        Inputs with changes at events only are read at the start of the step.
         """
         for port, part in self.parts.items():
             self.values[part] = inputs[port] if self.discrete else inputs.at(port, tau)
@@ -119,9 +119,9 @@ class Block:
             self._taken = taken
 
     def publish(self) -> None:
-        """Bring the outputs that the FMU has written from their C type to doubles.
+        """Convert the outputs written by the FMU from their C type to doubles.
 
-        Raises SessionError if one of them is not a number that a port can carry.
+        Raises SessionError for an output beyond the numbers of ports.
         """
         if self.raw is not self.values:
             np.copyto(self.values, self.raw)

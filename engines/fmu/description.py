@@ -26,12 +26,12 @@ __all__ = ["Description", "describe"]
 _log = logging.getLogger(__name__)
 
 MOST_ELEMENTS = 1_000_000
-"""Of one array. A larger one in a port would fill the memory of all hosts at every step."""
+"""Most elements of an array. A larger array in a port would fill the memory of all hosts at every step."""
 
 
 @dataclass(frozen=True)
 class Description:
-    """An FMU that can be co-simulated here."""
+    """Description of an FMU for co-simulation here."""
 
     path: Path
     major: int
@@ -44,13 +44,13 @@ class Description:
     outputs: tuple[Variable, ...]
     ports: tuple[Port, ...]
     starts: tuple[Start, ...]
-    """The start values that the scenario gives, as the FMU takes them."""
+    """The scenario's start values, in the form for the FMU."""
 
 
 def describe(path: Path, start: Mapping[str, Any], *, strict: bool = True) -> Description:
     """Read the FMU at `path`; `start` holds start values by FMU variable name, in the variables' units.
 
-    `strict` false: read what can be read of a modelDescription.xml that breaks rules of FMI.
+    `strict` false: read a modelDescription.xml in spite of broken rules of FMI.
 
     Raises ScenarioError, and MissingExtraError without FMPy.
     """
@@ -79,7 +79,7 @@ def describe(path: Path, start: Mapping[str, Any], *, strict: bool = True) -> De
 
 
 def _size(path: Path, row: ModelVariable, start: Mapping[str, Any]) -> int:
-    """Return the number of elements of a variable. Raises ScenarioError if it has none or too many."""
+    """Return the number of elements of a variable. Raises ScenarioError for none or too many."""
     try:
         size = size_of(row, start)
     except (TypeError, ValueError):  # of given structural parameters `_starts` has taken care

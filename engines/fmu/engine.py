@@ -1,10 +1,10 @@
 """FMUs as engines: FMI 2.0 and 3.0 for co-simulation, through FMPy.
 
-Inputs and outputs of the FMU are ports, named as `engines.fmu.variables.port_name` says, in the unit that the
-FMU declares: nothing is converted, so that a length in mm fits an input in mm alone. Scalars are
-`std_msgs/msg/Float64`, FMI 3 arrays `std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and
-booleans (0, 1) are exchanged as doubles; an input that is no valid number of its type ends the session.
-Strings, binaries and clocks become no ports, which is logged.
+Inputs and outputs of the FMU are ports, with names by `engines.fmu.variables.port_name`, in the FMU's units:
+nothing is converted, so a length in mm fits an input in mm alone. Scalars are `std_msgs/msg/Float64`, FMI 3
+arrays `std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and booleans (0, 1) are exchanged
+as doubles; an input without a valid number of its type ends the session. Strings, binaries and clocks become
+no ports, with an entry in the log.
 """
 
 from __future__ import annotations
@@ -69,16 +69,16 @@ class FmuParams(Params):
 
 
 class FmuEngine(Stepped):
-    """One FMU.
+    """An FMU as a participant.
 
-    Between communication points an FMU holds its inputs. Where a connection extrapolates linearly, an FMI 2
-    FMU that can interpolate gets value and slope; any other FMU gets the mean of the input over each
-    communication step, which `step` makes as short as needed.
+    Between communication points an FMU holds its inputs. For a connection with linear extrapolation, an FMI 2
+    FMU with interpolation gets value and slope; any other FMU gets the mean of the input over each
+    communication step, made as short as needed by `step`.
 
-    `state_hash` covers the serialised state of the FMU where equal states have equal bytes. Many FMUs
-    serialise addresses of their memory as well (those of modelica/Reference-FMUs do, `getFMUState` in
-    src/cosimulation.c), so a second instance is compared at the start; where equal states differ in their
-    bytes, and where the FMU cannot serialise, the hash covers inputs, outputs and the time.
+    `state_hash` covers the serialised state of the FMU if equal states have equal bytes. Many FMUs serialise
+    addresses of memory as well (modelica/Reference-FMUs do, `getFMUState` in src/cosimulation.c), so a second
+    instance is compared at the start. For states with differing bytes, and without serialisation, the hash
+    covers inputs, outputs and the time.
     """
 
     params_model: ClassVar[type[Params]] = FmuParams
@@ -101,11 +101,11 @@ class FmuEngine(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The FMU's inputs and outputs. Raises ScenarioError if the file is no FMU that runs here."""
+        """The FMU's inputs and outputs. Raises ScenarioError for a file without an FMU for this machine."""
         return self._description.ports
 
     def configure(self, setup: Setup) -> Outputs:
-        """Load the FMU, set its start values and bring it to time 0."""
+        """Load the FMU, set start values and initialise to time 0."""
         step = self.params.step
         if step and setup.period_ns % step:
             problem = (
@@ -128,13 +128,13 @@ class FmuEngine(Stepped):
         return self._read(0)
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
-        """Advance the FMU from `t` to `t + h` (ns), or to where it ends the simulation.
+        """Advance the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation.
 
-        Outputs are those at `t + h`: after the step and, in FMI 3, after the events of that instant. What is
-        read after fmi2DoStep belongs to the end of the step (FMI 2.0.4 section 4.2.1), and in FMI 3 with an
-        event mode discrete outputs change in that mode only (FMI 3.0.1, Event Mode). FMPy's `simulate_fmu`
-        records before and after an event: the second sample is this one (docs/decisions/0036). Once the FMU
-        has ended the simulation its last outputs are held.
+        Outputs are the values at `t + h`: after the step and, in FMI 3, after the events of this instant.
+        Values read after fmi2DoStep belong to the end of the step (FMI 2.0.4 section 4.2.1), and in FMI 3
+        with an event mode discrete outputs change in event mode only (FMI 3.0.1, Event Mode). FMPy's
+        `simulate_fmu` records before and after an event: the second sample equals ours (docs/decisions/0036).
+        After the FMU's end of the simulation the last outputs are held.
         """
         instance = self._running()
         sub = self.params.step or h
@@ -148,24 +148,24 @@ class FmuEngine(Stepped):
 
     @property
     def ended(self) -> str:
-        """When and how the FMU has ended the simulation; empty while it goes on."""
+        """Time and manner of the FMU's end of the simulation; empty: running."""
         return self._running().ended if self._instance else ""
 
     def state_hash(self) -> int:
-        """Return the hash of the FMU's state, or else of its inputs, outputs and time."""
+        """Return the hash of the FMU's state, or else of inputs, outputs and time."""
         instance = self._running()
         if self._hashes_state:
             return state_hash(instance.memory, instance.serialise())
         return state_hash(self._time, *(block.values for block in (*instance.inputs, *instance.outputs)))
 
     def save(self) -> bytes:
-        """Return the FMU's state. Raises StateError if it cannot get and serialise it."""
+        """Return the FMU's state. Raises StateError for an FMU without this capability."""
         instance = self._running()
         self._check_can_save()
         return instance.memory.tobytes() + instance.serialise()
 
     def restore(self, state: bytes) -> None:
-        """Return the FMU to a saved state. Raises StateError if it cannot deserialise and set it."""
+        """Return the FMU to a saved state. Raises StateError for an FMU without this capability."""
         instance = self._running()
         self._check_can_save()
         size = instance.memory.nbytes
@@ -177,7 +177,7 @@ class FmuEngine(Stepped):
         instance.memory[:] = np.frombuffer(state, np.float64, instance.memory.size)
 
     def close(self) -> None:
-        """Terminate and unload the FMU and remove what was extracted of it."""
+        """Terminate and unload the FMU and remove the extracted files."""
         instance, self._instance = self._instance, None
         if instance:
             instance.close()

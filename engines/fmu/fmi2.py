@@ -83,7 +83,7 @@ class Fmi2Instance(Instance):
         """Set the inputs: value and slope if the FMU interpolates, else the mean over the `dt` seconds."""
         interpolates = bool(self._slope_ports)
         for block in self.inputs:
-            block.take(inputs, tau if interpolates else tau + dt / 2)
+            block.store(inputs, tau if interpolates else tau + dt / 2)
             self.transfer(block)
         if interpolates:
             for index, port in enumerate(self._slope_ports):
@@ -94,11 +94,11 @@ class Fmi2Instance(Instance):
                 raise self.failure("SetRealInputDerivatives", status)
 
     def advance(self, t: int, h: int) -> None:
-        """Bring the FMU from `t` to `t + h` (ns), or to where it ends the simulation.
+        """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation.
 
-        The point and the size of a step add up to the next point in every bit, so that an FMU finds no gap
-        between its steps, unless it only takes steps of one size (FMI 2.0.4 section 4.2.2, fmi2DoStep: "the
-        slave must integrate until time instant tc[i+1] = tc[i] + hc[i]").
+        Point and size of a step add up to the next point in every bit, so an FMU finds no gap between steps,
+        except FMUs with steps of a fixed size (FMI 2.0.4 section 4.2.2, fmi2DoStep: "the slave must integrate
+        until time instant tc[i+1] = tc[i] + hc[i]").
         """
         now = t / 1e9
         size = (t + h) / 1e9 - now if self._varies else h / 1e9
@@ -107,7 +107,7 @@ class Fmi2Instance(Instance):
             self._take_failure(status, t, h)
 
     def _take_failure(self, status: int, t: int, h: int) -> None:
-        """Note that the FMU has ended the simulation; raises SessionError if it has failed."""
+        """Note the FMU's end of the simulation; raises SessionError after a failure."""
         reached = ctypes.c_double()
         known = status == DISCARD and self._status("GetRealStatus", _LAST_SUCCESSFUL_TIME, reached)
         ended = ctypes.c_int()
@@ -120,7 +120,7 @@ class Fmi2Instance(Instance):
         raise self.failure("DoStep", status, about)
 
     def _status(self, function: str, kind: int, value: Any) -> bool:
-        """Ask the FMU for a status; returns whether it answered."""
+        """Ask the FMU for a status; return whether the FMU answered."""
         if not self.library.has(f"fmi2{function}"):
             return False
         return self._function(function)(self._component, kind, ctypes.byref(value)) <= WARNING

@@ -1,4 +1,4 @@
-"""FMI 3.0 co-simulation, with its events."""
+"""FMI 3.0 co-simulation, with events."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from schemas.errors import SessionError
 __all__ = ["Fmi3Instance"]
 
 _SAME_INSTANT_S = 0.5e-9
-"""Simulated time has whole nanoseconds: times nearer than half of one are the same instant."""
+"""Simulated time has whole nanoseconds: times nearer than half a nanosecond are the same instant."""
 _MOST_EVENTS = 10_000
-"""In one step. An FMU that asks for more stands still (a Zeno point), and a session must not hang on it."""
+"""Most events in a step. An FMU with more events stands still (a Zeno point), and a session must not hang."""
 
 
 class Fmi3Instance(Instance):
     """An FMI 3.0 FMU.
 
-    Where it has an event mode, events are handled at the time they happen, inside the step.
+    With an event mode, events are handled at their time, inside the step.
     """
 
     prefix = "fmi3"
@@ -98,24 +98,21 @@ class Fmi3Instance(Instance):
             self.call("EnterStepMode")
 
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
-        """Set the inputs: continuous ones to their mean over the `dt` seconds, discrete ones in event mode.
-
-        Discrete inputs are set only if they have changed.
-        """
+        """Set continuous inputs to their mean over `dt` seconds, changed discrete inputs in event mode."""
         for block in self._step_blocks:
-            block.take(inputs, tau + dt / 2)
+            block.store(inputs, tau + dt / 2)
             self.transfer(block)
         if not self._event_blocks:
             return
         for block in self._event_blocks:
-            block.take(inputs, tau)
+            block.store(inputs, tau)
         values = np.concatenate([block.values for block in self._event_blocks])
         if not np.array_equal(values, self.memory[1:]):
             self.memory[1:] = values
             self._handle_event(self._event_blocks, at=self.now_ns / 1e9)
 
     def advance(self, t: int, h: int) -> None:
-        """Bring the FMU from `t` to `t + h` (ns), from event to event, or to where it ends the simulation."""
+        """Bring the FMU from `t` to `t + h` (ns), event by event, or to the FMU's end of the simulation."""
         now, end = t / 1e9, (t + h) / 1e9
         for _ in range(_MOST_EVENTS):
             target = min(end, float(self.memory[0])) if self._splits else end
@@ -134,7 +131,7 @@ class Fmi3Instance(Instance):
         )
 
     def _step_to(self, now: float, target: float) -> float:
-        """Step towards `target` and return the time that was reached."""
+        """Step towards `target` and return the reached time."""
         status = self._do_step(now, target - now, not self.can_save, *self._step_results)
         if status > WARNING:
             raise self.failure("DoStep", status, f" for the step from {now:.9g} s to {target:.9g} s")
@@ -144,7 +141,7 @@ class Fmi3Instance(Instance):
         return reached
 
     def _handle_event(self, inputs: Sequence[Block] = (), *, at: float) -> None:
-        """Handle the event at `at` (s). Where the FMU ends the simulation it is left in event mode."""
+        """Handle the event at `at` (s). An FMU at the end of its simulation stays in event mode."""
         self.call("EnterEventMode")
         for block in inputs:
             self.transfer(block)
@@ -154,9 +151,9 @@ class Fmi3Instance(Instance):
             self._end(at, "terminateSimulation of fmi3UpdateDiscreteStates")
 
     def _update_discrete_states(self) -> bool:
-        """Iterate the event until the discrete states stay, and note when the next one is due.
+        """Iterate the event until the discrete states stay, and note the time of the next event.
 
-        Returns whether the simulation goes on: the FMU may ask to end it.
+        Returns whether the simulation goes on: the FMU may ask for the end.
         """
         for _ in range(_MOST_EVENTS):
             self.call("UpdateDiscreteStates", *self._update_results)

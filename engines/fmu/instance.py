@@ -1,4 +1,4 @@
-"""One instance of an FMU: what FMI 2.0 and 3.0 have in common."""
+"""An instance of an FMU: the common part of FMI 2.0 and 3.0."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ DISCARD, _ERROR, _FATAL = 2, 3, 4
 class Instance(ABC):
     """A loaded FMU.
 
-    Raises SessionError, with the FMU's own message, whenever one of its functions fails.
+    Raises SessionError, with the FMU's own message, whenever a function fails.
     """
 
     prefix: ClassVar[str]
@@ -47,7 +47,7 @@ class Instance(ABC):
     """C type of a serialised state's elements."""
 
     required: ClassVar[Sequence[str]]
-    """Functions that are called of every FMU, without their prefix."""
+    """Functions required of every FMU, without prefix."""
 
     def __init__(
         self,
@@ -58,16 +58,16 @@ class Instance(ABC):
     ) -> None:
         """Unpack and load the FMU through FMPy's class `slave` and instantiate it.
 
-        `options`: what it is instantiated with; if it refuses the first ones, the next are tried.
+        `options`: sets of arguments of the instantiation, tried in order until the FMU accepts.
 
-        Raises ScenarioError if the archive is refused, if the library cannot be loaded or lacks a function
-        that is needed, and SessionError if the FMU refuses to be instantiated.
+        Raises ScenarioError for a refused archive, and for a library that cannot be loaded or lacks a
+        required function; SessionError if the FMU refuses all options.
         """
         self._name = name
         self.ended = ""
-        """When and how the FMU has ended the simulation; empty while it goes on."""
+        """Time and manner of the FMU's end of the simulation; empty: running."""
         self.now_ns = 0
-        """The time at which inputs are set."""
+        """Time of the inputs, ns."""
         with contextlib.ExitStack() as stack:
             directory = stack.enter_context(tempfile.TemporaryDirectory(prefix="trocar-fmu-"))
             unpack(description.path, Path(directory))
@@ -84,9 +84,7 @@ class Instance(ABC):
         self._worst = 0
         self._state = ctypes.c_void_p()
         self.memory = np.zeros(0)
-        """What is known between steps apart from the FMU's own state; an array to be written into, never
-        replaced.
-        """
+        """State between steps apart from the FMU's own; written in place, never replaced."""
         self._serialised: Any = (self.byte * 0)()
         self.inputs = [Block("Set", group, self._access) for group in grouped(description.inputs)]
         self.outputs = [Block("Get", group, self._access) for group in grouped(description.outputs)]
@@ -104,7 +102,7 @@ class Instance(ABC):
     def _instantiate(
         self, description: Description, options: Sequence[Mapping[str, Any]]
     ) -> Mapping[str, Any]:
-        """Instantiate the FMU with the first of `options` that it takes, and return them."""
+        """Instantiate the FMU with the first accepted `options`, and return the options."""
         for which in options:
             try:
                 self._fmu.instantiate(**which)
@@ -139,11 +137,11 @@ class Instance(ABC):
 
     @abstractmethod
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
-        """Set the inputs for the `dt` seconds that begin `tau` seconds after the start of the step."""
+        """Set the inputs for `dt` seconds from `tau` seconds after the start of the step on."""
 
     @abstractmethod
     def advance(self, t: int, h: int) -> None:
-        """Bring the FMU from `t` to `t + h`, both in nanoseconds, or to where it ends the simulation."""
+        """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation."""
 
     def read_outputs(self) -> None:
         """Bring the FMU's outputs into the blocks."""
@@ -162,7 +160,7 @@ class Instance(ABC):
         return bytes(self._serialised)
 
     def deserialise(self, state: bytes) -> None:
-        """Bring the FMU back to a state that `serialise` returned."""
+        """Bring the FMU back to a state from `serialise`."""
         self.ended = ""
         restored = ctypes.c_void_p()
         self.call(
@@ -177,7 +175,7 @@ class Instance(ABC):
             self.call(f"Free{self.state_word}", ctypes.byref(restored))
 
     def close(self) -> None:
-        """Terminate and free the instance, unload its library and remove what was extracted."""
+        """Terminate and free the instance, unload the library and remove the extracted files."""
         with self._loaded:
             if self._worst >= _FATAL:
                 return  # no function of the FMU may be called any more (fmi2Fatal, fmi3Fatal)
@@ -193,15 +191,15 @@ class Instance(ABC):
             self._function("FreeInstance")(self._component)
 
     def call(self, function: str, *arguments: Any) -> None:
-        """Call an FMI function, named without its prefix."""
+        """Call an FMI function, named without prefix."""
         status = self._function(function)(self._component, *arguments)
         if status > WARNING:
             raise self.failure(function, status)
 
     def failure(self, function: str, status: int, about: str = "") -> SessionError:
-        """Return the error for a function that failed, and remember how bad it was.
+        """Return the error for a failed function, and store the severity.
 
-        `about`: what it was called for, as part of the message.
+        `about`: purpose of the call, as part of the message.
         """
         self._worst = max(self._worst, status)
         label = _STATUS[status] if 0 <= status < len(_STATUS) else str(status)
@@ -215,7 +213,7 @@ class Instance(ABC):
         return getattr(self.library, self.prefix + name)
 
     def _end(self, time_s: float, how: str) -> None:
-        """Note that the FMU asks to end the simulation."""
+        """Note the FMU's request to end the simulation."""
         self.ended = f"the FMU asks to end the simulation at {time_s:.9g} s ({how}){self._reason()}"
 
     def _access(self, function: str, references: Sequence[int], raw: NDArray[Any]) -> Callable[[], int]:

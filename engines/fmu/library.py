@@ -1,4 +1,4 @@
-"""The shared library of an FMU: whether there is one for this platform, and how it is loaded."""
+"""The shared library of an FMU: availability for this platform, and loading."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["Library", "load_library"]
 _ABSENT = re.compile(
     r"(?P<file>(?P<name>[\w.+-]+?)\.so(?:\.(?P<version>\d+))?[\d.]*): cannot open shared object"
 )
-"""What the loader of Linux says of a library that another one needs (dlerror, glibc and musl)."""
+"""Message of the Linux loader about a missing dependency of a library (dlerror, glibc and musl)."""
 
 
 class Library:
-    """A loaded library. A function that it lacks is replaced by one that raises SessionError when called.
+    """A loaded library. A call of a missing function raises SessionError.
 
-    Tools leave functions out that their FMU does not need, such as `fmi2DeSerializeFMUstate` (FMI 2.0.4
-    section 2.1.8: optional by capability flag); FMPy looks all of them up when it loads a library.
+    Tools leave out functions without use in their FMU, such as `fmi2DeSerializeFMUstate` (FMI 2.0.4 section
+    2.1.8: optional by capability flag); FMPy looks up all functions while loading a library.
     """
 
     def __init__(self, library: ctypes.CDLL) -> None:
@@ -46,12 +46,12 @@ class Library:
         return not self.missing(names)
 
     def missing(self, names: Collection[str]) -> list[str]:
-        """Return those of the functions `names` that the library lacks."""
+        """Return the functions among `names` missing in the library."""
         return [name for name in names if isinstance(getattr(self, name), _AbsentFunction)]
 
 
 class _AbsentFunction:
-    """Stands for a function that a library lacks; FMPy sets its C types as attributes."""
+    """Stands for a missing function of a library; FMPy sets C types as attributes."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -61,7 +61,7 @@ class _AbsentFunction:
 
 
 def load_library(slave: type[Any], description: Description, directory: Path, name: str) -> Any:
-    """Load the FMU that was unpacked to `directory` through FMPy's class `slave`, as instance `name`.
+    """Load the FMU unpacked to `directory` through FMPy's class `slave`, as instance `name`.
 
     The `dll` of the result is a `Library`. Raises ScenarioError if the library cannot be loaded.
     """
@@ -87,7 +87,7 @@ def load_library(slave: type[Any], description: Description, directory: Path, na
 
 
 def _needed(error: str) -> str:
-    """Return which system library is missing and how to install it; empty if that is not the error.
+    """Return the missing system library with the remedy; empty for another error.
 
     Debian's package of a library is named after its soname (Debian Policy 8.1): libgfortran.so.3 is in
     libgfortran3.

@@ -11,7 +11,7 @@ __all__ = ["fmi2_callbacks", "last_warning", "log_everything", "log_message"]
 
 _log = logging.getLogger(__name__)
 _LEVELS = (logging.DEBUG, logging.WARNING, logging.WARNING, logging.ERROR, logging.CRITICAL, logging.DEBUG)
-"""By FMI status: ok, warning, discard, error, fatal, pending (FMI 2 alone)."""
+"""Log levels by FMI status: ok, warning, discard, error, fatal, pending (FMI 2 alone)."""
 _last_warnings: dict[str, str] = {}
 
 
@@ -25,10 +25,7 @@ def log_message(instance: str, status: int, category: bytes | None, message: byt
 
 
 def last_warning(instance: str) -> str:
-    """Return the last warning or error of an instance, and forget it.
-
-    It becomes part of the error that follows from it.
-    """
+    """Return the last warning or error of an instance once, as part of the following error."""
     return _last_warnings.pop(instance, "")
 
 
@@ -41,7 +38,7 @@ def log_everything() -> bool:
 def fmi2_callbacks() -> Any:
     """Return the callbacks of all FMI 2 instances.
 
-    FMPy's proxy, which formats the variadic messages, holds one logger a process.
+    FMPy's proxy for the variadic messages holds a single logger per process.
     """
     from fmpy import calloc, fmi2, free
 

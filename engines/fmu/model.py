@@ -1,4 +1,4 @@
-"""An FMU's modelDescription.xml, read by FMPy and checked before its names go anywhere."""
+"""An FMU's modelDescription.xml, read by FMPy and checked before any use of its names."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ __all__ = ["co_simulation", "read_model"]
 _log = logging.getLogger(__name__)
 
 _LONGEST_REASON = 1000
-"""Letters of what FMPy reports: it quotes values of any length."""
+"""Most letters of a report of FMPy: FMPy quotes values of any length."""
 
 
 def read_model(path: Path, *, strict: bool) -> tuple[ModelDescription, int, list[str]]:
-    """Return the description of the FMU at `path`, the major version of FMI, and the names in its archive.
+    """Return the description of the FMU at `path`, the major version of FMI, and the names in the archive.
 
-    Rules of FMI that FMPy finds broken are logged: tools write many FMUs that run well and break one. Where
-    the description breaks a rule such that FMPy cannot check it, or a name is not fit to be shown, the error
-    names variable and line; `strict` false ignores the former.
+    Rules of FMI found broken by FMPy are logged: many working FMUs break some. If a broken rule stops FMPy's
+    check, or a name is unfit for display, the error names variable and line; `strict` false ignores the
+    former.
 
     Raises ScenarioError, and MissingExtraError without FMPy.
     """
@@ -79,7 +79,7 @@ def _read(path: Path, file: IO[bytes], *, strict: bool) -> ModelDescription:
 
 
 def _undefined_display_units(model: ModelDescription) -> Iterator[str]:
-    """Yield the variables on which FMPy's own check fails: they have a display unit and no defined unit."""
+    """Yield the variables of a failing check in FMPy itself: a display unit without a defined unit."""
     units = {unit.name for unit in model.unitDefinitions}
     for row in model.modelVariables:
         if row.displayUnit is not None and unit_of(row) not in units:
@@ -90,7 +90,7 @@ def _undefined_display_units(model: ModelDescription) -> Iterator[str]:
 
 
 def _check_texts(path: Path, model: ModelDescription) -> None:
-    """Refuse names and units that terminals and pages could take for commands.
+    """Refuse names and units readable as commands by terminals and pages.
 
     FMI's flat names exclude carriage return, line feed and tab (FMI 2.0.4 section 2.2.9); angle brackets
     occur in quoted Modelica names alone.
@@ -110,14 +110,14 @@ def _check_texts(path: Path, model: ModelDescription) -> None:
 
 
 def _shown(text: str, *, most: int = 80) -> str:
-    """Return `text` such that it can be shown in one line, its first `most` letters."""
+    """Return the first `most` letters of `text`, for display in a line."""
     return "".join(letter if letter.isprintable() else "?" for letter in text[:most])
 
 
 def co_simulation(path: Path, model: ModelDescription, major: int, names: Collection[str]) -> CoSimulation:
-    """Return the co-simulation part of the FMU, whose archive holds `names`.
+    """Return the co-simulation part of the FMU with the archive entries `names`.
 
-    Raises ScenarioError if it has none that runs on this platform.
+    Raises ScenarioError if there is none for this platform.
     """
     if model.coSimulation is None:
         raise ScenarioError(
@@ -135,7 +135,7 @@ def co_simulation(path: Path, model: ModelDescription, major: int, names: Collec
 
 
 def _is_time_based_input(row: ModelVariable) -> bool:
-    """Return whether a variable is an input clock that ticks at times the importer must know (FMI 3.0.1)."""
+    """Return whether a variable is a time-based input clock, with ticks known to the importer (FMI 3.0.1)."""
     return row.type == "Clock" and row.causality == "input" and row.intervalVariability != "triggered"
 
 

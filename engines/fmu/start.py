@@ -1,7 +1,4 @@
-"""Start values: those that an FMU declares for its inputs, and those that a scenario gives.
-
-A scenario may give them for parameters, inputs and states.
-"""
+"""Start values: declared by an FMU for inputs, or given in a scenario for parameters, inputs and states."""
 
 from __future__ import annotations
 
@@ -24,14 +21,14 @@ __all__ = ["Start", "declared_start", "given_start", "settable", "size_of", "uni
 
 @dataclass(frozen=True)
 class Start:
-    """A start value as the FMU takes it."""
+    """A start value in the form for the FMU."""
 
     name: str
     reference: int
     access: str
-    """The set function without its prefix: `Real`, `Float64`, `String`, ..."""
+    """The set function without prefix: `Real`, `Float64`, `String`, ..."""
     structural: bool
-    """It is a structural parameter (FMI 3), which is set in configuration mode."""
+    """Whether the variable is a structural parameter (FMI 3), set in configuration mode."""
     value: NDArray[Any] | bytes
     """Numbers in the C type of the set function, shape (size,), or UTF-8 text."""
 
@@ -47,14 +44,14 @@ def settable(row: ModelVariable) -> bool:
 
 
 def unit_of(row: ModelVariable) -> str:
-    """Return the unit of a variable as the FMU spells it, of its own or of its declared type."""
+    """Return the unit of a variable in the FMU's spelling, from the variable or its declared type."""
     return row.unit or (row.declaredType.unit if row.declaredType else None) or ""
 
 
 def size_of(row: ModelVariable, start: Mapping[str, Any]) -> int:
     """Return the number of elements of a variable.
 
-    Structural parameters among the start values change that of FMI 3 arrays.
+    Structural parameters among the start values change the size of FMI 3 arrays.
     """
     return math.prod(
         int(start.get(d.variable.name, d.variable.start) if d.variable else d.start) for d in row.dimensions
@@ -62,7 +59,7 @@ def size_of(row: ModelVariable, start: Mapping[str, Any]) -> int:
 
 
 def declared_start(row: ModelVariable, size: int) -> tuple[float, ...] | None:
-    """Return the start value that the FMU declares, `size` numbers; None if it declares none of that size."""
+    """Return the FMU's declared start value, `size` numbers; None: no declared value of this size."""
     numbers = [float({"true": "1", "false": "0"}.get(word, word)) for word in (row.start or "").split()]
     if len(numbers) == 1:
         numbers *= size
@@ -70,9 +67,9 @@ def declared_start(row: ModelVariable, size: int) -> tuple[float, ...] | None:
 
 
 def given_start(row: ModelVariable, given: Any, major: int, size: int) -> Start:
-    """Return the start value `given`: a number, a text with a unit, a list of them, or true or false.
+    """Return the start value `given`: a number, a text with a unit, a list of these, or true or false.
 
-    For a String it is a text. Numbers are in the variable's unit. Raises ValueError if it does not fit the
+    For a String a text. Numbers are in the variable's unit. Raises ValueError for a value unfit for the
     variable.
     """
     structural = row.causality == "structuralParameter"

@@ -1,4 +1,4 @@
-"""FMU variables as numbers: their port names, their FMI types, and the exact way from float64 to those."""
+"""FMU variables as numbers: port names, FMI types, and exact conversion from float64."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ _BAD_START = re.compile(r"[^A-Za-z]|x(?=[0-9A-F]{2,}_)")
 
 @dataclass(frozen=True)
 class NumberType:
-    """An FMI type that holds numbers or truth values."""
+    """An FMI type of numbers or truth values."""
 
     name: str
     """`Real`, `Float64`, `Boolean`, `Enumeration`, ..."""
     access: str
-    """Its get and set functions without their prefix: `Real` for `fmi2GetReal` and `fmi2SetReal`."""
+    """Get and set functions without prefix: `Real` for `fmi2GetReal` and `fmi2SetReal`."""
     dtype: np.dtype[Any]
-    """The C type of those functions."""
+    """The C type of get and set functions."""
 
     def from_float64(self, values: Vector, variable: str) -> NDArray[Any]:
         """Return `values` in the C type.
 
-        A boolean is 0 or 1, an integer a whole number in its range and of at most 2^53. Raises ValueError,
-        naming the variable, if a value cannot be represented exactly.
+        A boolean is 0 or 1, an integer a whole number in range and of at most 2^53. Raises ValueError, naming
+        the variable, for a value without an exact representation.
         """
         low, high = self._bounds()
         fits = (values >= low) & (values <= high)
@@ -59,7 +59,7 @@ class NumberType:
 
 @dataclass(frozen=True)
 class Variable:
-    """An input or output of an FMU that is a port."""
+    """An input or output of an FMU, as a port."""
 
     name: str
     port: str
@@ -68,7 +68,7 @@ class Variable:
     type: NumberType
     size: int
     discrete: bool
-    """It changes at events only."""
+    """Whether the variable changes at events only."""
 
 
 _FMI2 = {
@@ -96,18 +96,18 @@ _FMI3 = {
 
 
 def number_type(major: int, fmi_type: str) -> NumberType | None:
-    """Return an FMI type by name; None if it holds no numbers.
+    """Return an FMI type by name; None: a type without numbers.
 
-    Names are those of FMI 2.0 (fmi2TypesPlatform.h) or 3.0 (fmi3PlatformTypes.h).
+    Names as in FMI 2.0 (fmi2TypesPlatform.h) or 3.0 (fmi3PlatformTypes.h).
     """
     return (_FMI2 if major == 2 else _FMI3).get(fmi_type)
 
 
 def port_name(variable: str) -> str:
-    """Return the port name of an FMU variable. No two variables share one: the name can be read backwards.
+    """Return the port name of an FMU variable. Port names are unique: the conversion is reversible.
 
-    A dot becomes `/`; any other character that a port name cannot hold becomes `_xHH_`, with its code point
-    in hexadecimal, or `xHH_` where a part starts with it: `body.r[1]` is `body/r_x5B_1_x5D_`, `arm._q` is
+    A dot becomes `/`; any other character forbidden in port names becomes `_xHH_`, with the code point in
+    hexadecimal, or `xHH_` at the start of a part: `body.r[1]` is `body/r_x5B_1_x5D_`, `arm._q` is
     `arm/x5F_q`.
     """
     parts = variable.split(".")
