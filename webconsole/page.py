@@ -49,7 +49,7 @@ _STATE_S = 0.25
 _MOST_WAITING = 2
 """Frames that a page has not acknowledged; until it does, newer values replace what it would have got."""
 _MOST_PROBLEMS = 50
-"""Damaged values of which a page is told."""
+"""Damaged values that are reported to a page."""
 _MESSAGES_PER_S = 400.0
 """Of a page: 60 acknowledgements, 120 inputs of a hand, and a burst of them after a pause."""
 _MOST_REFUSED = 200

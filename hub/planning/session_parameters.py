@@ -25,7 +25,7 @@ Successors = Mapping[str, Sequence[tuple[int, Stepped]]]
 class SessionParameters:
     """Kinds and parameters of participants over a session, and the files that these may name.
 
-    To build a participant imports its kind and may run native code and read files. So whoever makes such a
+    To build a participant imports its kind and may run native code and read files. A caller that makes such a
     value answers for its source: the user's own scenario, a hub that a host has joined, or, for a recording,
     `trusted_parameters` alone (hub/recording/trust.py).
     """

@@ -1,4 +1,4 @@
-"""Latched `state_command`s: new commands told from repeated deliveries."""
+"""Latched `state_command`s: new commands, distinguished from repeated deliveries."""
 
 from __future__ import annotations
 
