@@ -8,10 +8,10 @@ go through it, and so does a grant with samples.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from functools import cache
 from math import isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from schemas.codec import decode, encode_as
 from schemas.errors import MessageError
@@ -32,6 +32,8 @@ class Entering(NamedTuple):
     stale: bool
     payload: Bytes
     age_ns: int
+    decoded: tuple[Hashable, Any] | None = None
+    """Layout of the port and value of the payload, if this process has decoded it."""
 
 
 class Grant(NamedTuple):

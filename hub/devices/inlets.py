@@ -10,6 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,16 @@ _MOST_QUEUED = 10_000
 """An event queue this long is a flood: more samples are refused until the next communication point."""
 
 
+class _Queued(NamedTuple):
+    """A sample that has arrived and has not entered yet."""
+
+    payload: bytes
+    value: Any
+    arrived_ns: int
+    sent_ns: int | None
+    """By the device's own clock."""
+
+
 @dataclass
 class _Inlet:
     source: str
@@ -36,8 +47,7 @@ class _Inlet:
     """Its place among all inlets."""
     simulated: bool = False
     max_age_ns: int = 0
-    queue: deque[tuple[bytes, int, int | None]] = field(default_factory=deque[tuple[bytes, int, int | None]])
-    """Payload, arrival, and the time at which it was sent, by the device's own clock."""
+    queue: deque[_Queued] = field(default_factory=deque["_Queued"])
     arrived_ns: int | None = None
     stale: bool = True
     newest: tuple[int, int] = (0, 0)
@@ -123,7 +133,7 @@ class Inlets:
         inlet = self._inlets.get((participant, port))
         if inlet is None:
             raise MessageError(f"no connection takes '{participant}.{port}'")
-        inlet.codec.accept(payload)
+        value = inlet.codec.accept(payload)
         with self._lock:
             if stamp is not None:
                 inlet.follow(stamp)
@@ -133,7 +143,7 @@ class Inlets:
                 raise MessageError(
                     f"'{participant}.{port}' has {_MOST_QUEUED} samples waiting; this one is refused"
                 )
-            inlet.queue.append((payload, now_ns, None if stamp is None else stamp.sent_ns))
+            inlet.queue.append(_Queued(payload, value, now_ns, None if stamp is None else stamp.sent_ns))
             inlet.arrived_ns = now_ns
             self._offered.add(inlet.number)
 
@@ -150,7 +160,7 @@ class Inlets:
                     inlet.arrived_ns, inlet.stale = None, True
                     self._offered.discard(inlet.number)
                     if not inlet.codec.is_event:
-                        entering.append(_sample(inlet, b"", stale=True, age_ns=0))
+                        entering.append(_staleness(inlet, stale=True))
         return entering
 
     def sample(self, time_ns: int, wall_ns: int) -> list[Entering]:
@@ -167,17 +177,19 @@ class Inlets:
                 if inlet.arrived_ns is not None:
                     stale = bool(inlet.max_age_ns) and now_ns - inlet.arrived_ns > inlet.max_age_ns
                 offset_ns = self.offsets_ns.get(inlet.source)
-                for payload, arrived_ns, sent_ns in inlet.queue:
-                    entering.append(_sample(inlet, payload, stale=stale, age_ns=now_ns - arrived_ns))
+                for payload, value, arrived_ns, sent_ns in inlet.queue:
+                    content, age_ns = np.frombuffer(payload, np.uint8), now_ns - arrived_ns
+                    decoded = inlet.codec.layout, value
+                    entering.append(Entering(inlet.source, inlet.port, stale, content, age_ns, decoded))
                     if sent_ns is not None and offset_ns is not None:
                         self.latencies.add("device to grant", inlet.name, now_ns - sent_ns - offset_ns)
                 if stale != inlet.stale and not inlet.queue:
-                    entering.append(_sample(inlet, b"", stale=stale, age_ns=0))
+                    entering.append(_staleness(inlet, stale=stale))
                 inlet.queue.clear()
                 inlet.stale = stale
             self._offered.clear()
         return entering
 
 
-def _sample(inlet: _Inlet, payload: bytes, *, stale: bool, age_ns: int) -> Entering:
-    return Entering(inlet.source, inlet.port, stale, np.frombuffer(payload, np.uint8), age_ns)
+def _staleness(inlet: _Inlet, *, stale: bool) -> Entering:
+    return Entering(inlet.source, inlet.port, stale, np.zeros(0, np.uint8), 0)

@@ -27,8 +27,9 @@ from hub.transport.port_codec import PortCodec
 from hub.transport.reader import Queue, Reader
 from hub.transport.wire import Wire
 from schemas.errors import MessageError, ParticipantError, TrocarError
-from schemas.lockstep import Ack, Grant
+from schemas.lockstep import Ack, Entering, Grant
 from schemas.ports import BondSide
+from schemas.trocar_msgs import InletSample
 
 __all__ = ["Done", "Host"]
 
@@ -162,7 +163,7 @@ class Host:
             self._renew(*self._successors.pop(0))
         for sample in grant.inlets:
             for one, port, codec in self._inlets.get((sample.participant, sample.port), ()):
-                _enter(one, port, codec, sample.payload.tobytes(), stale=sample.stale)
+                _enter(one, port, codec, sample)
         step_ns = self.plan.step_ns
         end = grant.horizon_ns // step_ns
         for one in self._hosted:
@@ -300,19 +301,23 @@ def _take(one: HostedParticipant, queue: Queue) -> None:
     queue.arrived.clear()
 
 
-def _enter(one: HostedParticipant, port: str, codec: PortCodec, payload: bytes, *, stale: bool) -> None:
+def _enter(one: HostedParticipant, port: str, codec: PortCodec, sample: InletSample | Entering) -> None:
     """Write one inlet sample of a grant into the inputs of a participant."""
-    if stale:
+    if sample.stale:
         one.stale.add(port)
     else:
         one.stale.discard(port)
-    if not payload:
+    if not sample.payload.size:
         return
-    try:
-        value = codec.accept(payload)
-    except MessageError as error:
-        log.warning("inlet sample for '%s.%s' refused: %s", one.name, port, error)
-        return
+    decoded = sample.decoded if isinstance(sample, Entering) else None
+    if decoded is not None and decoded[0] == codec.layout:
+        value = decoded[1]
+    else:
+        try:
+            value = codec.accept(sample.payload.tobytes())
+        except MessageError as error:
+            log.warning("inlet sample for '%s.%s' refused: %s", one.name, port, error)
+            return
     if codec.is_event:
         one.events[port] = (*one.events.get(port, ()), value)
     else:

@@ -23,7 +23,7 @@ __all__ = ["HostLayout", "Listeners"]
 class Listeners(Protocol):
     """Returns what is called with every value of some outputs; None if nothing is."""
 
-    def listener(self, planned: PlannedParticipant, port: Port) -> Listener | None:
+    def listener(self, planned: PlannedParticipant, codec: PortCodec) -> Listener | None:
         """Return the listener of messages or events."""
         ...
 
@@ -94,6 +94,7 @@ class HostLayout:
         for port in planned.ports:
             if port.causality == "input":
                 continue
+            codec, listeners = PortCodec(port), self._listeners
             stride = plan.stride(planned.name, port.name)
             depth = self._depth(planned.name, port.name, here=True)
             is_read = self._is_read_elsewhere(planned.name, port.name)
@@ -104,20 +105,21 @@ class HostLayout:
             if self._wire is not None:
                 publisher = self._wire.publisher(
                     planned,
-                    port,
+                    codec,
                     is_read=is_read,
                     feeds=to_devices,
                     bundles=indices.get(port.name, ()),
                     stride_ns=stride * plan.step_ns,
                 )
-            codec, listeners = codec_of(port).vector, self._listeners
             output = self._outputs[planned.name, port.name] = Output(
                 port,
-                codec,
+                codec.vector,
                 stride > planned.period,
                 Cell(planned.period, stride, depth) if depth else None,
                 publisher,
-                listeners.listener(planned, port) if listeners is not None and codec is None else None,
+                listeners.listener(planned, codec)
+                if listeners is not None and codec.vector is None
+                else None,
             )
             output.watched = listeners is not None and listeners.watches(planned.name, port.name)
             one.ports.append(output)

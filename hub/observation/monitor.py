@@ -28,7 +28,6 @@ from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.keys import Keys, topic
 from schemas.lockstep import Ack, Grant, pack_ack
-from schemas.message import Message
 from schemas.ports import Port
 from schemas.trocar_msgs import (
     AckMessage,
@@ -141,40 +140,27 @@ class Monitor:
 
         return receive
 
-    def listener(self, planned: PlannedParticipant, port: Port) -> Callable[[int, int, Any], None] | None:
+    def listener(
+        self, planned: PlannedParticipant, codec: PortCodec
+    ) -> Callable[[int, int, Any], None] | None:
         """Return what receives a message or the events of a participant in this process.
 
         It is called with step, time (ns) at which the value is valid, and value. None: nothing receives it.
         """
-        is_recorded = self._recorder is not None
+        is_recorded, port = self._recorder is not None, codec.port
         is_measured = (planned.name, port.name) in self.measures.by_port
         if not is_recorded and not is_measured:
             return None
-        record = self._recording(self._output(planned, port).channel)
-        if port.variability == "signal" and not is_measured:
-            return record
+        channel = self._output(planned, port).channel
 
         def receive(step: int, time_ns: int, value: Any) -> None:
-            for message in value if port.variability == "event" else (value,):
+            for message in value if codec.is_event else (value,):
                 if is_measured and step > INITIAL:
                     self.measures.take(planned.name, port.name, message, time_ns)
                 if is_recorded:
-                    record(step, time_ns, message)
+                    self._unrecorded.append((channel, time_ns, codec.encode(message, time_ns)))
 
         return receive
-
-    def _recording(self, channel: int) -> Callable[[int, int, Message], None]:
-        """Return what records messages of a channel; one that stays the same object is encoded once."""
-        last: Message | None = None
-        payload = b""
-
-        def record(_: int, time_ns: int, message: Message) -> None:
-            nonlocal last, payload
-            if message is not last:
-                last, payload = message, encode(message)
-            self._unrecorded.append((channel, time_ns, payload))
-
-        return record
 
     def _output(self, planned: PlannedParticipant, port: Port) -> _Watched:
         return self._by_port[planned.name, port.name]

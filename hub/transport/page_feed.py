@@ -16,7 +16,6 @@ from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
 from hub.transport.publisher import Publisher
-from schemas.codec import encode
 
 __all__ = ["PageFeed"]
 
@@ -58,13 +57,15 @@ class PageFeed:
     def keep_first(self, time_ns: int, value: Any) -> None:
         """Keep the value at time 0 of a signal without a vector form, for pages that come later."""
         if self._codec.vector is None and not self._codec.is_event:
-            self._first = encode(value), Tag.pack(self._run, 0, INITIAL, time_ns)
+            self._first = self._codec.encode(value, time_ns), Tag.pack(self._run, 0, INITIAL, time_ns)
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`; of a signal only if it is due."""
         if self._codec.is_event:
             for message in value:
-                self._publisher.put(encode(message), Tag.pack(self._run, 0, step, time_ns))
+                self._publisher.put(
+                    self._codec.encode(message, time_ns), Tag.pack(self._run, 0, step, time_ns)
+                )
             return
         now_ns = monotonic_ns()
         if now_ns < self._due_ns and step != INITIAL:

@@ -13,9 +13,7 @@ from hub.transport.envelope import Tag
 from hub.transport.page_feed import PageFeed
 from hub.transport.port_codec import PortCodec
 from hub.transport.publisher import Publisher
-from schemas.codec import encode
 from schemas.keys import Keys
-from schemas.ports import Port
 
 __all__ = ["PortPublisher"]
 
@@ -30,7 +28,7 @@ class PortPublisher:
         session: The Zenoh session.
         keys: The keys of the session.
         planned: The participant.
-        port: Its output.
+        codec: Codec of its output.
         run: The number of the run.
         changed: Is called whenever `needed` may have changed.
         always: A reader needs every value from the first on.
@@ -44,7 +42,7 @@ class PortPublisher:
         session: zenoh.Session,
         keys: Keys,
         planned: PlannedParticipant,
-        port: Port,
+        codec: PortCodec,
         run: int,
         changed: Callable[[], None],
         *,
@@ -53,7 +51,7 @@ class PortPublisher:
         bundles: Sequence[tuple[Bundle, int]] = (),
         stride_ns: int = 0,
     ) -> None:
-        self.codec = PortCodec(port)
+        self.codec, port = codec, codec.port
         self._run = run
         self._changed = changed
         self.always = always
@@ -98,7 +96,9 @@ class PortPublisher:
         if not value and self.always:
             self._publishers[0].put(b"", Tag.pack(self._run, 0, step, time_ns, 0, 0))
         for index, message in enumerate(value):
-            self._send(encode(message), Tag.pack(self._run, 0, step, time_ns, index, len(value)))
+            self._send(
+                self.codec.encode(message, time_ns), Tag.pack(self._run, 0, step, time_ns, index, len(value))
+            )
 
     def _bundle(self, time_ns: int, value: Any) -> None:
         takers = [

@@ -9,6 +9,7 @@ import zenoh
 from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle, DeviceBundle, ObserverBundle
 from hub.transport.cells import RemoteCell
+from hub.transport.port_codec import PortCodec
 from hub.transport.port_publisher import PortPublisher
 from hub.transport.port_receiver import PortReceiver
 from hub.transport.refusals import Refusals
@@ -78,7 +79,7 @@ class Wire:
     def publisher(
         self,
         planned: PlannedParticipant,
-        port: Port,
+        codec: PortCodec,
         *,
         is_read: bool,
         feeds: bool,
@@ -94,10 +95,10 @@ class Wire:
             self.session,
             self.keys,
             planned,
-            port,
+            codec,
             self.run,
             self._count_change,
-            always=is_read or (planned.name, port.name) in self._watched,
+            always=is_read or (planned.name, codec.port.name) in self._watched,
             feeds=feeds,
             bundles=bundles,
             stride_ns=stride_ns,

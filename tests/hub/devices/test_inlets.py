@@ -112,6 +112,15 @@ def test_a_sample_enters_with_its_age():
     assert [s.age_ns for s in box.sample(0, 12)] == [7]
 
 
+def test_a_sample_enters_with_the_value_that_was_decoded_to_check_it():
+    box = inlets()
+    box.offer("stylus", "value", number(1.5), 5)
+    (entering,) = box.sample(0, 12)
+    assert entering.decoded is not None
+    _, value = entering.decoded
+    assert value.tolist() == [1.5]
+
+
 def test_a_flood_of_events_is_refused_until_the_next_communication_point(monkeypatch):
     monkeypatch.setattr(module, "_MOST_QUEUED", 3)
     box = inlets()

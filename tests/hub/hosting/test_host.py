@@ -9,8 +9,9 @@ import pytest
 from hub.hosting.host import Host
 from hub.participant import Params
 from hub.testing import run_in_process
+from hub.transport.port_codec import PortCodec
 from schemas.errors import ParticipantError, StateError
-from schemas.lockstep import Grant
+from schemas.lockstep import Entering, Grant
 from schemas.ros import Float64Message
 from tests.hub.parts import Part, into, out, plan_of
 
@@ -51,6 +52,26 @@ def run(host, steps, start=0):
         lambda planned, ack: reports.append((planned.name, ack)),
     )
     return reports
+
+
+def test_a_sample_that_this_process_has_decoded_is_not_decoded_again():
+    given = []
+
+    class Reads(Scripted):
+        def step(self, t, h, inputs):
+            given.append(None if inputs is None else inputs["in"])
+            return super().step(t, h, inputs)
+
+    host = host_of(Reads("reader", [{}, {}, {}], into("in", start=(0.0,))))
+    host.configure(Path())
+    codec, value = PortCodec(into("in", start=(0.0,))), np.array([2.0])
+    payload = np.frombuffer(codec.encode(np.array([1.0]), 0), np.uint8)
+    others = PortCodec(into("in", size=2)).layout
+    for step, decoded in enumerate(((codec.layout, value), (others, value))):
+        sample = Entering("reader", "in", False, payload, 0, decoded)
+        host.run(Grant(1, 0, step, step * MS, (step + 1) * MS, [sample]), lambda *_: None)
+    assert given[1] is value
+    assert given[2].tolist() == [1.0]
 
 
 GOOD = {"out": np.zeros(2)}
