@@ -16,6 +16,8 @@ from schemas.ros import BoolMessage, Header, StringMessage, Time
 
 __all__ = ["Messages"]
 
+_OTHER = "other"
+"""Stands for the name of an end effector other than a jaw."""
 _STREAMS = {
     command: row
     for row, command in enumerate(
@@ -23,13 +25,19 @@ _STREAMS = {
             *filter(crtk.is_stream, crtk.COMMANDS),
             *(
                 f"{gripper}/{command}"
-                for gripper in ("jaw", "hand")
+                for gripper in ("jaw", _OTHER)
                 for command in filter(crtk.is_stream, crtk.GRIPPER_COMMANDS)
             ),
         )
     )
 }
 """Commands that come as a stream, and the row of each in `Messages.state`."""
+
+
+def _row(command: str) -> int | None:
+    """Return the row of a command that comes as a stream."""
+    word = command.rpartition("/")[2]
+    return _STREAMS.get(command, _STREAMS.get(f"{_OTHER}/{word}"))
 
 
 class Messages:
@@ -92,7 +100,7 @@ class Messages:
         For a stream the same refusal is reported once in two seconds, with the number of commands.
         """
         count = 1
-        if (stream := _STREAMS.get(command)) is not None:
+        if (stream := _row(command)) is not None:
             count = refusals_to_report(self.state[stream], reason, self._now_ns)
         if count:
             text = f"{command} refused: {reason}" + (f" ({count} times)" if count > 1 else "")
@@ -100,7 +108,7 @@ class Messages:
 
     def executed(self, command: str) -> None:
         """Note that a command was executed, so that its next refusal is reported at once."""
-        if (stream := _STREAMS.get(command)) is not None:
+        if (stream := _row(command)) is not None:
             self.state[stream] = 0.0
 
     def _put(self, name: str, message: Message) -> None:

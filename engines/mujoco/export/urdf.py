@@ -86,7 +86,7 @@ def _leads(arms: Mapping[CartArm, MountedArm]) -> dict[str, _Lead]:
     for arm, params in arms.items():
         for motor in params.end_effector.motors:
             servo, lead = f"{arm}/{motor.name}", _Lead("", 1.0, f"{arm}/{motor.name}")
-            if motor.kind in ("disc", "gear"):
+            if motor.kind in ("disc", "gear") and motor.joint not in motor.moves:
                 lead = _Lead(f"{arm}/{motor.joint}", motor.ratio, servo)
             for link in motor.moves:
                 leads.setdefault(f"{arm}/{link}", lead)
