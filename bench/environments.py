@@ -18,8 +18,7 @@ from collections.abc import Sequence
 from time import process_time
 from typing import Any
 
-from learning.environments import ENVIRONMENTS  # isort: skip  (before numpy)
-from learning.environments.oracles import oracle  # isort: skip
+from trocar.environments import ENVIRONMENTS, oracle  # isort: skip  (before numpy)
 
 import gymnasium
 import mujoco

@@ -14,7 +14,7 @@ import argparse
 from itertools import pairwise
 from pathlib import Path
 
-import learning.environments  # isort: skip  # noqa: F401  (before numpy)
+import trocar.environments  # isort: skip  # noqa: F401  (before numpy)
 
 import gymnasium
 import numpy as np

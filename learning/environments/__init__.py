@@ -1,11 +1,12 @@
 """Environments to learn in, after Gymnasium: importing this module registers them as `trocar/...-v0`.
 
-    import learning.environments     # before numpy: then state hashes are those of the command line
+    import trocar.environments     # before numpy: then state hashes are those of the command line
     import gymnasium
 
     env = gymnasium.make("trocar/NeedlePick-v0", reward="sparse", record="recordings/needle")
 
-What an environment observes, does and rewards: docs/how-to/learn.md.
+What an environment observes, does and rewards: docs/how-to/learn.md. The public name is
+`trocar.environments`.
 """
 
 from __future__ import annotations

@@ -17,12 +17,13 @@ import trocar
 from learning.environments.exercises import Exercise
 from learning.environments.goals import Reward, bonus, reward
 from learning.environments.view import View
+from schemas.errors import MessageError, SessionError
 from schemas.ros import Header, Image, Point, Pose, PoseStamped, Quaternion
 from schemas.trocar_msgs import TaskEvent
 from schemas.vectors import Vector
 from tasks.task import Task
 
-__all__ = ["Environment"]
+__all__ = ["ActionError", "Environment"]
 
 Observation = dict[str, NDArray[Any]]
 
@@ -31,6 +32,10 @@ _FAR = 2.0
 _SETTLING_NS = 20_000_000
 """Until the first action is due where things are put: the period at which the scenes report them."""
 _EYES = ("left", "right")
+
+
+class ActionError(MessageError, InvalidAction):
+    """An action is not what the action space holds."""
 
 
 class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -96,6 +101,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.exercise = exercise(cast("Task", self._session.participant("task")))
         self._view = self._new_view()
         self._describe(len(self._view.vector()), (height, width, 3))
+        self._closed = False
         self._episode, self._seen = 0, set[str]()
         self._goal = np.zeros(exercise.goal_size)
 
@@ -138,6 +144,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         `options`: none are known. Things are put and seen before the first action is due, after 20 ms; where
         none are put, it is due at once.
         """
+        self._require_open()
         super().reset(seed=seed)
         if options:
             raise ValueError(f"options {sorted(options)}: there are none")
@@ -160,14 +167,10 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act for one step. What is out of range is clipped.
 
-        Raises InvalidAction for a wrong shape, or a number that is not finite.
+        Raises ActionError for anything but finite numbers of the right shape, SessionError after `close`.
         """
-        given = np.asarray(action, np.float64)
-        if given.shape != self.action_space.shape or not np.isfinite(given).all():
-            raise InvalidAction(
-                f"action {given.tolist()}: expected {self.action_space.shape} finite numbers, x, y, z, turn"
-                f" and jaw of {' and '.join(self.exercise.hands)}; they are clipped to -1 to 1"
-            )
+        self._require_open()
+        given = self._numbers(action)
         self._session.advance(self._count, {"actions.action": np.clip(given, -1.0, 1.0)})
         observation = self._observe()
         events = cast("tuple[TaskEvent, ...]", self._session["task.events"])
@@ -176,6 +179,25 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         worth = float(self.compute_reward(observation["achieved_goal"], observation["desired_goal"], info))
         terminated = self.exercise.lost(self._view) or (self._terminates and info["is_success"])
         return observation, worth, terminated, False, info
+
+    def _numbers(self, action: Any) -> Vector:
+        """Return an action as numbers, shape of the action space. Raises ActionError."""
+        try:
+            given = np.asarray(action)
+            if given.dtype.kind in "biuf" and given.shape == self.action_space.shape:
+                numbers = given.astype(np.float64)
+                if np.isfinite(numbers).all():
+                    return numbers
+        except (ValueError, TypeError):  # lists of several lengths, objects of other libraries
+            pass
+        raise ActionError(
+            f"action {action!r:.200}: expected {self.action_space.shape} finite numbers, x, y, z, turn"
+            f" and jaw of {' and '.join(self.exercise.hands)}; they are clipped to -1 to 1"
+        )
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise SessionError("the environment is closed: make a new one with gymnasium.make")
 
     def compute_reward(
         self,
@@ -219,10 +241,12 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the camera's left picture, shape (height, width, 3)."""
+        self._require_open()
         return self._pictures()["left"] if self.render_mode else None
 
     def close(self) -> None:
         """End the recording and release the engines."""
+        self._closed = True
         self._session.close()
 
 

@@ -40,7 +40,7 @@ def register() -> None:
     except ModuleNotFoundError as error:
         from schemas.errors import MissingExtraError
 
-        raise MissingExtraError("learning.environments", "gym", "gymnasium") from error
+        raise MissingExtraError("trocar.environments", "gym", "gymnasium") from error
     registry: Any = gymnasium
     for name, (exercise, steps) in ENVIRONMENTS.items():
         if name not in gymnasium.registry:

@@ -10,6 +10,7 @@ import typer
 
 from robots.dvrk.instruments import instrument as tool_of
 from schemas.errors import MissingExtraError, MotionError
+from schemas.user_files import require_place
 
 if TYPE_CHECKING:
     from robots.identification.arms import IdentifiedArm
@@ -101,6 +102,9 @@ def identify(
     from robots.identification.signals import filtered
 
     paths = recordings or []
+    for file in (output, plot):
+        if file is not None:
+            require_place(file)
     jaw = tool is not None and tool.jaw is not None and all(has_jaw(path, arm) for path in paths)
     moving = of_ecm() if tool is None else of_psm(tool, jaw=jaw)
     joints = [joint.name for joint in moving.joints]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from hub.recording.ros_bag_reader import RosBag
 from robots.dvrk.own_dynamics import JAW
 from robots.identification.signals import Measured
 from schemas.errors import RecordingError, did_you_mean
+from schemas.user_files import read_number_table
 from schemas.vectors import Vector
 
 __all__ = ["has_jaw", "measurements"]
@@ -36,22 +36,8 @@ def measurements(path: Path, arm: str, joints: Sequence[str], owner: str = "") -
     )
 
 
-def _table(path: Path) -> tuple[list[str], Vector]:
-    """Return names and numbers of a CSV file, the numbers by rows."""
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = csv.reader(file)
-            names = [name.strip() for name in next(rows, list[str]())]
-            table = np.array([[float(cell) for cell in row] for row in rows if row], np.float64)
-    except OSError as error:
-        raise RecordingError(f"cannot read '{path}': {error.strerror}") from error
-    except ValueError as error:
-        raise RecordingError(f"'{path}' is not a table of numbers below a line of names: {error}") from error
-    return names, table.reshape(-1, max(1, len(names)))
-
-
 def _of_csv(path: Path, joints: Sequence[str]) -> Measured:
-    names, table = _table(path)
+    names, table = read_number_table(path)
     wanted = ["time", *(f"{part}.{joint}" for part in ("position", "effort") for joint in joints)]
     for name in wanted:
         if name not in names:
@@ -63,7 +49,7 @@ def _of_csv(path: Path, joints: Sequence[str]) -> Measured:
 def has_jaw(path: Path, arm: str) -> bool:
     """Return whether `path` has states of the jaw of `arm`."""
     if path.suffix == ".csv":
-        return f"effort.{JAW}" in _table(path)[0]
+        return f"effort.{JAW}" in read_number_table(path)[0]
     with RosBag(path) as bag:
         return bool(_topics(bag, f"{arm}/{JAW}/{_TOPIC}"))
 

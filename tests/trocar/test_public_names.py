@@ -79,6 +79,7 @@ def test_the_public_names_are_these() -> None:
     assert dir(trocar) == PUBLIC
     assert {module.name for module in pkgutil.iter_modules(trocar.__path__)} == {
         "__main__",
+        "environments",
         "messages",
         "quantities",
         "records",

@@ -10,11 +10,15 @@ import typer
 
 from schemas.errors import MissingExtraError
 from schemas.quantity import to_si
+from schemas.user_files import require_place
 
 if TYPE_CHECKING:
     from engines.bullet.calibration.fit import Calibration
 
 __all__ = ["app"]
+
+_LARGE_RESIDUAL = 0.1
+"""Residual of the force above which a fit is warned of."""
 
 app = typer.Typer(help="Materials from your own measurements.", no_args_is_help=True)
 
@@ -87,6 +91,7 @@ def tissue(
         raise typer.BadParameter(f"'{shape}' is none of {', '.join(SHAPES)}", param_hint="--shape")
     if two_parameters and shape != "sphere":
         raise typer.BadParameter("a stiffening is known for a sphere only", param_hint="--two-parameters")
+    require_place(output)
     indenter = Indenter(shape, radius, thickness, poisson_ratio)
     found = fit(read(data), indenter, two_parameters=two_parameters)
     file = material_file(found, indenter, density, frequency, data.name)
@@ -114,3 +119,10 @@ def _print(found: Calibration) -> None:
     for name, label, value, unit in rows:
         typer.echo(f"{label:22}{value * unit:10.4g} +- {found.deviations[name] * unit:.2g}")
     typer.echo(f"residual of the force  {found.residual:9.2%}")
+    if found.residual > _LARGE_RESIDUAL:
+        typer.echo(
+            f"warning: {found.residual:.0%} of the force is unexplained, at most {_LARGE_RESIDUAL:.0%} are"
+            " expected: the fit does not describe this tissue. Check --shape, --radius, --thickness and the"
+            " zero of depth",
+            err=True,
+        )

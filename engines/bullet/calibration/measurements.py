@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from schemas.errors import RecordingError, did_you_mean
+from schemas.user_files import read_number_table
 from schemas.vectors import Vector
 
 __all__ = ["Measured", "read"]
@@ -40,23 +40,13 @@ def read(path: Path) -> Measured:
     Columns in any order: `time` (s), `depth` (m), `force` (N); for friction also `slide` (m) and
     `tangential_force` (N). Raises RecordingError for a missing column or an entry without a number.
     """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = csv.reader(file)
-            names = [name.strip() for name in next(rows, list[str]())]
-            cells = [[float(cell) for cell in row] for row in rows if row]
-    except OSError as error:
-        raise RecordingError(f"cannot read '{path}': {error.strerror}") from error
-    except ValueError as error:
-        raise RecordingError(f"'{path}' is not a table of numbers below a line of names: {error}") from error
+    names, table = read_number_table(path)
     for name in _NEEDED:
         if name not in names:
             raise RecordingError(f"'{path}' has no column '{name}'.{did_you_mean(name, names)}")
-    if len({len(names), *map(len, cells)}) > 1 or len(cells) < _FEWEST:
-        raise RecordingError(
-            f"'{path}' has {len(cells)} samples, at least {_FEWEST} of {len(names)} numbers are needed"
-        )
-    columns = dict(zip(names, np.array(cells, np.float64).T.copy(), strict=True))
+    if len(table) < _FEWEST:
+        raise RecordingError(f"'{path}' has {len(table)} samples, at least {_FEWEST} are needed")
+    columns = dict(zip(names, table.T.copy(), strict=True))
     if not all(np.isfinite(column).all() for column in columns.values()):
         raise RecordingError(f"'{path}' has numbers that are not finite: leave such samples out")
     if (np.diff(columns["time"]) <= 0.0).any():

@@ -13,10 +13,9 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv
 
 import trocar
-from learning.environments import ENVIRONMENTS
-from learning.environments.oracles import oracle
-from schemas.errors import RecordingError
+from schemas.errors import RecordingError, SessionError, TrocarError
 from schemas.ros import Header, Point, Pose, PoseStamped, Quaternion
+from trocar.environments import ENVIRONMENTS, oracle
 
 pytestmark = pytest.mark.xdist_group("environments")
 IDS = sorted(name for name in ENVIRONMENTS if "Retraction" not in name)
@@ -61,7 +60,7 @@ def test_the_seed_decides_the_episode(needle):
 
 def test_episodes_of_a_vector_are_those_of_one_process(needle):
     alone = [episode(needle, seed)[0] for seed in (3, 4)]
-    make = partial(gymnasium.make, "learning.environments:trocar/NeedlePick-v0")
+    make = partial(gymnasium.make, "trocar.environments:trocar/NeedlePick-v0")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         many = AsyncVectorEnv([make, make], context="spawn")
@@ -188,7 +187,48 @@ def test_what_is_unknown_is_refused():
 def test_without_gymnasium_the_sentence_says_what_mends_it():
     program = (
         "import sys; sys.modules['gymnasium'] = None\n"
-        "try:\n    import learning.environments\nexcept Exception as error:\n    print(error)"
+        "try:\n    import trocar.environments\nexcept Exception as error:\n    print(error)"
     )
     done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)
     assert "pip install 'trocar[gym]'" in done.stdout
+
+
+def test_a_fresh_process_needs_no_import_of_ours():
+    program = (
+        "import gymnasium; made = gymnasium.make('trocar.environments:trocar/Reach-v0'); made.reset(seed=1);"
+        "made.close(); print(made.spec.id)"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "trocar/Reach-v0\n"
+
+
+def test_a_gymnasium_that_loads_plug_ins_finds_all_ids():
+    program = (
+        "import gymnasium; from importlib.metadata import entry_points;"
+        "(plugin,) = entry_points(group='gymnasium.envs', name='__root__'); plugin.load()();"
+        "print(*sorted(name for name in gymnasium.registry if name.startswith('trocar/')))"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == sorted(ENVIRONMENTS)
+
+
+@pytest.mark.parametrize(
+    "action",
+    ["up", ["a", "b", "c", "d", "e"], [1j, 0, 0, 0, 0], [[0.0], [1.0, 2.0]], None, [float("nan")] * 5, [0.0]],
+    ids=str,
+)
+def test_an_action_that_is_none_is_refused_with_a_sentence(needle, action):
+    needle.reset(seed=3)
+    for kind in (TrocarError, InvalidAction):
+        with pytest.raises(kind, match=r"expected \(5,\) finite numbers"):
+            needle.unwrapped.step(action)
+
+
+def test_after_close_a_sentence():
+    env = gymnasium.make("trocar/Reach-v0").unwrapped
+    env.reset(seed=1)
+    env.close()
+    for call in (env.reset, env.render, lambda: env.step(np.zeros(5))):
+        with pytest.raises(SessionError, match="closed: make a new one"):
+            call()
+    env.close()

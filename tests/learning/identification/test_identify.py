@@ -40,6 +40,10 @@ def test_a_table_has_its_columns_in_any_order(tmp_path):
         ("time,position.yaw,position.pitch,effort.yaw\n0,1,2,3\n", "no column 'effort.pitch'"),
         ("time,position.yaw\n0,fast\n", "not a table of numbers"),
         ("", "no column 'time'"),
+        ("a,b\n1,2,3,4\n5,6,7,8\n", "line 2 has 4 numbers, the first line 2 names"),
+        ("a,b\n1,2\n3\n", "line 3 has 1 numbers"),
+        ("a,b\n" + "1" * 200_000 + ",2\n", "field larger than field limit"),
+        ("a,b\n\0,2\n", "not a table of numbers"),
     ],
 )
 def test_a_table_that_lacks_something_is_refused(tmp_path, text, reason):
@@ -148,3 +152,10 @@ def test_the_whole_circle(tmp_path, monkeypatch):
     MountedPsm.model_validate(
         {"instrument": "400006", "dynamics": "own.yaml"}, context={"directory": tmp_path}
     )
+
+
+def test_a_missing_output_directory_is_said_before_the_fit(tmp_path):
+    file = tmp_path / "own.csv"
+    file.write_text("time\n", "utf-8")
+    done = CliRunner().invoke(app, [str(file), "-o", str(tmp_path / "no" / "arm.yaml")])
+    assert "there is no directory" in str(done.exception)

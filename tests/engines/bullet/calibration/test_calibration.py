@@ -1,6 +1,7 @@
 """A material from what an indenter measured: the laws, the fit with noise, its deviations, the file."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -195,7 +196,10 @@ def test_a_table_reads_back(tmp_path):
         ("time,depth,force\n" + "0,0,x\n", "not a table of numbers"),
         ("time,depth,force\n" + "0,0,0\n" * 3, "3 samples, at least 20"),
         ("time,depth,force\n" + "\n".join(f"{i},0,nan" for i in range(30)), "not finite"),
-        ("time,depth,force\n0,1\n" + "\n".join(f"{i},0,1" for i in range(30)), "of 3 numbers"),
+        (
+            "time,depth,force\n0,1\n" + "\n".join(f"{i},0,1" for i in range(30)),
+            "line 2 has 2 numbers, the first line 3",
+        ),
     ],
 )
 def test_an_unusable_table_is_refused(text, message, tmp_path):
@@ -207,6 +211,21 @@ def test_an_unusable_table_is_refused(text, message, tmp_path):
 
 def run(*words):
     return CliRunner().invoke(app, ["tissue", *map(str, words)])
+
+
+def test_a_fit_that_explains_little_is_warned_of(tmp_path):
+    measured = pressed()
+    force = measured.force * (1.0 + 0.8 * np.sin(25.0 * measured.time))
+    data = write(tmp_path / "press.csv", replace(measured, force=force))
+    result = run(data, "--shape", "sphere", "--radius", "5 mm", "-o", tmp_path / "mine.yaml")
+    assert result.exit_code == 0, result.output
+    assert "of the force is unexplained, at most 10% are expected" in result.stderr
+
+
+def test_a_missing_output_directory_is_said_before_the_fit(tmp_path):
+    data = write(tmp_path / "press.csv", pressed())
+    result = run(data, "--shape", "sphere", "--radius", "5 mm", "-o", tmp_path / "no" / "mine.yaml")
+    assert "there is no directory" in str(result.exception)
 
 
 def test_a_scenario_names_what_the_command_wrote(tmp_path):
