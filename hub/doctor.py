@@ -1,4 +1,4 @@
-"""What works on this machine, and the line that mends what does not."""
+"""Working parts of this machine, and remedies for all others."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["Finding", "as_json", "examine"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was checked. `remedy` is the line that mends it if it does not work."""
+    """A checked part. `remedy`: the repairing line for a broken part."""
 
     area: str
     name: str
@@ -31,7 +31,7 @@ class Finding:
     detail: str
     remedy: str = ""
     needed: bool = False
-    """Nothing runs without it."""
+    """Whether nothing runs without the part."""
 
 
 _ROS = (
@@ -75,7 +75,7 @@ def _python() -> Iterator[Finding]:
 
 
 def _import_names() -> Iterator[Finding]:
-    """Check that no other distribution brings modules of our names: one hides or overwrites the other."""
+    """Check for foreign distributions with modules of our names, hiding or overwriting ours."""
     found = collisions()
     if not found:
         yield Finding("base", "import names", True, f"{', '.join(NAMES)} are Trocar's alone", needed=True)
@@ -95,7 +95,7 @@ def _import_names() -> Iterator[Finding]:
 
 
 def _zenoh() -> Iterator[Finding]:
-    """Open a router on loopback and join it, as a session does."""
+    """Open and join a router on loopback, as a session does."""
     try:
         port = LoopbackPort("tcp/127.0.0.1:0")
         with (
@@ -123,7 +123,7 @@ def _zenoh() -> Iterator[Finding]:
 
 
 def _certificates() -> Iterator[Finding]:
-    """Check the certificates of this user, by which a hub and other machines identify each other."""
+    """Check the certificates of this user for remote machines."""
     directory = credentials.default_directory()
     files = [file for file in sorted(directory.glob("*.pem")) if file.name != "ca.pem"]
     if not files:
@@ -183,7 +183,7 @@ def _kinds() -> Iterator[Finding]:
 
 
 def _checks() -> Iterator[Finding]:
-    """Try what packages bring by the entry-point group `trocar.checks`."""
+    """Run the checks of packages in the entry-point group `trocar.checks`."""
     for entry in sorted(entry_points(group="trocar.checks"), key=lambda e: e.name):
         try:
             yield Finding("machine", entry.name, *entry.load()())

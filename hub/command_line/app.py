@@ -1,4 +1,4 @@
-"""The application: all commands, and the version, logs, errors and exit codes that they share."""
+"""The application: all commands, and the common version, logs, errors and exit codes."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def options(
 
 
 def main() -> None:
-    """Run the command line: a TrocarError becomes one message and an exit code."""
+    """Run the command line: a TrocarError becomes a message and an exit code."""
     try:
         app()
     except TrocarError as error:

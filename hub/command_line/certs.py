@@ -1,4 +1,4 @@
-"""`trocar certs`: the certificates of a hub and of participants on other machines."""
+"""`trocar certs`: the certificates of a hub and of participants on remote machines."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ app = typer.Typer(
 )
 
 _HUB_DAYS = 397
-"""A year, and a month to renew: the most that browsers accept for a server.
+"""A year, and a month to renew: the longest time accepted by browsers for a server.
 
 Source: CA/Browser Forum, Baseline Requirements 6.3.2.
 """
 
 _PARTICIPANT_DAYS = 30
-"""Short, as a certificate that is lost or stolen may stay unnoticed."""
+"""A short time: the loss of a certificate may stay unnoticed."""
 
 _LEAST_DAYS, _MOST_DAYS = 0.01, 3650
-"""A quarter of an hour, to try it out; ten years, as the authority's own certificate."""
+"""A quarter of an hour, for a trial; ten years, as the authority's own certificate."""
 
 Directory = Annotated[
     Path | None,
@@ -66,9 +66,9 @@ def init(
     Do this once, on the machine where the hub runs.
     """
     _require_cryptography()
-    from hub.security.certs import found, names_of_this_machine
+    from hub.security.certs import create_authority, names_of_this_machine
 
-    file = found(_directory(directory), hosts or names_of_this_machine(), days)
+    file = create_authority(_directory(directory), hosts or names_of_this_machine(), days)
     console.print(
         f"wrote {file}, for the hub, and beside it the authority ca.pem with its key ca.key: keep that key"
         " secret",
@@ -114,9 +114,9 @@ def issue(
         float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long the certificate is valid.")
     ] = _PARTICIPANT_DAYS,
 ) -> None:
-    """Create the certificate of one participant on another machine.
+    """Create the certificate of a participant on another machine.
 
-    An older certificate of the participant stays valid until it expires, or is revoked.
+    An older certificate of the participant stays valid until expiry or revocation.
     """
     _require_cryptography()
     from hub.security.certs import issue as make
@@ -148,9 +148,9 @@ def revoke(
     *,
     directory: Directory = None,
 ) -> None:
-    """Let a hub reject all certificates that NAME has, for instance because a file was lost.
+    """Let a hub reject all certificates of NAME, for instance after the loss of a file.
 
-    Hubs that run with this directory apply it within a second or two, and end the connections of NAME.
+    Running hubs with this directory end the connections of NAME within a second or two.
     """
     _require_cryptography()
     from hub.security.certs import revoke as ban

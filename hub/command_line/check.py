@@ -1,4 +1,4 @@
-"""`trocar check` and `trocar schema`: what a scenario means, and what it may contain."""
+"""`trocar check` and `trocar schema`: the plan of a scenario, and the schema of scenarios."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def check(
 ) -> None:
     """Check a scenario without starting anything, and show its participants.
 
-    A class that it names as a kind is imported, which one line says before: only the class has the ports.
+    A class named as a kind is imported, after a line about the import: only the class knows the ports.
     """
     file = load(scenario, overrides or ())
     with with_places(file.source):
@@ -43,7 +43,7 @@ def check(
 
 
 def _print_plan(plan: Plan, *, with_ports: bool) -> None:
-    """Print every participant with its ports and the sources of its inputs, or with their numbers."""
+    """Print every participant with ports and sources of inputs, or with their numbers."""
     sources: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for connection in (*plan.connections, *plan.from_devices, *plan.to_devices):
         source = f"{connection.source}.{connection.source_port}"
@@ -70,7 +70,7 @@ def _print_plan(plan: Plan, *, with_ports: bool) -> None:
 
 
 def _counts(planned: PlannedParticipant, sources: Mapping[tuple[str, str], list[str]]) -> str:
-    """Return how many ports there are, and the participants from which inputs come."""
+    """Return the number of ports, and the participants feeding the inputs."""
     inputs = [port.name for port in planned.ports if port.causality == "input"]
     connected = [port for port in inputs if (planned.name, port) in sources]
     origins = {one.partition(".")[0] for port in connected for one in sources[planned.name, port]}
@@ -80,7 +80,7 @@ def _counts(planned: PlannedParticipant, sources: Mapping[tuple[str, str], list[
 
 
 def _time(planned: PlannedParticipant) -> str:
-    """Return whether a participant that only looks has a time of its own; empty for any other one."""
+    """Return whether an observer has a time of its own; empty for other participants."""
     if planned.observer:
         return ", an observer: it looks in its own time, and the session does not wait for it"
     return f", in lock-step: {planned.lock_step}" if planned.lock_step else ""

@@ -1,4 +1,4 @@
-"""The command line in a process that ends with its parent, however that one ends.
+"""The command line in a process ending with its parent, however the parent ends.
 
 `python -P -m hub.command_line.child PID COMMAND...`; except on Linux, standard input must be a pipe.
 """

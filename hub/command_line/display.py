@@ -23,7 +23,7 @@ from schemas.scenario import Scenario
 __all__ = ["LATENCY_COLUMNS", "RunProgress", "console", "latency_rows", "show", "table"]
 
 _LONGEST = 10_000
-"""Characters of one cell."""
+"""Most characters of a cell."""
 
 _UNITS = {"s": "s", "n": "N", "j": "J", "m": "m"}
 
@@ -73,7 +73,7 @@ _OBSERVER_COLUMNS = ("observer", "states", "dropped", "per second", "attainable"
 
 
 def _observer_rows(observers: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[object, ...]]:
-    """Yield a row for each participant that looked on in its own time."""
+    """Yield a row for each observer with a time of its own."""
     for name, row in observers.items():
         seen, dropped = row["states"], row["dropped"]
         share = f"{dropped} ({dropped / max(seen + dropped, 1):.1%})"
@@ -83,7 +83,7 @@ def _observer_rows(observers: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple
 LATENCY_COLUMNS = ("latency", "stream", "count", "p50", "p99", "largest")
 _TIMES = ("p50_s", "p99_s", "largest_s")
 _MOST_STREAMS = 8
-"""Streams of one device that are shown one by one: a gateway to ROS has dozens. `--json` has them all."""
+"""Most streams of a device shown singly: a gateway to ROS has dozens. `--json` has all streams."""
 
 
 def latency_rows(latency: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Iterator[tuple[object, ...]]:

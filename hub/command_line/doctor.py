@@ -1,4 +1,4 @@
-"""`trocar doctor`: what works on this machine."""
+"""`trocar doctor`: working and missing parts of this machine."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["doctor"]
 
 
 def doctor(*, as_json: Json = False) -> None:
-    """Show what works on this machine, and how to repair what does not."""
+    """Show the working parts of this machine, and remedies for all others."""
     findings = examination.examine()
     if as_json:
         typer.echo(examination.as_json(findings))

@@ -48,8 +48,8 @@ def fork(
 ) -> None:
     """Go on from an instant of a recording, live: with other devices, parameters, or a person.
 
-    Up to the instant all is simulated again, and has the recorded state hashes. The fork's own recording
-    verifies like any other. The parent may be one that was cut short, or that is still being written.
+    Up to the instant all is simulated again, with the recorded state hashes. The fork's own recording
+    verifies like any recording. The parent may be cut short, or still in writing.
     """
     from hub.fork import Fork
 
@@ -80,7 +80,7 @@ def forks(
     *,
     as_json: Json = False,
 ) -> None:
-    """Show recordings as a tree: below each one its forks, with instant and changes."""
+    """Show recordings as a tree: below each recording its forks, with instant and changes."""
     members = list(family(places or [Path()]))
     if as_json:
         rows: list[dict[str, Any]] = [

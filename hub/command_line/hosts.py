@@ -1,4 +1,4 @@
-"""`trocar engine` and `trocar device`: host one participant of a session whose hub runs elsewhere."""
+"""`trocar engine` and `trocar device`: host a participant of a session with a remote hub."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def engine(
     directory: Directory = None,
     certs: Certificates = None,
 ) -> None:
-    """Host one engine or controller here, for a session whose hub runs elsewhere."""
+    """Host an engine or controller here, for a session with a remote hub."""
     from hub.hosting.joining import run_host
 
     run_host(connect, session, f"remote/{name}", directory=directory, certificates=certs)
@@ -48,9 +48,9 @@ def device(
     directory: Directory = None,
     certs: Certificates = None,
 ) -> None:
-    """Host one device here, for sessions whose hub runs elsewhere.
+    """Host a device here, for sessions with a remote hub.
 
-    It joins again when the hub returns, until it is stopped.
+    The device joins again whenever the hub returns, until stopped.
     """
     from hub.hosting.joining import run_device
 

@@ -42,9 +42,9 @@ def link(
     connect: HubEndpoints = None,
     as_json: Json = False,
 ) -> None:
-    """Change the network link of a device while its session runs: delay, jitter, loss, outage.
+    """Change the network link of a device in a running session: delay, jitter, loss, outage.
 
-    Options that are not given keep their values.
+    Missing options keep their values.
     """
     from hub.devices.network_link_control import NetworkLinkReply, NetworkLinkRequest
     from hub.remote.live_sessions import ask_about

@@ -1,4 +1,4 @@
-"""`trocar ls`: the sessions that are running."""
+"""`trocar ls`: the running sessions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PROFILE_COLUMNS = ("session", "core-seconds per simulated second", "most of it"
 
 
 def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Json = False) -> None:
-    """List the running sessions: where, participants, devices, latencies, and what takes processor time."""
+    """List the running sessions: endpoints, participants, devices, latencies, and users of processor time."""
     found = _found(connect, certs)
     if as_json:
         typer.echo(json.dumps([_session_row(session) for session in found], indent=2))
@@ -61,15 +61,15 @@ def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Jso
 
 
 class _Found(NamedTuple):
-    """A session that answered."""
+    """A session with an answer."""
 
     status: SessionStatus
     endpoints: tuple[str, ...]
-    """Where its hub listens, as far as is known here."""
+    """Known endpoints of the hub."""
     pid: int | None
-    """The hub's process, if it is one of this user on this machine."""
+    """The hub's process, if run by this user on this machine."""
     profile: dict[str, Any] | None
-    """Where the time goes, if that is measured (`hub/recording/profiles.py`)."""
+    """Profile of a profiled session (`hub/recording/profiles.py`)."""
 
 
 def _found(connect: Sequence[str] | None, certificates: Path | None) -> list[_Found]:
@@ -111,14 +111,14 @@ def _session_row(session: _Found) -> dict[str, Any]:
 
 
 def _profile_rows(session: _Found) -> Iterator[tuple[str, ...]]:
-    """Yield the row of a session that keeps a profile: what it takes, and who takes the most of it."""
+    """Yield the row of a profiled session: processor time, and its largest users."""
     if session.profile is not None and session.profile["by_taker"]:
         taker, core_s = next(iter(session.profile["by_taker"].items()))
         yield session.status.session, f"{session.profile['core_s_per_sim_s']:.2f}", f"{taker} ({core_s:.2f})"
 
 
 def _device_rows(status: SessionStatus) -> Iterator[tuple[str, ...]]:
-    """Yield the rows of the devices: the offset of their clock to the hub's, and its uncertainty."""
+    """Yield the rows of the devices: clock offset to the hub, and uncertainty of the offset."""
     for device in status.devices:
         measured = device.round_trip_ns >= 0
         offset = f"{device.offset_ns / 1e6:+.3f} ms" if measured else "same clock"

@@ -1,4 +1,4 @@
-"""The page of a session that this process runs: `trocar view` in a process of its own."""
+"""The page of a session of this process: `trocar view` in a process of its own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share."""
+"""Common arguments and options of commands."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on 
 
 @contextmanager
 def with_places(source: Source) -> Generator[None]:
-    """Put file, line and column in front of scenario errors that name a value."""
+    """Put file, line and column in front of scenario errors about a value."""
     try:
         yield
     except ScenarioError as error:

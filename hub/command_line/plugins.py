@@ -1,6 +1,6 @@
 """Commands of other packages: each is a `typer.Typer` at an entry point of the group `trocar.commands`.
 
-It is added under the name of its entry point: as a command if it has a single one, otherwise as a group.
+A Typer with a single command is added as a command, otherwise as a group, under the name of the entry point.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ log = logging.getLogger(__name__)
 GROUP = "trocar.commands"
 """Entry-point group.
 
-Its modules are imported at every start of `trocar`, so they should import what they need inside commands.
+Modules of the group are imported at every start of `trocar`, so further imports belong inside commands.
 """
 
 
 def mount(app: typer.Typer) -> None:
-    """Add every installed command to `app`, except broken ones, about which a warning is logged."""
+    """Add every installed command to `app`; log a warning about a broken command."""
     taken = {
         (info.name or getattr(info.callback, "__name__", "")).replace("_", "-")
         for info in app.registered_commands

@@ -30,7 +30,7 @@ def verify(
 ) -> None:
     """Simulate a recorded session again and compare every state hash.
 
-    If one differs, the exit code is 1 and the result names the first step and participant that differ.
+    After a difference the exit code is 1 and the result names the first differing step and participant.
     """
     from hub.verify import verify as resimulate
 
@@ -62,14 +62,14 @@ def replay(
 
 
 def recover(recording: RecordingPath, *, output: Output = None, as_json: Json = False) -> None:
-    """Save the readable part of a recording that was cut short."""
+    """Save the readable part of a recording without an end."""
     from hub.recording.recover import recover as save
 
     show(asdict(save(recording, output)), as_json=as_json)
 
 
 def report(recording: RecordingPath, *, output: Output = None) -> None:
-    """Write one self-contained HTML page with plots of a recording."""
+    """Write a self-contained HTML page with plots of a recording."""
     from hub.recording.report import report as write
 
     name = recording.stem if recording.is_file() else recording.name

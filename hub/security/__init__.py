@@ -1,1 +1,1 @@
-"""Certificates, access rules, and the gate through which other machines join a session."""
+"""Certificates, access rules, and the gate of a session for other machines."""

@@ -1,8 +1,8 @@
-"""The access rules for other machines, generated from the plan: what they do not allow is denied.
+"""The access rules for other machines, generated from the plan, with denial by default.
 
-A rule of Zenoh allows kinds of messages on keys in a direction: into the gate (ingress) or out of it
-(egress). It applies to a name in a certificate. The hub's machine, which the gate reaches over loopback or
-by a socket of the file system, may do everything, as without a gate.
+A rule of Zenoh allows kinds of messages on keys in a direction: into the gate (ingress) or out of the gate
+(egress), for a name in a certificate. The hub's machine, connected over loopback or by a socket of the file
+system, may do everything, as without a gate.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _DEVICE_BYTES = 2**20
 """The largest message of a device: a colour image of 640 x 480 pixels fits."""
 
 _MOST_BYTES = 2**25
-"""The largest message of any client: Zenoh collects its fragments in memory before it applies the rules."""
+"""Largest message of any client: Zenoh collects fragments in memory before applying the rules."""
 
 Rule = dict[str, Any]
 
@@ -40,9 +40,9 @@ Rule = dict[str, Any]
 def access_settings(
     plan: Plan, session: str, foreign: Mapping[str, Sequence[str]] | None = None
 ) -> dict[str, Any]:
-    """Return Zenoh's settings that allow each remote participant of `plan` its part in `session` only.
+    """Return Zenoh's settings for the rights of each remote participant of `plan` in `session`.
 
-    `foreign`: by device, the keys that it shares with programs, which connect with the certificate `console`.
+    `foreign`: keys shared with programs (connected with the certificate `console`), by device.
     """
     keys = Keys(session)
     rights = {
@@ -95,7 +95,7 @@ def access_settings(
 
 
 def _part(plan: Plan, keys: Keys, planned: PlannedParticipant) -> list[Rule]:
-    """Return the rights of one remote participant."""
+    """Return the rights of a remote participant."""
     name, role, hub = planned.name, planned.key_role, keys.alive("hub", "hub")
     inputs = [
         keys.output("engine", connection.source, connection.source_port)
@@ -118,7 +118,7 @@ def _part(plan: Plan, keys: Keys, planned: PlannedParticipant) -> list[Rule]:
 
 
 def _to_device(plan: Plan, keys: Keys, connection: ConnectionToDevice) -> str:
-    """Return the key on which a device or an observer receives the values of a connection."""
+    """Return the key of a connection's values to a device or an observer."""
     if plan.participants[connection.source].port(connection.source_port).variability == "event":
         return keys.feed(connection.source, connection.source_port)
     return keys.signals(connection.source, connection.target)
@@ -133,6 +133,6 @@ def _subscribe(*keys: str) -> list[Rule]:
 
 
 def allow(flow: str, messages: Sequence[str], *keys: str) -> Rule:
-    """Return a rule that allows `messages` on `keys`, in the direction `flow` or in both."""
+    """Return a rule to allow `messages` on `keys`, in the direction `flow` or in both."""
     flows = ["ingress", "egress"] if flow == "both" else [flow]
     return {"permission": "allow", "flows": flows, "messages": list(messages), "key_exprs": list(keys)}

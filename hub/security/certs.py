@@ -1,6 +1,6 @@
-"""The authority of a hub, which issues the certificates of the hub and of participants.
+"""The authority of a hub, issuer of the certificates of the hub and of participants.
 
-Keys are of the elliptic curve P-256, which every TLS library supports. Needs the extra `certs`. The design:
+Keys are of the elliptic curve P-256, supported by every TLS library. Needs the extra `certs`. The design:
 docs/decisions/0027-remote-hosts.md.
 """
 
@@ -31,18 +31,18 @@ from hub.security.credentials import CONSOLE, HUB, OBSERVER, examine, load
 from schemas.errors import ConnectError, ScenarioError
 from schemas.keys import valid_name
 
-__all__ = ["found", "issue", "names_of_this_machine", "renew", "revoke"]
+__all__ = ["create_authority", "issue", "names_of_this_machine", "renew", "revoke"]
 
 _AUTHORITY_DAYS = 3650
 _SKEW = timedelta(hours=1)
-"""Certificates are valid from this time before now: the clock of the other machine may be behind."""
+"""Age of new certificates: the clock of a remote machine may be behind."""
 
 
-def found(directory: Path, hosts: Sequence[str], days: float) -> Path:
-    """Create an authority in `directory`, and the hub's certificate for `hosts`; return the latter's file.
+def create_authority(directory: Path, hosts: Sequence[str], days: float) -> Path:
+    """Create an authority in `directory` and the hub's certificate for `hosts`; return its file.
 
-    `hosts`: names and addresses at which the hub is reached. Raises ScenarioError if there is an authority
-    already, as the certificates that it has issued would become useless.
+    `hosts`: names and addresses of the hub. Raises ScenarioError if there is an authority already: all
+    certificates issued so far would become useless.
     """
     key_file, certificate_file = directory / "ca.key", directory / "ca.pem"
     if key_file.exists() or certificate_file.exists():
@@ -73,9 +73,9 @@ def found(directory: Path, hosts: Sequence[str], days: float) -> Path:
 
 
 def renew(directory: Path, hosts: Sequence[str], days: float) -> Path:
-    """Replace the hub's certificate, for `hosts` or (if empty) those of the present one; return its file.
+    """Replace the hub's certificate, for `hosts` or (if empty) the present hosts; return the file.
 
-    Raises ConnectError if `hosts` is empty and there is no present one, or it is invalid.
+    Raises ConnectError if `hosts` is empty and the present certificate is missing or invalid.
     """
     if not hosts:
         try:
@@ -89,19 +89,19 @@ def renew(directory: Path, hosts: Sequence[str], days: float) -> Path:
 
 
 def issue(directory: Path, name: str, days: float) -> Path:
-    """Create a certificate for the participant `name`, `observer` or `console`, and return its file.
+    """Create a certificate for the participant `name`, `observer` or `console`, and return the file.
 
-    The file is all that the other machine needs; it replaces an older one. Raises ScenarioError if the name
-    is invalid, ConnectError if `directory` has no authority.
+    The remote machine needs nothing but this file; an older file is replaced. Raises ScenarioError for an
+    invalid name, ConnectError if `directory` has no authority.
     """
     _check_holder(name)
     return _issue(directory, name, days)
 
 
 def revoke(directory: Path, name: str) -> str:
-    """Revoke every certificate that `name` has, and return their common name; hubs read the list as they run.
+    """Revoke every certificate of `name`, and return their common name; running hubs read the list.
 
-    Raises ScenarioError if the name is invalid, ConnectError if `directory` has no authority.
+    Raises ScenarioError for an invalid name, ConnectError if `directory` has no authority.
     """
     if name == HUB:
         raise ScenarioError(
@@ -114,7 +114,7 @@ def revoke(directory: Path, name: str) -> str:
 
 
 def names_of_this_machine() -> list[str]:
-    """Return the names and addresses at which other machines may reach this one."""
+    """Return the names and addresses of this machine for remote machines."""
     names = {socket.gethostname(), socket.getfqdn(), "localhost"}
     with suppress(OSError):
         names |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None)}
@@ -192,6 +192,6 @@ def _key_pem(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _write(file: Path, content: bytes) -> None:
-    """Write a new file that only its owner may read."""
+    """Write a new file, readable by the owner only."""
     with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as out:
         out.write(content)

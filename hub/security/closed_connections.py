@@ -1,4 +1,4 @@
-"""The remote addresses of TCP connections that have closed, as Linux reports them.
+"""The remote addresses of closed TCP connections, as reported by Linux.
 
 See sock_diag(7) and linux/inet_diag.h.
 """
@@ -20,15 +20,15 @@ _TCP_DESTROY = 1 << 0
 _FAMILY, _PORTS, _SOURCE_BYTES, _TARGET_BYTES = 16, struct.Struct(">HH"), 24, 40
 """Offsets behind the header of 16 bytes.
 
-struct inet_diag_msg begins with the family, its sockid with both ports and both addresses.
+struct inet_diag_msg begins with the family, sockid with both ports and both addresses.
 """
 
 
 def closed_connections(ports: Collection[int], look_s: float) -> Iterator[str | None]:
-    """Yield the remote address and port of each connection to one of this machine's `ports` that has closed.
+    """Yield the remote address and port of each closed connection to `ports` of this machine.
 
-    Yields None whenever none has for `look_s` seconds. Raises OSError where the system does not report it: on
-    other systems than Linux, or without its module inet_diag.
+    Yields None after `look_s` seconds without a closed connection. Raises OSError on systems without such
+    reports: not Linux, or without the module inet_diag.
     """
     with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, _SOCK_DIAG) as reports:
         reports.bind((0, _TCP_DESTROY))

@@ -1,4 +1,4 @@
-"""The identity of this machine: one PEM file with a key, its certificate, and the authority of both sides."""
+"""The identity of this machine: a PEM file with key, certificate, and the authority of both sides."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from schemas.errors import ConnectError
 __all__ = ["CONSOLE", "HUB", "OBSERVER", "Certificate", "Credentials", "default_directory", "examine", "load"]
 
 HUB = "hub"
-"""Name of the certificate with which a hub listens."""
+"""Name of a hub's certificate."""
 
 CONSOLE = "console"
-"""Name of the certificate of programs that share keys with devices of a session, such as gateways to ROS.
+"""Name of the certificate of programs sharing keys with devices of a session, such as gateways to ROS.
 
-It gives access to those keys and nothing else.
+The certificate gives access to the shared keys and nothing else.
 """
 
 OBSERVER = "observer"
-"""Name of the certificate that gives access to the status of a session, and nothing else."""
+"""Name of the certificate with access to the status of a session, and nothing else."""
 
 _KEY = re.compile("-----BEGIN PRIVATE KEY-----.*?-----END PRIVATE KEY-----\n", re.DOTALL)
 _CERTIFICATE = re.compile("-----BEGIN CERTIFICATE-----.*?-----END CERTIFICATE-----\n", re.DOTALL)
@@ -36,7 +36,7 @@ _CERTIFICATE = re.compile("-----BEGIN CERTIFICATE-----.*?-----END CERTIFICATE---
 
 @dataclass(frozen=True)
 class Credentials:
-    """The contents of one PEM file: key, certificate, authority, in this order."""
+    """The contents of a PEM file: key, certificate, authority, in this order."""
 
     file: Path
     key: str
@@ -49,7 +49,7 @@ class Credentials:
         return self.file.stem
 
     def listening(self) -> dict[str, Any]:
-        """Return Zenoh's settings for a hub, which demands a certificate, and disconnects when it expires."""
+        """Return Zenoh's settings for a hub: certificates are required, and expiry disconnects."""
         return self._settings("listen") | {"transport/link/tls/close_link_on_expiration": True}
 
     def connecting(self) -> dict[str, Any]:
@@ -79,7 +79,7 @@ class Certificate:
     common_name: str
     until: datetime
     hosts: tuple[str, ...]
-    """The names and addresses at which a hub may be reached."""
+    """Names and addresses of a hub."""
 
     @property
     def name(self) -> str:
@@ -96,9 +96,9 @@ def default_directory() -> Path:
 
 
 def load(name: str, where: Path | None = None) -> Credentials:
-    """Return the credentials in the file `where`, or those called `name` in the directory `where`.
+    """Return the credentials in the file `where`, or the credentials `name` in the directory `where`.
 
-    `where` is by default this user's directory. Raises ConnectError if the file is missing or is another one.
+    `where` is by default this user's directory. Raises ConnectError for a missing or different file.
     """
     place = default_directory() if where is None else where
     file = place if place.is_file() else place / f"{name}.pem"
@@ -125,9 +125,9 @@ def load(name: str, where: Path | None = None) -> Credentials:
 
 
 def examine(credentials: Credentials) -> Certificate:
-    """Return the contents of a certificate, verified against its authority as in a connection.
+    """Return the contents of a certificate, verified against the authority as in a connection.
 
-    Raises ConnectError if it has expired, is of another authority, or does not belong to its key.
+    Raises ConnectError for an expired certificate, another authority, or another key.
     """
     try:
         verified = _verified(credentials)
@@ -150,9 +150,9 @@ def examine(credentials: Credentials) -> Certificate:
 
 
 def _verified(credentials: Credentials) -> dict[str, Any]:
-    """Return the certificate as the other side of a connection sees it, from a handshake in memory.
+    """Return the certificate as seen by a peer, from a handshake in memory.
 
-    Raises SSLError if the other side rejects it.
+    Raises SSLError if the peer rejects the certificate.
     """
     contexts = {side: ssl.SSLContext(side) for side in (ssl.PROTOCOL_TLS_SERVER, ssl.PROTOCOL_TLS_CLIENT)}
     for context in contexts.values():

@@ -1,8 +1,8 @@
-"""The gate of a hub: the only process that listens to other machines.
+"""The gate of a hub: the only process listening to other machines.
 
-It presents the hub's certificate, demands theirs and applies the access rules. It forwards what they allow to
-the hub's router over loopback, and reports what they deny to the hub, which logs it. The design:
-docs/decisions/0027-remote-hosts.md.
+The gate presents the hub's certificate, demands the client's certificate and applies the access rules.
+Allowed messages are forwarded to the hub's router over loopback; denials are reported to the hub for the log.
+The design: docs/decisions/0027-remote-hosts.md.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ __all__ = ["OPEN", "Gate"]
 log = logging.getLogger(__name__)
 
 OPEN = "open"
-"""The first line of the process once it listens."""
+"""First line of the listening process."""
 
 _STOP_S = 3.0
 _RETRY_S = 1.0
 
 
 class Gate:
-    """The gate, from the side of its hub."""
+    """The gate, from the side of the hub."""
 
     def __init__(
         self, endpoints: Sequence[str], security: Mapping[str, Any], revoked: Path | None = None
@@ -41,7 +41,7 @@ class Gate:
         Args:
             endpoints: Where to listen, such as tls/0.0.0.0:7447.
             security: Zenoh's settings of TLS and of access.
-            revoked: The list of revoked certificates; when it changes, the process starts again with it.
+            revoked: The list of revoked certificates; after a change, the process starts again.
         """
         self.endpoints = list(endpoints)
         self._security = dict(security)
@@ -51,7 +51,7 @@ class Gate:
         self._reader: threading.Thread | None = None
 
     def open(self, hub: str) -> None:
-        """Start the process for the hub at the endpoint `hub`; raises ConnectError if it cannot listen."""
+        """Start the process for the hub at the endpoint `hub`; raises ConnectError if listening fails."""
         self._hub = hub
         self._process = self._start()
         self._reader = threading.Thread(target=self._read, name="gate", daemon=True)
@@ -81,7 +81,7 @@ class Gate:
         return process
 
     def _read(self) -> None:
-        """Log the reports of the process, and restart it if it ends; its clients then reconnect."""
+        """Log the reports of the process, and restart an ended process; clients then reconnect."""
         while True:
             answers = _pipes(self._process)[1]
             for line in answers:
@@ -110,7 +110,7 @@ class Gate:
             return True
 
     def close(self) -> None:
-        """Stop the process, if it was started."""
+        """Stop a started process."""
         if self._reader is None:
             return
         with self._starting:
@@ -121,7 +121,7 @@ class Gate:
 
 
 def _stop(process: subprocess.Popen[str]) -> int:
-    """Stop a process by closing its input, or by force; return its exit code."""
+    """Stop a process by closing its input, or by force; return the exit code."""
     with suppress(BrokenPipeError):
         _pipes(process)[0].close()
     try:

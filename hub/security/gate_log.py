@@ -1,4 +1,4 @@
-"""Reads from Zenoh's log who connects to the gate and what is denied to them.
+"""Reads the clients of the gate and their denials from Zenoh's log.
 
 Written for the log lines of Zenoh 1.10: a denial by an access rule appears at level trace only, and the line
 of a failed handshake does not name the client.
@@ -14,16 +14,16 @@ from dataclasses import dataclass
 __all__ = ["LOG_FILTER", "GateLog"]
 
 LOG_FILTER = "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor::access_control=trace"
-"""The part of Zenoh's log that is needed, in the syntax of `RUST_LOG`."""
+"""The needed part of Zenoh's log, in the syntax of `RUST_LOG`."""
 
 Report = tuple[int, str]
 """Level of `logging`, and message."""
 
 _MOST_REPORTS = 20
-"""Denials that are reported of one connection, so that a client cannot flood the hub's log."""
+"""Most reported denials per connection: a client must not flood the hub's log."""
 
 _CONTROL = re.compile(r"\x1b\[[0-9;]*m|[\x00-\x1f\x7f-\x9f]")
-"""Colours, and all other control characters: a key is the client's text, and might command a terminal."""
+"""Control characters, colours included: a key is the client's text, and might command a terminal."""
 _CONNECTED = re.compile(r"Accepted TLS connection on \S+: (?P<address>\S+)\. Common Name: (?P<name>.*)\.$")
 _FAILED = re.compile(r" WARN .*zenoh_link_tls\S*: (?P<reason>.*?)(\. Hint: .*)?$")
 _LIST = re.compile(r"(?P<thread>ThreadId\(\d+\)).* ACL \(\w+\): caching permissions for `(?P<key>.*)`")
@@ -50,7 +50,7 @@ _REASONS = {
 
 @dataclass
 class _List:
-    """The verdicts that Zenoh computes in advance, for every kind of message, when a client names a key."""
+    """The verdicts computed by Zenoh in advance, for every kind of message, when a client names a key."""
 
     key: str
     peer: str = ""
@@ -66,8 +66,8 @@ class GateLog:
         """Start reading.
 
         Args:
-            known: The common names of certificates that have access rules.
-            revoked: Those that had them.
+            known: Common names of certificates with access rules.
+            revoked: Common names of revoked certificates.
         """
         self._known = known
         self._revoked = revoked
@@ -78,7 +78,7 @@ class GateLog:
         self._reported: dict[str, set[str]] = {}
 
     def read(self, line: str) -> Iterator[Report]:
-        """Yield the reports that follow from a line."""
+        """Yield the reports from a line."""
         if not self._lists and " is authorized " in line:  # fast path: most lines are of this kind
             return
         text = _CONTROL.sub("", line.rstrip())
@@ -123,7 +123,7 @@ class GateLog:
         )
 
     def _judge(self, verdict: re.Match[str]) -> Iterator[Report]:
-        """Yield the report of a denial, unless it belongs to a list."""
+        """Yield the report of a denial outside of lists."""
         if named := _NAME.search(verdict["subject"] or ""):
             self._names[verdict["peer"]] = named[1]
         refused = verdict["verdict"] == "unauthorized"
@@ -140,7 +140,7 @@ class GateLog:
             yield from self._report(verdict["peer"], f"{verdict['deed'].lower()} on {verdict['key']}")
 
     def _close_list(self, thread: str) -> Iterator[Report]:
-        """End a list, and report its key if the client may neither publish nor receive anything on it."""
+        """End a list, and report the key if the client may neither publish nor receive there."""
         listed = self._lists.pop(thread, None)
         if listed is not None and listed.nothing_allowed and listed.peer in self._names:
             yield from self._report(listed.peer, f"publish or receive anything on {listed.key}")

@@ -1,7 +1,7 @@
 """The process of a gate, `python -P -m hub.security.gate_process`.
 
-It reads its settings from the first line of its input, and ends when the input is closed, or when the list of
-revoked certificates changes: started again, it has other rules, and all its connections are new ones.
+The process reads settings from the first line of its input, and ends when the input is closed, or when the
+list of revoked certificates changes: started again, the process has new rules and new connections.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from schemas.errors import ConnectError
 __all__ = ["main"]
 
 _MOST_PER_SECOND = 200
-"""Lines that are reported to the hub, however often clients try to connect."""
+"""Most lines reported to the hub per second, however often clients try to connect."""
 
 _LATER_S = 0.3
-"""The report that a connection has closed may be read before the log line that it was accepted."""
+"""Delay of the report of a closed connection: the log line of its acceptance may come later."""
 
 _LIST_S = 1.0
 """How often the list of revoked certificates is read."""
 
 
 def main() -> None:
-    """Run a gate until it has to end; exit code 1 if it cannot listen."""
+    """Run a gate until its end; exit code 1 if listening fails."""
     first = sys.stdin.readline()
     if not first:  # the hub has ended before it could send it
         sys.exit(1)
@@ -74,7 +74,7 @@ def _revoked(file: Path | None) -> list[str]:
 
 
 def _accept_others(security: dict[str, Any], banned: list[str]) -> list[str]:
-    """Apply the rules for each name to its certificates that are not revoked; return their common names."""
+    """Apply the rules of each name to its valid certificates; return the certificates' common names."""
     known: list[str] = []
     for subject in security["access_control"]["subjects"]:
         if names := subject.get("cert_common_names"):
@@ -84,7 +84,7 @@ def _accept_others(security: dict[str, Any], banned: list[str]) -> list[str]:
 
 
 def _wait_for_end(file: Path | None, banned: list[str]) -> None:
-    """Return when the input is closed, or other certificates are revoked than those of `banned`."""
+    """Return when the input is closed, or the list of revoked certificates differs from `banned`."""
     closed = threading.Event()
 
     def wait_for_close() -> None:
@@ -102,7 +102,7 @@ def _wait_for_end(file: Path | None, banned: list[str]) -> None:
 
 
 def _split_outputs() -> tuple[TextIO, TextIO]:
-    """Return this process' output, and a pipe with the log of Zenoh, which it always writes to the output."""
+    """Return this process' output, and a pipe with the log of Zenoh, otherwise written to the output."""
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1)
     reading, writing = os.pipe()
     os.dup2(writing, sys.stdout.fileno())

@@ -1,9 +1,9 @@
-"""The router of those that connect without the secret of a session: programs of other makers, and the gate.
+"""The router of clients without the secret of a session: programs of other makers, and the gate.
 
-ROS programs look for a router on loopback and know no password. A gate cannot have one either: Zenoh would
-then demand it of those who have a certificate. So these connect to a router of their own. It is connected to
-the hub's for a gate only; then access rules hold programs to the keys that devices share with them
-(docs/decisions/0038-secret-of-a-session.md).
+ROS programs look for a router on loopback and know no password. A gate cannot have a password either: Zenoh
+would demand the password of clients with a certificate too. So programs and gate connect to a router of their
+own, connected to the hub's router for a gate only; then access rules hold programs to the keys shared by
+devices (docs/decisions/0038-secret-of-a-session.md).
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ _BY_FILE = "unixsock-stream"
 
 
 class OuterRouter:
-    """A router beside that of a hub.
+    """A router beside the router of a hub.
 
     Args:
-        port: Where programs connect; None if no device of the session has keys for them.
-        foreign_keys: The keys that devices share with programs.
+        port: Port for programs; None: no device of the session shares keys.
+        foreign_keys: Keys shared with programs by devices.
         gated: The hub has a gate.
     """
 
     def __init__(self, port: LoopbackPort | None, foreign_keys: Sequence[str], *, gated: bool) -> None:
         self._port, self._foreign_keys, self._gated = port, list(foreign_keys), gated
         self.inside: list[str] = []
-        """The endpoint where hub and gate connect to it while it is open, if there is a gate."""
+        """Endpoint of the open router for hub and gate, if there is a gate."""
 
     @property
     def programs(self) -> str:
-        """Where programs connect; empty if no device has keys for them."""
+        """Endpoint for programs; empty: no device shares keys."""
         return "" if self._port is None else self._port.endpoint
 
     @contextmanager
@@ -65,9 +65,9 @@ class OuterRouter:
 
 @contextmanager
 def _private_endpoint() -> Generator[str]:
-    """Yield an endpoint that only processes of this user can reach; on Windows, any process of this machine.
+    """Yield an endpoint for processes of this user only; on Windows, for any process of this machine.
 
-    Zenoh has no sockets with rights of files there.
+    Zenoh has no sockets with rights of files on Windows.
     """
     if os.name == "nt":
         port = LoopbackPort("tcp/127.0.0.1:0")
@@ -79,7 +79,7 @@ def _private_endpoint() -> Generator[str]:
 
 
 def _rules(foreign_keys: Sequence[str]) -> dict[str, Any]:
-    """Return Zenoh's settings that hold those who connect by TCP to `foreign_keys`."""
+    """Return Zenoh's settings to hold TCP clients to `foreign_keys`."""
     everything = ["**", *foreign_keys]  # `**` does not match chunks that begin with @
     local = [_BY_FILE] if os.name != "nt" else [_BY_FILE, "tcp"]
     rules = {"hub and gate": (local, everything)}

@@ -1,7 +1,7 @@
-"""The certificates that a hub accepts no longer: one common name a line, in a file beside its own one.
+"""The revoked certificates of a hub: a common name per line, in a file beside the hub's certificate.
 
-Of a certificate, Zenoh's rules see the common name alone. That of a participant's first certificates is the
-participant's name; once they are revoked, that of the next ones is NAME.2, then NAME.3. The choice:
+Zenoh's rules see nothing of a certificate but the common name. A participant's first certificates have the
+participant's name; after a revocation the next certificates have NAME.2, then NAME.3. The choice:
 docs/decisions/0040-revoked-certificates.md.
 """
 
@@ -23,9 +23,9 @@ _COMMON_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(\.[0-9]+)?")
 
 
 def read(file: Path) -> list[str]:
-    """Return the common names of the certificates that `file` revokes: none if it is missing.
+    """Return the common names of the certificates revoked by `file`: none for a missing file.
 
-    Raises ConnectError if it cannot be read: without it, a hub must let no other machine in.
+    Raises ConnectError for an unreadable file: without the list, a hub must let no machine in.
     """
     try:
         lines = file.read_text(encoding="ascii").splitlines()
@@ -43,7 +43,7 @@ def read(file: Path) -> list[str]:
 
 
 def add(file: Path, name: str) -> str:
-    """Revoke the certificates that the participant `name` has; return their common name."""
+    """Revoke the certificates of the participant `name`; return their common name."""
     revoked = common_name(name, read(file))
     with file.open("a", encoding="ascii") as out:
         out.write(f"{revoked}\n")
@@ -51,11 +51,11 @@ def add(file: Path, name: str) -> str:
 
 
 def common_name(name: str, revoked: Collection[str]) -> str:
-    """Return the common name with which the participant `name` is accepted."""
+    """Return the accepted common name of the participant `name`."""
     numbered = (name if number == 1 else f"{name}.{number}" for number in count(1))
     return next(candidate for candidate in numbered if candidate not in revoked)
 
 
 def holder(common_name: str) -> str:
-    """Return the participant, `hub`, `observer` or `console` to which a certificate was issued."""
+    """Return the holder of a certificate: the participant, `hub`, `observer` or `console`."""
     return common_name.partition(".")[0]

@@ -1,4 +1,4 @@
-"""The rules that engines, controllers and devices share: their declarations and their messages."""
+"""Common rules of engines, controllers and devices: declarations and messages."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def require(condition: bool, rule: str) -> None:
 
 
 def check_declarations(participant: Stepped | Device) -> None:
-    """Check the ports and the parameters of a participant that is not started."""
+    """Check the ports and the parameters of a participant before the start."""
     ports = participant.ports
     names = [port.name for port in ports]
     require(len(set(names)) == len(names), f"port names are unique, but these are {names}")
@@ -52,7 +52,7 @@ def check_declarations(participant: Stepped | Device) -> None:
 
 
 def check_message(port: Port, message: Any, where: str) -> None:
-    """Check that a message fits its port; `where` names the method that returned it."""
+    """Check that a message fits its port; `where`: name of the returning method."""
     require(isinstance(message, Message), f"{where} gives messages on '{port.name}', but also {message!r}")
     require(
         message.ros_type == port.type,

@@ -19,7 +19,7 @@ class Authority(NamedTuple):
 
     @classmethod
     def founded(cls, directory: Path, *hosts: str) -> "Authority":
-        certs.found(directory, hosts or ("127.0.0.1", "localhost"), 1)
+        certs.create_authority(directory, hosts or ("127.0.0.1", "localhost"), 1)
         return cls(directory)
 
     def issued(self, name: str, days: float = 1) -> Credentials:

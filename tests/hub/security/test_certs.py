@@ -51,7 +51,7 @@ def test_nobody_else_can_read_a_key(authority):
 def test_an_authority_is_not_replaced(authority):
     before = {file: file.read_bytes() for file in authority.directory.iterdir()}
     with pytest.raises(ScenarioError, match=r"has an authority already.*trocar certs renew"):
-        certs.found(authority.directory, ["hub.example"], 1)
+        certs.create_authority(authority.directory, ["hub.example"], 1)
     assert before == {file: file.read_bytes() for file in authority.directory.iterdir()}
 
 
