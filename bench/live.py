@@ -1,4 +1,4 @@
-"""What a session costs beside its bare participants: every scenario of `configs`.
+"""Cost of a session beside its bare participants: every scenario of `configs`.
 
     python -m bench.live                                  # all scenarios, from begin to end, 20 s at most
     python -m bench.live table palpation --seconds 1
