@@ -25,7 +25,7 @@ Layout = tuple[str, str, int, tuple[int, ...], tuple[str, ...], tuple[str, ...],
 class PortCodec:
     """Encodes and decodes the values of one port, of any type.
 
-    The newest message is encoded once, whoever sends or records it: a picture has megabytes.
+    The newest message is encoded once for all readers and the recorder: a picture has megabytes.
     """
 
     def __init__(self, port: Port) -> None:
