@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -263,13 +264,16 @@ def _guided(seed: int) -> dict[str, Any]:
     for point in holes:
         there = Point(x=float(point[0]), y=float(point[1]))
         trial.send("lead", "operator/pick", PointStamped(header=Header(frame_id="phantom"), point=there))
-    trial.send("lead", "operator/command", StringMessage(data="consent"))
-    begun = False
-    while trial.time_ns < 120_000_000_000 and (surgeon.guided.stage is Stage.RUNNING or not begun):
+    consented = False
+    while trial.time_ns < 120_000_000_000 and (
+        surgeon.guided.stage in (Stage.PROPOSED, Stage.RUNNING) or not said
+    ):
         trial.step()
         if not trial.time_ns % 10_000_000:
             said += [message.data for message in trial.out["lead"]["status"]]
-            begun = begun or bool(said)
+            if not consented and (named := re.search(r"consent (\w{8})\?", " ".join(said))):
+                word, consented = StringMessage(data=f"consent {named[1]}"), True
+                trial.send("lead", "operator/command", word)
             needle = pose_to_matrix(trial.out["robot"]["needle/pose"])
             tips.append(needle[:3, :3] @ shape.marks[2] + needle[:3, 3])
     said += [message.data for message in trial.out["lead"]["status"]]

@@ -194,10 +194,10 @@ class Pick(_Command):
 
 
 class Say(_Command):
-    """A word to what is guided: `consent`, `pause`, and what else it knows."""
+    """A word to the guided participant: `pause`, `consent` with the name of a proposal, and others."""
 
     do: Literal["say"]
-    word: Annotated[str, Field(pattern=r"^[a-z][a-z ]{0,30}$")]
+    word: Annotated[str, Field(pattern=r"^[a-z][a-z0-9 ]{0,30}$")]
 
 
 Command = Annotated[

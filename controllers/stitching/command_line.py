@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Sequence
+from queue import Empty as NothingSaid
+from queue import SimpleQueue
+from threading import Event
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from hub.command_line.display import console
 from hub.command_line.options import HubEndpoints
+from schemas.codec import decode
+from schemas.errors import ConnectError, MotionError
+from schemas.ros import StringMessage
+
+if TYPE_CHECKING:
+    import zenoh
 
 __all__ = ["app"]
+
+_PATIENCE_S = 5.0
 
 app = typer.Typer(help="Guide a stitch of a running session.", no_args_is_help=True)
 
@@ -37,11 +49,8 @@ def pick(
     connect: HubEndpoints = None,
 ) -> None:
     """Pick where the needle goes in, and where it comes out; the path is shown, or why there is none."""
-    for place in (entry, exit_):
-        x, y, z = (each * 1e-3 for each in place)
-        point = {"header": {"frame_id": frame}, "point": {"x": x, "y": y, "z": z}}
-        _set(lead, "pick", point, session, connect)
-    console.print("picked; what follows is on the participant's `status` and in the picture")
+    points = [[each * 1e-3 for each in place] for place in (entry, exit_)]
+    _tell(lead, [("pick", _point(frame, *point)) for point in points], session, connect)
 
 
 @app.command()
@@ -58,15 +67,16 @@ def click(
     connect: HubEndpoints = None,
 ) -> None:
     """Pick entry and exit by what is seen: the points of the pad under two pixels of a picture."""
-    for x, y in (entry, exit_):
-        point = {"header": {"frame_id": f"{camera}_{eye}_image"}, "point": {"x": x, "y": y, "z": 0.0}}
-        _set(lead, "pick", point, session, connect)
-    console.print("picked; what follows is on the participant's `status` and in the picture")
+    frame = f"{camera}_{eye}_image"
+    _tell(lead, [("pick", _point(frame, x, y, 0.0)) for x, y in (entry, exit_)], session, connect)
 
 
 @app.command()
 def say(
-    word: Annotated[str, typer.Argument(help="consent, pause, resume, 'take over' or cancel")],
+    words: Annotated[
+        list[str],
+        typer.Argument(help="consent NAME, with the name of the proposal; pause, resume, take over, cancel"),
+    ],
     *,
     lead: Lead = "lead",
     session: Session = None,
@@ -75,16 +85,51 @@ def say(
     """Consent to the path that is shown; pause, resume, take over or cancel."""
     from controllers.stitching.stage import COMMANDS
 
-    if word not in COMMANDS:
-        raise typer.BadParameter(f"'{word}' is no command, allowed: {', '.join(COMMANDS)}")
-    _set(lead, "command", {"data": word}, session, connect)
+    text = " ".join(words)
+    if text not in COMMANDS and not text.startswith("consent "):
+        raise typer.BadParameter(f"'{text}' is no command, allowed: {', '.join(COMMANDS)}")
+    _tell(lead, [("command", {"data": text})], session, connect)
 
 
-def _set(lead: str, port: str, value: dict[str, Any], session: str | None, connect: list[str] | None) -> None:
-    from hub.remote.live_sessions import ask_about
+def _point(frame: str, x: float, y: float, z: float) -> dict[str, Any]:
+    return {"header": {"frame_id": frame}, "point": {"x": x, "y": y, "z": z}}
+
+
+def _tell(
+    lead: str, values: Sequence[tuple[str, dict[str, Any]]], session: str | None, connect: list[str] | None
+) -> None:
+    """Write values to the ports of a person, each once the one before was answered, and print the answers.
+
+    Raises MotionError if one is refused, ConnectError if there is no answer.
+    """
+    from zenoh.handlers import Callback
+
+    from hub.remote.live_sessions import session_of
+    from hub.transport.control_client import ask
     from hub.transport.control_messages import Empty, SetRequest
     from hub.transport.hub_files import running_hubs
 
     endpoints = connect or [hub.endpoint for hub in running_hubs()]
-    request = SetRequest(participant=lead, port=f"operator/{port}", value=value)
-    ask_about(lead, endpoints, "set", request, Empty, session=session)
+    said: SimpleQueue[str] = SimpleQueue()
+    runs = Event()
+
+    def hear(sample: zenoh.Sample) -> None:
+        said.put(decode(StringMessage, sample.payload.to_bytes()).data)
+
+    def see(_sample: zenoh.Sample) -> None:
+        runs.set()
+
+    with session_of(lead, endpoints, session) as (client, keys):
+        client.declare_subscriber(keys.view(lead, "status"), Callback(hear, indirect=False))
+        client.declare_subscriber(keys.view(lead, "stage"), Callback(see, indirect=False))
+        heard = runs.wait(_PATIENCE_S)  # with the first stage it is known that the session publishes for us
+        for port, value in values:
+            request = SetRequest(participant=lead, port=f"operator/{port}", value=value)
+            ask(client, keys.control("set"), request, Empty)
+            try:
+                answer = said.get(timeout=_PATIENCE_S if heard else 0.0)
+            except NothingSaid:
+                raise ConnectError(f"'{lead}' has not answered: the session may be paused") from None
+            if answer.startswith("refused: "):
+                raise MotionError(answer.removeprefix("refused: "))
+            console.print(answer, markup=False, highlight=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from hashlib import blake2b
 from math import cos, radians, sin
 
 import numpy as np
@@ -36,6 +37,8 @@ _LEAST = 2.0e-3
 _TURNS = (15, -15, 30, -30, 45, -45, 60, -60, 90, -90, 135, -135, 180)
 """Degrees about the skin's normal, by which a stitch that is not feasible is tried; least first."""
 _HANDED = ("", ", handed over once", ", handed over twice")
+_NAME_BYTES = 4
+"""Size of the hash that names a proposal: eight digits that a person can type."""
 _RAMP = 0.2
 """s in which a pause stops all motion."""
 _MOVED, _TURNED = 0.5e-3, 0.01
@@ -108,6 +111,8 @@ class GuidedSurgeon(Procedure):
         guided.stage = Stage.PICKING
         if is_exit:
             self._propose()
+        else:
+            self._status.append("the entry is picked, the exit is next")
 
     def _propose(self) -> None:
         try:
@@ -117,10 +122,27 @@ class GuidedSurgeon(Procedure):
             self.guided.picked = 0
             raise MotionError(f"{error}{hint}") from error
         self.guided.stage = Stage.PROPOSED
+        self._status.append(self._question(plan))
+
+    def _question(self, plan: WayOn) -> str:
+        """Return the question whether a person consents to a plan, with the plan's name."""
         who = self.hands[plan.exchanged].arm
         pulls, over = " and pulls" if plan.alone else "", _HANDED[len(plan.handed)]
         left = f"{plan.margin:.2f} of the joints' ranges left"
-        self._status.append(f"consent? {who} drives{pulls}{over}; {left}")
+        return f"consent {self._name(plan)}? {who} drives{pulls}{over}; {left}"
+
+    def _name(self, plan: WayOn) -> str:
+        """Return the name of a plan: a hash of the picked points, and of which arm does what."""
+        roles = bytes([plan.exchanged, plan.alone, len(plan.handed)])
+        return blake2b(self.guided.points.tobytes() + roles, digest_size=_NAME_BYTES).hexdigest()
+
+    def _consent(self, name: str) -> None:
+        """Do what was proposed under this name. Raises MotionError if something else is proposed now."""
+        plan = self._way_on()
+        if name != (proposed := self._name(plan)):
+            self._status.append(self._question(plan))  # what is shown last is the question
+            raise MotionError(f"a consent to '{name:.40}', but '{proposed}' is proposed")
+        self._go_on(plan)
 
     def _feasible_turn(self) -> str:
         """Say by which least turn about its middle the picked stitch becomes feasible; empty: by none."""
@@ -140,8 +162,15 @@ class GuidedSurgeon(Procedure):
         return ""
 
     def command(self, word: str) -> None:
-        """Do what a person says, one of COMMANDS. Raises MotionError if that cannot be done now."""
+        """Do what a person says, one of COMMANDS, `consent` with the name of a proposal.
+
+        Raises MotionError if that cannot be done now.
+        """
         guided, word = self.guided, word.strip().lower()
+        if word.startswith("consent "):
+            word, _, name = word.partition(" ")
+        else:
+            name = ""
         if word not in COMMANDS:
             raise MotionError(f"'{word}' is no command, allowed: {', '.join(COMMANDS)}")
         if guided.stage not in COMMANDS[word]:
@@ -160,8 +189,10 @@ class GuidedSurgeon(Procedure):
             raise MotionError(f"'{word}' while a hand leads an arm: release it first")
         elif guided.stage is Stage.PAUSED and self._is_where_it_paused:
             self._stage(Stage.RUNNING)
+        elif word == "consent":
+            self._consent(name.strip())
         else:
-            self._go_on()
+            self._go_on(self._way_on())
 
     def take_over(self) -> None:
         """Command nothing from now on: the arms are in a person's hands."""
@@ -212,9 +243,8 @@ class GuidedSurgeon(Procedure):
             super()._way_on()  # says that it is neither
         return None
 
-    def _go_on(self) -> None:
-        """Plan anew, and let the hands go to where the procedure goes on, each from its setpoint."""
-        plan = self._way_on()
+    def _go_on(self, plan: WayOn) -> None:
+        """Let the hands go to where a plan begins, each from its setpoint."""
         for hand, setpoint in zip(self.hands, self._setpoints, strict=True):
             hand.state.correction[:] = 0.0
             hand.state.start[:] = hand.state.goal[:] = setpoint

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, nullcontext, suppress
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -20,7 +20,7 @@ from schemas.keys import Keys
 from schemas.message import Message
 from schemas.trocar_msgs import Profile, SessionStatus
 
-__all__ = ["ask_about", "live_profiles", "live_sessions"]
+__all__ = ["ask_about", "live_profiles", "live_sessions", "session_of"]
 
 R = TypeVar("R", bound=BaseModel)
 M = TypeVar("M", bound=Message)
@@ -89,6 +89,15 @@ def ask_about(
         ConnectError: There is no such session on these endpoints, or more than one.
         MessageError: The hub rejects the request.
     """
+    with session_of(participant, endpoints, session) as (client, keys):
+        return ask(client, keys.control(verb), request, reply_model)
+
+
+@contextmanager
+def session_of(
+    participant: str, endpoints: Iterable[str], session: str | None = None
+) -> Generator[tuple[zenoh.Session, Keys]]:
+    """Yield a connection to the session that has `participant`, and its keys; raises as `ask_about` does."""
     seen: list[str] = []
     found: list[tuple[zenoh.Session, str]] = []
     with ExitStack() as clients:
@@ -109,7 +118,8 @@ def ask_about(
                 " choose one by --session, or by --connect where the names are the same"
             )
         for client, name in found:
-            return ask(client, Keys(name).control(verb), request, reply_model)
+            yield client, Keys(name)
+            return
     where = f"session '{session}'" if session else "any session"
     raise ConnectError(
         f"there is no '{participant}' in {where} of these hubs; running: {', '.join(sorted(seen)) or 'none'}"

@@ -27,8 +27,9 @@ def test_a_pixel_is_a_point_in_the_frame_of_its_picture():
     assert (asked.participant, asked.port) == ("lead", "operator/pick")
     assert asked.value["header"] == {"frame_id": "endoscope_right_image"}
     assert asked.value["point"] == {"x": 12.5, "y": 40.0, "z": 0.0}
-    said = guiding("lead", Say(do="say", word="take over"))
-    assert (said.port, said.value) == ("operator/command", {"data": "take over"})
+    for word in ("take over", "consent 3f2a91c0"):
+        said = guiding("lead", Say(do="say", word=word))
+        assert (said.port, said.value) == ("operator/command", {"data": word})
 
 
 @pytest.mark.parametrize(
@@ -53,7 +54,7 @@ def test_a_stitch_is_clicked_in_a_picture_and_consented_to(browser, tmp_path):
         words = person.page.locator("#notice")
         click(187, 104)  # the row of holes that is farthest from the camera
         click(145, 104)
-        until(lambda: "consent?" in words.inner_text(), 60.0)
+        until(lambda: "? PSM" in words.inner_text(), 60.0)
         person.page.get_by_role("button", name="Consent").click()
         until(lambda: words.inner_text() == "running", 60.0)
         person.page.get_by_role("button", name="Take over").click()

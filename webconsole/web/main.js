@@ -66,7 +66,7 @@ const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
   () => said("pictures", "a picture cannot be read"))
 const alerts = new Alerts($("alerts")), depths = new Depths($("depth-list"))
 const network = new Network($("network"), $("links"), link)
-const notices = new Notices($("notice"))
+const notices = new Notices($("notice"), (text) => guide.read(text))
 let past = false // no samples for the plots: an instant of a recording, or of the running session's past
 const timeline = new Timeline((time) => {
   if (time != null) lastTime = time

@@ -25,8 +25,9 @@ export function markersOf(buffer, start) {
 }
 
 export class Notices {
-  constructor(line) {
-    this.line = line
+  // `changed`: is called with the new words.
+  constructor(line, changed) {
+    Object.assign(this, { line, changed })
     this.clear()
   }
 
@@ -45,7 +46,10 @@ export class Notices {
 
   show() {
     const text = this.texts.flat().join("\n")
-    if (this.line.textContent !== text) this.line.textContent = text
+    if (this.line.textContent !== text) {
+      this.line.textContent = text
+      this.changed(text)
+    }
     this.line.hidden = !text
   }
 }

@@ -72,8 +72,16 @@ class Guided(World):
         self.step(command=(StringMessage(data=word),))
         return self
 
+    @property
+    def proposal(self):
+        """The name of the proposal that was shown last."""
+        return [found[1] for text in self.said if (found := re.search(r"consent (\w{8})\?", text))][-1]
+
+    def consent(self):
+        return self.say(f"consent {self.proposal}")
+
     def consented(self):
-        return self.pick(0.008, 0.018).pick(-0.008, 0.018).say("consent")
+        return self.pick(0.008, 0.018).pick(-0.008, 0.018).consent()
 
     def until(self, phase, seconds=30):
         return self.run(seconds, until=lambda world: world.phase.name == phase)
@@ -87,14 +95,14 @@ def test_a_person_picks_sees_the_path_consents_and_gets_a_stitch_through_both_po
     tips = dict(world.tips)
     assert world.stage is Stage.PROPOSED
     assert {"stitch/entry", "stitch/exit", "stitch/path", "stitch/disc"} <= set(world.markers)
-    assert "consent?" in world.markers["stitch/banner"].text
+    assert f"consent {world.proposal}?" in " ".join(world.markers["stitch/banner"].text.split())
     world.run(1.0, until=lambda _: False)
     assert all((world.tips[arm] == tip).all() for arm, tip in tips.items())  # nothing moves before consent
-    world.say("consent").run(60, until=lambda w: w.stage is Stage.PICKING)
+    world.consent().run(60, until=lambda w: w.stage is Stage.PICKING)
     assert list(world.grips) == ["PSM2"]
     assert world.lead._surgeon.state.made[0] == 1.0
     assert "stitch/path" not in world.markers
-    world.pick(0.008, 0.006).pick(-0.008, 0.006).say("consent").until("COME_BACK")  # from the other hand
+    world.pick(0.008, 0.006).pick(-0.008, 0.006).consent().until("COME_BACK")  # from the other hand
     assert world.largest < TIP_PERIOD
 
 
@@ -111,7 +119,7 @@ def test_a_stitch_goes_in_any_direction(degrees, way, ends_with):
     world, tips, takers = Guided(), [], []
     holes = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0.0]) * 0.008
     entry, leave = np.array([0.0, 0.01, 0.0]) - holes, np.array([0.0, 0.01, 0.0]) + holes
-    world.pick(*entry[:2]).pick(*leave[:2]).say("consent")
+    world.pick(*entry[:2]).pick(*leave[:2]).consent()
     while world.stage is Stage.RUNNING and world.t < 60e9:
         world.step()
         if world.phase is Phase.APPROACH and takers != (held := list(world.grips)):
@@ -140,7 +148,7 @@ def test_a_needle_that_lies_the_wrong_way_up_is_turned_over_by_the_other_hand():
 )
 def test_a_stitch_with_exchanged_hands_goes_on_after_a_take_over(phase):
     world = Guided()  # PSM1 gives the needle to PSM2, which drives, lets go and pulls
-    world.pick(-0.0057, 0.0157).pick(0.0057, 0.0043).say("consent").until(phase)
+    world.pick(-0.0057, 0.0157).pick(0.0057, 0.0043).consent().until(phase)
     assert world.phase.name == phase
     world.led = True
     world.step()
@@ -298,7 +306,28 @@ def test_of_a_stitch_that_is_not_feasible_it_says_which_turn_makes_it_so():
     turn = 90 + int(world.said[-1].split("turned by ")[1].split(" degrees")[0])
     c, s = 0.008 * np.cos(np.radians(turn)), 0.008 * np.sin(np.radians(turn))
     world.pick(0.065 - c, 0.045 - s).pick(0.065 + c, 0.045 + s)
-    assert "consent?" in world.said[-1]
+    assert "consent " in world.said[-1]
+
+
+def test_a_consent_is_to_the_proposal_that_it_names():
+    """A is proposed, and replaced by B before the consent to A arrives: nothing moves."""
+    world = Guided().pick(0.008, 0.018).pick(-0.008, 0.018)
+    first = world.proposal
+    world.pick(0.008, 0.006).pick(-0.008, 0.006)
+    second, tips = world.proposal, {arm: tip.copy() for arm, tip in world.tips.items()}
+    assert first != second
+    world.say(f"consent {first}").run(0.5, until=lambda _: False)
+    refusal, question = world.said[-2:]
+    assert refusal == f"refused: a consent to '{first}', but '{second}' is proposed"
+    assert question.startswith(f"consent {second}? PSM1 drives")
+    world.say("consent")
+    assert world.said[-2] == f"refused: a consent to '', but '{second}' is proposed"
+    assert world.stage is Stage.PROPOSED
+    assert all((world.tips[arm] == tip).all() for arm, tip in tips.items())
+    assert f"consent {second}?" in " ".join(world.markers["stitch/banner"].text.split())
+    world.pick(0.008, 0.018).pick(-0.008, 0.018)
+    assert world.proposal == first, "the name is that of the proposal, not of the moment"
+    assert world.consent().stage is Stage.RUNNING
 
 
 def test_words_that_are_none_are_refused():

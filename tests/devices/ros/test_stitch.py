@@ -1,5 +1,7 @@
 """A program guides a stitch over each gateway: picks, sees the path, consents, pauses and resumes."""
 
+import re
+
 import pytest
 import yaml
 
@@ -61,7 +63,10 @@ def in_turn(peer, rows):
     surgeon.pick(-0.008, 0.018)
     surgeon.hears("/stitch/state", "PROPOSED")
     assert {"stitch/entry", "stitch/exit", "stitch/disc", "stitch/banner"} <= surgeon.sees()
-    surgeon.say("consent")
+    proposal = re.search(r"consent (\w{8})\?", surgeon.hears("/stitch/status", "PSM"))[1]
+    surgeon.say("consent 00000000")
+    surgeon.hears("/stitch/status", f"a consent to '00000000', but '{proposal}' is proposed")
+    surgeon.say(f"consent {proposal}")
     for word, stage in (("pause", "PAUSED"), ("resume", "RUNNING"), ("take over", "TAKEN_OVER")):
         surgeon.say(word)
         surgeon.hears("/stitch/state", stage)
