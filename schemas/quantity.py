@@ -15,6 +15,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
+from schemas.magnitudes import require_magnitude
+
 __all__ = [
     "MAX_LENGTH",
     "Acceleration",
@@ -134,7 +136,7 @@ def _quantity(unit: str, example: str) -> Any:
         "examples": [example],
         "unit": unit,
     }
-    return BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(schema)
+    return BeforeValidator(lambda value: require_magnitude(to_si(value, unit), unit)), WithJsonSchema(schema)
 
 
 def _nanoseconds(value: Any) -> int:

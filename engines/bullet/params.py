@@ -36,7 +36,7 @@ class BulletParams(Params):
     probes: dict[Name, ProbeParams] = Field(default_factory=lambda: {"probe": ProbeParams()})
     timestep: Duration | None = Field(
         default=None,
-        gt=0,
+        ge=10_000,
         description=(
             "sub-step; the period is a multiple of it; default: 1 ms, halved until all organs are stable"
         ),

@@ -129,7 +129,7 @@ class MujocoParams(SceneParams):
     open_to_pages: ClassVar[bool] = True
 
     timestep: Duration = Field(
-        default=500_000, gt=0, description="sub-step of the physics; divides the participant's period"
+        default=500_000, ge=1000, description="sub-step of the physics; divides the participant's period"
     )
     publish_period: Duration = Field(
         default=5_000_000,

@@ -25,7 +25,7 @@ class SuturePadParams(Params):
     objects: dict[Name, dict[str, Any]] = Field(description="as in the scene: one of them is the needle")
     tissue: TissueParams = TissueParams()
     timestep: Duration = Field(
-        default=1_000_000, gt=0, description="sub-step; the period is a multiple of it"
+        default=1_000_000, ge=10_000, description="sub-step; the period is a multiple of it"
     )
     node_period: Duration = Field(
         default=40_000_000, gt=0, description="how often the skin is output; a multiple of the period"

@@ -82,10 +82,18 @@ def options(
     """Co-simulation hub for robotic surgery research."""
     level = logging.DEBUG if debug else logging.INFO
     if console.is_terminal:
-        handler = RichHandler(console=console, show_path=debug)
-        logging.basicConfig(level=level, format="%(message)s", handlers=[handler])
+        handler, layout = RichHandler(console=console, show_path=debug), "%(message)s"
     else:  # one line for each message, whatever its length
-        logging.basicConfig(level=level, format="%(asctime)s %(levelname)s %(message)s")
+        handler, layout = logging.StreamHandler(), "%(asctime)s %(levelname)s %(message)s"
+    handler.setFormatter(_Printable(layout))
+    logging.basicConfig(level=level, handlers=[handler])
+
+
+class _Printable(logging.Formatter):
+    """A message may quote a stranger's file: nothing in it is a command to the terminal."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return shown(super().format(record), _LONGEST)
 
 
 def main() -> None:

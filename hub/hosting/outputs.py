@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
 from operator import attrgetter, is_, itemgetter
 from typing import Any
 
@@ -19,7 +18,9 @@ from hub.transport.cells import INITIAL, Cell
 from hub.transport.port_publisher import PortPublisher
 from hub.transport.reader import Queue
 from hub.transport.wire import Wire
+from schemas import ros
 from schemas.errors import MessageError
+from schemas.magnitudes import ABSURD
 from schemas.ports import Port
 from schemas.vectors import Vector, VectorCodec, joined
 
@@ -27,6 +28,21 @@ __all__ = ["DueOutputs", "Listener", "Output", "VectorsListener"]
 
 Listener = Callable[[int, int, Any], None]
 """Is called with every value of one output: step, time (ns) at which it is valid, value."""
+
+_PHYSICAL = frozenset(
+    model.ros_type
+    for model in (
+        ros.JointState,
+        ros.PointStamped,
+        ros.PoseStamped,
+        ros.TransformStamped,
+        ros.TwistStamped,
+        ros.Vector3,
+        ros.WrenchStamped,
+    )
+)
+"""Types whose numbers are forces, states and their rates; other types may hold any number."""
+_ABSURD_SQUARE = ABSURD**2
 
 VectorsListener = Callable[[int, int, bytes], None]
 """Is called with the vectors of outputs: step, time (ns) at which they are valid, and their bytes, joined."""
@@ -120,7 +136,7 @@ class _Vectors:
         data = joined(values)
         if data != self._bytes:
             self._bytes = data
-            if len(data) != self._size or not _is_finite(data) or step == INITIAL:
+            if len(data) != self._size or not _has_sense(data) or step == INITIAL:
                 self._check(values)  # raises what is wrong, unless the numbers are only large
             for i, output in self._copied:
                 output.set_inputs(values[i].copy())
@@ -140,6 +156,12 @@ class _Vectors:
     def _check(self, values: Sequence[Vector]) -> None:
         for codec, value in zip(self._codecs, values, strict=True):
             codec.checked(value)
+            if codec.port.type in _PHYSICAL and (size := float(np.abs(value).max(initial=0.0))) > ABSURD:
+                raise MessageError(
+                    f"output '{codec.port.name}' has a size of {size:.3g} in SI units, which has no meaning"
+                    f" (more than {ABSURD:g}): the simulation has become unstable, or a parameter is out of"
+                    " any sense"
+                )
 
 
 class _Messages:
@@ -244,6 +266,7 @@ def _values_of(outputs: Sequence[Output]) -> Callable[[Outputs], Sequence[Any]]:
     return only
 
 
-def _is_finite(data: bytes) -> bool:
+def _has_sense(data: bytes) -> bool:
+    """Return whether all numbers are finite, and small enough for every physical quantity."""
     numbers = np.frombuffer(data)
-    return isfinite(numbers.dot(numbers))
+    return bool(numbers.dot(numbers) < _ABSURD_SQUARE)  # false for NaN

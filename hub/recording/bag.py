@@ -148,6 +148,12 @@ class Bag:
         self._unfinished: Unfinished | None = None
         self.topics: dict[str, str] = {}
         """Type of each topic."""
+        self._by_topic: dict[str, set[int]] = {}
+        """Channels of each topic."""
+        self._known = 0
+        """Number of channels in `_by_topic`."""
+        self._unpacked: tuple[int, bytes] = (-1, b"")
+        """Place and records of the chunk that was read last: many topics begin in the same chunk."""
         try:
             with reading(self.file):
                 self._summary = self._read_summary()
@@ -238,7 +244,7 @@ class Bag:
                 raise RecordingError(
                     f"'{self.file}' has no topic '{topic}'.{did_you_mean(topic, self.topics)}"
                 )
-        wanted = {c.id: c.topic for c in self._summary.channels.values() if not topics or c.topic in topics}
+        wanted = {channel: topic for topic in topics or self.topics for channel in self._ids(topic)}
         for records, found in self._located(set(wanted)):
             for m in found:
                 topic = wanted[m.channel]
@@ -279,8 +285,15 @@ class Bag:
     def chunk(self, index: ChunkIndex) -> bytes:
         """Return the uncompressed records of a chunk; raises RecordingError if they are damaged."""
         with reading(self.file), self.file.open("rb") as stream:
+            return self._records_of(index, stream)
+
+    def _records_of(self, index: ChunkIndex, stream: BinaryIO) -> bytes:
+        place, records = self._unpacked  # another thread may replace both
+        if place != index.chunk_start_offset:
             stream.seek(index.chunk_start_offset + _RECORD.size)
-            return chunk_records(Chunk.read(ReadDataStream(stream)))
+            records = chunk_records(Chunk.read(ReadDataStream(stream)))
+            self._unpacked = index.chunk_start_offset, records
+        return records
 
     def message_index(self, index: ChunkIndex, topic: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return times (ns) and places of the messages of `topic` in a chunk, shape (n,) each.
@@ -306,7 +319,14 @@ class Bag:
             return records[found.offset + MESSAGE_HEADER_BYTES : found.end]
 
     def _ids(self, topic: str) -> set[int]:
-        return {one.id for one in self._summary.channels.values() if one.topic == topic}
+        """Return the channels of a topic; a search for each of 20 000 topics would take minutes."""
+        channels = self._summary.channels
+        if self._known != len(channels):
+            found: dict[str, set[int]] = {}
+            for one in channels.values():
+                found.setdefault(one.topic, set()).add(one.id)
+            self._by_topic, self._known = found, len(channels)
+        return self._by_topic.get(topic, set())
 
     def _read_summary(self) -> Summary:
         with self.file.open("rb") as stream:
@@ -336,8 +356,7 @@ class Bag:
                 if places and wanted.isdisjoint(places):
                     continue
                 with reading(self.file):
-                    stream.seek(index.chunk_start_offset + _RECORD.size)
-                    records = chunk_records(Chunk.read(ReadDataStream(stream)))
+                    records = self._records_of(index, stream)
                     if wanted.issuperset(places):
                         found = [m for m in located_messages(records) if m.channel in wanted]
                     else:

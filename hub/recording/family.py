@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import logging
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hub.recording.fork_origin import ForkOrigin, fork_origin
@@ -11,6 +12,8 @@ from hub.recording.recording import Recording
 from schemas.errors import RecordingError
 
 __all__ = ["Member", "family"]
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -28,33 +31,33 @@ def family(places: Iterable[Path]) -> Iterator[Member]:
     """Yield the recordings in and below `places`, each followed by its forks, the earliest fork first.
 
     Of one that is being written, or was cut short, there is what is whole. What is no recording of a
-    session is passed over. A fork whose parent is not there stands by itself.
+    session, or cannot be read, is passed over with a line in the log. A fork whose parent is not there stands
+    by itself.
     """
-    found: dict[str, tuple[Recording, ForkOrigin | None]] = {}
+    found: dict[str, Member] = {}
     for file in sorted({file for place in places for file in _files(place)}):
         try:
             recording = Recording(file, unfinished=True)
             first = next(recording.grants(), None)
             if first is not None:
-                found[f"{first.run:x}"] = recording, fork_origin(recording)
-        except RecordingError:
-            continue
+                found[f"{first.run:x}"] = Member(
+                    file, 0, recording.scenario().name, recording.duration_ns, fork_origin(recording)
+                )
+        except RecordingError as error:
+            log.info("passed over: %s", error)
     children: dict[str, list[str]] = {}
-    for run, (_, origin) in found.items():
+    for run, one in found.items():
+        origin = one.origin
         parent = origin.parent_run if origin is not None and origin.parent_run in found else ""
         children.setdefault(parent, []).append(run)
     yield from _members(found, children, children.get("", []), 0)
 
 
 def _members(
-    found: dict[str, tuple[Recording, ForkOrigin | None]],
-    children: dict[str, list[str]],
-    runs: Sequence[str],
-    depth: int,
+    found: Mapping[str, Member], children: dict[str, list[str]], runs: Sequence[str], depth: int
 ) -> Iterator[Member]:
-    for run in sorted(runs, key=lambda run: (_forked_at(found[run][1]), str(found[run][0].file))):
-        recording, origin = found[run]
-        yield Member(recording.file, depth, recording.scenario().name, recording.duration_ns, origin)
+    for run in sorted(runs, key=lambda run: (_forked_at(found[run].origin), str(found[run].file))):
+        yield replace(found[run], depth=depth)
         yield from _members(found, children, children.pop(run, []), depth + 1)
 
 

@@ -5,16 +5,18 @@ Topics are the session's keys without `trocar/<session>`.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property
 from html import escape
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TypeVar
 
+from packaging.version import InvalidVersion, Version
 from pydantic import ValidationError
+from pydantic_core import from_json
 
 from hub.planning.plan import Plan
 from hub.planning.renamed import current_names
@@ -92,8 +94,9 @@ class Recording(Bag):
 
     def _repr_html_(self) -> str:
         """Return the table that a notebook shows."""
+        counts = self.counts
         rows = "".join(
-            f"<tr><td>{escape(name)}</td><td>{escape(kind)}</td><td>{self.counts[self._ports[name]]:,}</td></tr>"
+            f"<tr><td>{escape(name)}</td><td>{escape(kind)}</td><td>{counts[self._ports[name]]:,}</td></tr>"
             for name, kind in self.ports.items()
         )
         return (
@@ -134,9 +137,9 @@ class Recording(Bag):
         """Return the resolved scenario. Raises RecordingError if the recording is not one of a session."""
         if "scenario.json" not in self.attachments:
             raise RecordingError(f"'{self.file}' holds no scenario: it was not recorded by `trocar run`")
-        cannot = f"'{self.file}': this version cannot read the scenario in it"
+        cannot = f"'{self.file}': this version cannot read the scenario in it{self.made_by_newer()}"
         try:
-            recorded = json.loads(self.attachments["scenario.json"])
+            recorded = from_json(self.attachments["scenario.json"])  # of limited depth
             return Scenario.model_validate(current_names(recorded, self.versions().get("trocar", "")))
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
@@ -144,6 +147,16 @@ class Recording(Bag):
             raise RecordingError(f"{cannot}: {path}: {first['msg']}") from error
         except (AttributeError, KeyError, TypeError, ValueError) as error:  # not JSON, or not a scenario
             raise RecordingError(f"{cannot}: {type(error).__name__}: {error}") from error
+
+    def made_by_newer(self) -> str:
+        """Return a remark if a newer Trocar than the installed one has made the recording; else empty."""
+        try:
+            recorded, own = Version(self.versions().get("trocar", "0")), Version(version("trocar"))
+        except (InvalidVersion, RecordingError, PackageNotFoundError):
+            return ""
+        return (
+            f" (Trocar {recorded} has made it, which is newer than {own}: update)" if recorded > own else ""
+        )
 
     def versions(self) -> dict[str, str]:
         """Return the version of each installed package at that time; empty if not recorded."""
@@ -155,7 +168,7 @@ class Recording(Bag):
 
     def _table(self, name: str) -> dict[str, str]:
         try:
-            content = json.loads(self.attachments.get(name, b"{}"))
+            content = from_json(self.attachments.get(name, b"{}"))
             return {str(key): str(value) for key, value in content.items()}
         except (AttributeError, ValueError) as error:
             raise RecordingError(f"'{self.file}': attachment {name} is not a table: {error}") from error
@@ -173,7 +186,7 @@ class Recording(Bag):
             ) from None
         except ValidationError as error:
             raise RecordingError(
-                f"'{self.file}': this version cannot read the plan in it:"
+                f"'{self.file}': this version cannot read the plan in it{self.made_by_newer()}:"
                 f" {error.errors(include_url=False)[0]['msg']}"
             ) from error
         if problem := plan.contradiction():

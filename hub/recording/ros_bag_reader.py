@@ -102,7 +102,7 @@ def _require_bounded(bag: Path) -> None:
     """Raise RecordingError if a file of a bag is none, or if it is a bomb or does not fit on the disk."""
     space = int(shutil.disk_usage(tempfile.gettempdir()).free * _SHARE)
     for file in sorted(bag.iterdir()) if bag.is_dir() else (bag,):
-        if file.is_dir():
+        if file.is_dir() or not file.exists():  # what is missing is reported by its reader
             continue
         if not file.is_file():
             raise RecordingError(f"'{file}' is no regular file: it may be a pipe that never ends")

@@ -42,6 +42,8 @@ def trusted_parameters(
     Raises TrustError with the list of what they ask for, RecordingError if plan, scenario and renewals
     contradict each other or the installed kinds, and ScenarioError if a kind cannot be loaded.
     """
+    if remark := recording.made_by_newer():
+        log.warning("'%s'%s", recording.file, remark)
     files = recorded_files(recording, directory, trust=trust)
     directory, recorded = files.directory, set(recording.files().values())
     origin = fork_origin(recording)

@@ -13,6 +13,7 @@ from hub.recording.ros_bag_reader import RosBag
 from robots import rotation
 from robots.dvrk.mounted import MountedPsm
 from schemas.errors import RecordingError
+from schemas.magnitudes import MAGNITUDES
 from schemas.ros import JointState, PoseStamped
 from schemas.vectors import Vector
 from tasks.params import TaskParams
@@ -24,6 +25,8 @@ __all__ = ["score_ros_bag"]
 _PERIOD_NS = 10_000_000
 _INSTRUMENT = "LARGE_NEEDLE_DRIVER_400006"
 """Whose tip is taken for that of an arm of which only joints are recorded."""
+_LEAST_NORM, _GREATEST_NORM = 0.9, 1.1
+"""Norm of a quaternion that was rounded or badly normalised, but turns."""
 _CHAIN = MountedPsm(instrument=_INSTRUMENT).chain
 _SOURCES = ("local/measured_cp", "measured_cp", "measured_js")
 """Topics of an arm from which its tip is known, the best first: without what moves the endoscope."""
@@ -72,11 +75,22 @@ def _tips(bag: RosBag, topic: str) -> Stream:
             pose = read(message)
         except (AttributeError, TypeError, ValueError) as error:
             raise RecordingError(f"'{bag.path}': topic '{topic}' at {time_ns} ns: {error}") from error
-        if not np.isfinite(pose).all():
-            raise RecordingError(f"'{bag.path}': topic '{topic}' at {time_ns} ns: not all numbers are finite")
+        if problem := _problem(pose):
+            raise RecordingError(f"'{bag.path}': topic '{topic}' at {time_ns} ns: {problem}")
         times.append(time_ns - bag.start_ns)
         poses.append(pose)
     return Stream(np.array(times, np.int64), np.stack(poses), _PERIOD_NS)
+
+
+def _problem(pose: Vector) -> str:
+    """Return why position and quaternion, shape (7,), are no pose of an instrument; empty if they are."""
+    if not np.isfinite(pose).all():
+        return "not all numbers are finite"
+    if np.abs(pose).max() > MAGNITUDES["m"].most:
+        return f"a size of {np.abs(pose).max():g} is no place of an instrument"
+    if not _LEAST_NORM < np.linalg.norm(pose[3:]) < _GREATEST_NORM:
+        return f"the quaternion has norm {np.linalg.norm(pose[3:]):g} instead of 1"
+    return ""
 
 
 def _from_pose(message: Any) -> Vector:

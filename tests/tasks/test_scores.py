@@ -128,6 +128,25 @@ def test_a_bag_without_an_arm_says_what_to_record(tmp_path):
         score_ros_bag(bag, [])
 
 
+@pytest.mark.parametrize(
+    ("at", "turn", "problem"),
+    [
+        ((0.0, 0.0, 0.0), 0.0, "the quaternion has norm 0 instead of 1"),
+        ((1e300, 0.0, 0.0), 1.0, "is no place"),
+    ],
+)
+def test_a_bag_with_a_pose_without_a_meaning(tmp_path, at, turn, problem):
+    odd = pose(at)
+    odd = odd.model_copy(
+        update={"pose": odd.pose.model_copy(update={"orientation": Quaternion(x=0.0, y=0.0, z=0.0, w=turn)})}
+    )
+    bag = write(
+        tmp_path / "bag", [(0.0, "/PSM1/measured_cp", pose((0, 0, 0))), (0.01, "/PSM1/measured_cp", odd)]
+    )
+    with pytest.raises(RecordingError, match=problem):
+        score_ros_bag(bag, [])
+
+
 def test_a_session_of_an_earlier_version_without_a_task_is_measured(tmp_path):
     packed = Path(__file__).parents[1] / "hub" / "recording" / "recordings_0_1_0" / "pick.mcap.xz"
     (tmp_path / "pick.mcap").write_bytes(lzma.decompress(packed.read_bytes()))

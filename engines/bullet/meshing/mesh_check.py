@@ -7,12 +7,12 @@ import numpy as np
 from engines.bullet.meshing.tet_mesh import Indices, TetMesh, shape_quality
 from schemas.vectors import Vector
 
-__all__ = ["MOST_NODES", "checked_mesh"]
+__all__ = ["LARGEST_M", "MOST_NODES", "SMALLEST_M", "checked_mesh"]
 
 MOST_NODES = 5000
 """A step of 1 ms takes some 15 ms with as many at rest (bench/organs.py)."""
 
-_SMALLEST_M, _LARGEST_M = 5e-3, 1.0
+SMALLEST_M, LARGEST_M = 5e-3, 1.0
 """Extent of an organ: from a lymph node to more than any abdominal organ."""
 
 _FLATTEST = 0.02
@@ -70,15 +70,15 @@ def _numbers(nodes: Vector, tetrahedra: Indices) -> list[str]:
 
 def _size(nodes: Vector) -> list[str]:
     extent = float(np.ptp(nodes, axis=0).max())
-    if extent > _LARGEST_M:
+    if extent > LARGEST_M:
         return [
-            f"it is {extent:.4g} m large: is the file in millimetres? State `unit: mm`. Up to {_LARGEST_M:g}"
+            f"it is {extent:.4g} m large: is the file in millimetres? State `unit: mm`. Up to {LARGEST_M:g}"
             " m are allowed"
         ]
-    if extent < _SMALLEST_M:
+    if extent < SMALLEST_M:
         return [
             f"it is {1e3 * extent:.4g} mm large: is the file in metres? State `unit: m`. At least"
-            f" {1e3 * _SMALLEST_M:g} mm are allowed"
+            f" {1e3 * SMALLEST_M:g} mm are allowed"
         ]
     return []
 

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 from engines.bullet.elasticity.material import Material
 from engines.bullet.elasticity.stable_step import highest_frequency, lowest_frequency
 from engines.bullet.meshing.grid import FEWEST_NODES
-from engines.bullet.meshing.mesh_check import MOST_NODES, checked_mesh
+from engines.bullet.meshing.mesh_check import LARGEST_M, MOST_NODES, SMALLEST_M, checked_mesh
 from engines.bullet.meshing.tet_mesh import TetMesh
 from engines.bullet.meshing.vtk_file import read_vtk
 from engines.bullet.organs.anchors import AnchorParams, Edges
@@ -89,6 +89,7 @@ class OrganParams(BaseModel):
     damping: Duration = Field(
         default=1_000_000,
         ge=0,
+        le=1_000_000_000,
         description="stiffness-proportional damping: ratio of damping to stiffness, a time",
     )
     friction: float = Field(default=0.3, ge=0, le=2, description="Coulomb coefficient against probes")
@@ -104,6 +105,10 @@ class OrganParams(BaseModel):
             raise ValueError(
                 f"an organ has a size (a block), a shape ({', '.join(SHAPES)}) or a mesh (a .vtk file), one"
                 " of them"
+            )
+        if self.size is not None and not SMALLEST_M <= max(self.size) <= LARGEST_M:
+            raise ValueError(
+                f"the longest edge of a block is {SMALLEST_M:g} to {LARGEST_M:g} m, not {max(self.size):g} m"
             )
         if self.mesh is None and self.unit is not None:
             raise ValueError("unit is that of a mesh file; elsewhere units stand with the numbers")

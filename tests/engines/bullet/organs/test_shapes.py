@@ -390,7 +390,7 @@ def test_words_of_any_length_are_quoted_in_part(tmp_path, content):
 
 def test_a_pipe_has_no_end_and_is_not_read(tmp_path):
     os.mkfifo(tmp_path / "organ.vtk")
-    with pytest.raises(ValidationError, match=r"organ\.vtk: is no file"):
+    with pytest.raises(ValidationError, match="something else than regular files"):
         organ(mesh=str(tmp_path / "organ.vtk"), material="liver", anchors=[])
 
 

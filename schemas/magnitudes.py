@@ -1,0 +1,48 @@
+"""Least and greatest sizes of physical parameters: beyond them a simulation gives numbers without a meaning.
+
+A gravity of 1e200 m/s^2 ended as `done`, with tissue that stood still, and was the same again in `verify`.
+The limits are some powers of ten beyond every robot, tool and tissue, so that no sensible scene meets one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+__all__ = ["ABSURD", "MAGNITUDES", "Magnitude", "require_magnitude"]
+
+ABSURD = 1e9
+"""Size in SI units at which a force, a pose or a joint of a running session is out of any sense."""
+
+
+class Magnitude(NamedTuple):
+    """The sizes that a quantity may have, apart from zero, and examples of what is at the ends."""
+
+    least: float
+    most: float
+    reason: str
+
+
+MAGNITUDES = {
+    "m": Magnitude(1e-9, 1e3, "from a molecule to a building"),
+    "kg": Magnitude(1e-6, 1e4, "from a piece of suture to a lorry"),
+    "Pa": Magnitude(1e-3, 1e13, "from a foam to ten times diamond"),
+    "kg/m^3": Magnitude(1e-3, 1e5, "from a gas to four times osmium"),
+    "N": Magnitude(1e-9, 1e6, "from a cell to a hundred tonnes"),
+    "N/m": Magnitude(1e-6, 1e9, "from a cell to a machine's frame"),
+    "N*s/m": Magnitude(1e-9, 1e7, "from a cell to a vehicle's damper"),
+    "rad": Magnitude(1e-12, 1e5, "to 16 000 turns"),
+    "m/s": Magnitude(1e-9, 1e4, "to ten times a bullet"),
+    "m/s^2": Magnitude(1e-9, 1e3, "to a hundred times standard gravity"),
+}
+"""By SI unit."""
+
+
+def require_magnitude(number: float, unit: str) -> float:
+    """Return `number`; raises ValueError if a quantity in `unit` has no such size."""
+    size, limits = abs(number), MAGNITUDES[unit]
+    if size and not limits.least <= size <= limits.most:
+        raise ValueError(
+            f"{number:g} {unit} has no meaning here: expected 0, or {limits.least:g} to {limits.most:g}"
+            f" {unit} ({limits.reason})"
+        )
+    return number
