@@ -1,1 +1,1 @@
-"""Organs: their shapes, their materials, what holds them, and their bodies in Bullet."""
+"""Organs: shapes, materials, anchors, and bodies in Bullet."""

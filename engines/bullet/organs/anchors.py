@@ -1,4 +1,4 @@
-"""What holds an organ in its place: surfaces tied to the world, or to rigid parts of the scene."""
+"""Anchors of an organ: surfaces tied to the world, or to rigid parts of the scene."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Box(BaseModel):
 
 
 class AnchorParams(BaseModel):
-    """A part of an organ's surface, and what it is tied to."""
+    """An anchored part of an organ's surface, and its support."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -56,7 +56,7 @@ class AnchorParams(BaseModel):
 
 
 class RigidParams(BaseModel):
-    """A rigid box that does not move: a bed that organs lie on, a wall that they are tied to."""
+    """A fixed rigid box: a bed under organs, or a wall as support of anchors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -69,7 +69,7 @@ class RigidParams(BaseModel):
 
 
 def add_rigid(params: RigidParams, client: int) -> int:
-    """Add a rigid part to the world of `client`, and return its number there."""
+    """Add a rigid part to the world of `client`, and return its number in Bullet."""
     import pybullet as bullet
 
     shape = bullet.createCollisionShape(

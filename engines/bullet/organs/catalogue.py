@@ -1,4 +1,4 @@
-"""The organs that a scenario may name, and the block of tissue of any size."""
+"""The organs for scenarios, and the block of tissue of any size."""
 
 from __future__ import annotations
 

@@ -19,13 +19,13 @@ _RADIUS_M = 0.0225
 _WALL_M = 0.005
 
 _HAUSTRA = 4
-"""Along the length: one in 30 mm. By eye."""
+"""Number of haustra along the length, every 30 mm. By eye."""
 
 _TAENIAE = 3
-"""Bands along the colon, between which the haustra bulge; one is on the mesenteric side."""
+"""Bands along the colon, between bulging haustra; the first is on the mesenteric side."""
 
 _BULGE = 0.14
-"""By this share the haustra stand out, and the folds between them stand in. By eye."""
+"""Relative height of the haustra, and depth of the folds in between. By eye."""
 
 _LAYOUTS = [
     (around, along, layers)
@@ -33,7 +33,7 @@ _LAYOUTS = [
     for around in range(12, 61, 6)
     for along in range(2 * _HAUSTRA, 25 * _HAUSTRA, _HAUSTRA)
 ]
-"""Numbers of cells that put nodes on the taeniae and the folds."""
+"""Numbers of cells with nodes on the taeniae and the folds."""
 
 
 def _mesh(nodes: int) -> TetMesh:
@@ -68,7 +68,7 @@ def _tube(around: int, along: int, layers: int) -> TetMesh:
 
 
 _MESENTERY_RAD = 0.3
-"""Half of the angle over which the mesentery is attached: a taenia, 1 cm wide."""
+"""Half angle of the mesentery's attachment: a taenia, 1 cm wide."""
 
 _NANOMETRE = 1e-9
 

@@ -1,4 +1,4 @@
-"""A kidney with its adrenal gland."""
+"""A kidney with adrenal gland."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ _HALF_GLAND_M = np.array([0.019, 0.018, 0.005])
 """
 
 _OVERLAP_M = 0.010
-"""How far the gland reaches down over the pole, on which it sits like a cap."""
+"""Overlap of the gland with the pole, m: the gland sits on the pole like a cap."""
 
 _THICK_KIDNEY_M, _THICK_GLAND_M = 0.026, 0.016
-"""Half of the thicknesses in the body that is meshed."""
+"""Half thicknesses of the meshed body."""
 
 _TAPER = 0.5
-"""The gland is a pyramid with round edges: its breadth at the apex is less, at the base more than the mean by
-this share. By eye.
+"""Taper of the gland, a pyramid with round edges: relative difference of the breadths at base and apex from
+the mean. By eye.
 """
 
 _BLEND_M = 0.003
-"""Depth over which kidney and gland run into each other. By eye."""
+"""Depth of the transition between kidney and gland. By eye."""
 
 _HILUM_M, _HILUM_RADIUS_M = 0.009, 0.016
 """Depth and radius of the notch at the hilum. By eye."""
 
 _BEND_M, _BEND_RADIUS_M = 0.017, 0.050
-"""How far, and over what length, the poles bend around the hilum. By eye."""
+"""Bend of the poles around the hilum, and length of the bend. By eye."""
 
 
 def _field(points: Vector) -> Vector:

@@ -18,13 +18,13 @@ as the left.
 """
 
 _THICK_M = 0.030
-"""Half of the thickness everywhere in the body that is meshed."""
+"""Half thickness of the meshed body."""
 
 _EDGE_M = 0.014
 """Thickness where the free edge begins to be round."""
 
 _NARROWING = 0.2
-"""The lobe is broader at the diaphragm and narrower at its edge than its middle by this share. By eye."""
+"""Relative difference of the lobe's breadth at the diaphragm and at the edge from the middle. By eye."""
 
 _DOME_M = 0.014
 """How far the edge and the sides lie below the top of the dome. By eye."""
@@ -34,14 +34,14 @@ _BLUNTNESS = 2.5
 
 
 def _field(points: Vector) -> Vector:
-    """Positive inside a flat lobe that is as thick everywhere as at the diaphragm."""
+    """Positive inside a flat lobe of uniform thickness, as at the diaphragm."""
     x, y, z = (points / [*_HALF_M[:2], _THICK_M]).T
     outline = np.abs(x) ** _BLUNTNESS + np.abs(y / (1.0 - _NARROWING * np.clip(x, -1.5, 1.5))) ** _BLUNTNESS
     return _THICK_M * (1.0 - np.sqrt(outline ** (3.0 / _BLUNTNESS) + z**2))
 
 
 def _formed(points: Vector) -> Vector:
-    """Thin the lobe towards its edge, and dome it."""
+    """Thin the lobe towards the edge, and add the dome."""
     x, y, z = points.T
     thinned = (_HALF_M[2] + (0.5 * _EDGE_M - _HALF_M[2]) * _along(x)) / _THICK_M
     return np.stack([x, y, z * thinned + _middle(x, y)], axis=1)
@@ -58,7 +58,7 @@ def _middle(x: Vector, y: Vector) -> Vector:
 
 
 def _on_diaphragm(nodes: Vector) -> NDArray[np.bool_]:
-    """The upper surface of the half that lies under the diaphragm, to which ligaments hold it."""
+    """The upper surface of the half under the diaphragm, held there by ligaments."""
     x, y, z = nodes.T
     return (x < 0.0) & (z > _middle(x, y))
 

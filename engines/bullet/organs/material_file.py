@@ -1,4 +1,4 @@
-"""The material of the reader's own tissue, as `trocar calibrate tissue` writes it and a scenario names it."""
+"""The file of a user's own tissue, written by `trocar calibrate tissue` and named in a scenario."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from engines.bullet.organs.materials import TissueDensity, TissueModulus, Tissue
 __all__ = ["MaterialFile"]
 
 _LARGEST = 2**16
-"""Bytes of a file; one has 1 KiB."""
+"""Most bytes of a file; a usual file has 1 KiB."""
 
 
 class MaterialFile(BaseModel):
-    """The content of a file of YAML, SI units: what Bullet's material takes, and how it was found."""
+    """The content of a YAML file, SI units: constants of Bullet's material, and their provenance."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     young_modulus: TissueModulus
-    """Pa, as stiff as the tissue is at the frequency of `fit`."""
+    """Storage modulus of the tissue at the frequency of `fit`, Pa."""
     poisson_ratio: TissuePoissonRatio
     density: TissueDensity
     damping: Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
-    """Ratio of damping to stiffness, s, for the loss at that frequency."""
+    """Ratio of damping to stiffness, s, for the loss at the frequency of `fit`."""
     friction: Annotated[float, Field(ge=0.0, le=2.0, allow_inf_nan=False)] | None = None
     """Coulomb's coefficient; None: not measured."""
     fit: dict[str, Any] = Field(default_factory=dict[str, Any])
-    """What was measured, with deviations, and how well it fits; for the reader."""
+    """Measured values with deviations, and quality of the fit; for the reader."""
 
     @classmethod
     def load(cls, file: Path) -> Self:
-        """Return the content of `file`. Raises ValueError if it cannot be read or is not valid."""
+        """Return the content of `file`. Raises ValueError for an unreadable or invalid file."""
         try:
             if file.stat().st_size > _LARGEST:
                 raise ValueError(

@@ -1,8 +1,8 @@
-"""Materials of organs by name, each with its source and the loading under which it was measured.
+"""Materials of organs by name, each with source and loading of the measurement.
 
-Values for one tissue differ a thousandfold between indentation and tension to failure: which to take depends
-on what the scenario does. Tissue is nearly incompressible; a Poisson ratio of 0.4 stands for that in all
-presets, as linear tetrahedra lock near 0.5.
+Values for a tissue differ a thousandfold between indentation and tension to failure: the choice depends on
+the scenario. Tissue is nearly incompressible; all presets have a Poisson ratio of 0.4, as linear tetrahedra
+lock near 0.5.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ TissueDensity = Annotated[
 
 
 class Preset(BaseModel):
-    """A material, where its numbers come from, and for which loading they hold. SI units after validation."""
+    """A material with sources of its numbers and loading of the measurement. SI units after validation."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -72,7 +72,7 @@ def presets() -> dict[str, Preset]:
 
 
 def preset(name: str) -> Preset:
-    """Return one preset. Raises ValueError for an unknown name."""
+    """Return a preset. Raises ValueError for an unknown name."""
     if name not in presets():
         raise ValueError(
             f"no material '{name}'.{did_you_mean(name, presets())} Or give young_modulus, poisson_ratio and"

@@ -18,11 +18,11 @@ from schemas.vectors import Vector
 __all__ = ["Organ"]
 
 _WORLD_BODY = -1
-"""Bullet's number for no body: what is anchored to it does not move."""
+"""Bullet's number for no body: an anchor to the world does not move."""
 
 _STILL = (0.0, 0.0, 0.0)
 _HALTS = 24
-"""Each leaves some 1e-16 of a velocity; so many leave nothing of the largest that there can be."""
+"""Number of halts: each leaves some 1e-16 of a velocity, all together nothing of any possible velocity."""
 
 
 class Organ:
@@ -33,19 +33,19 @@ class Organ:
     ) -> None:
         """Load the organ into the world of `client`.
 
-        `parts` are the numbers of the rigid bodies, by name, that it may be anchored to.
+        `parts`: numbers of the rigid bodies for anchors, by name.
         """
         import pybullet as bullet
 
         self.name = name
         self.mesh = mesh = params.rest
         self.anchored = np.zeros(len(mesh.nodes), dtype=np.bool_)
-        """Which nodes are anchored, shape (n,)."""
+        """Anchored nodes, shape (n,)."""
         for tied in params.anchored_nodes.values():
             self.anchored |= tied
         self.touchable = mesh.triangles[~self.anchored[mesh.triangles].all(axis=1)]
         self.held = np.zeros(len(mesh.nodes), dtype=np.bool_)
-        """Which nodes are held by a grasp, shape (n,)."""
+        """Nodes held by a grasp, shape (n,)."""
         edges = mesh.nodes[mesh.triangles] - mesh.nodes[np.roll(mesh.triangles, 1, axis=1)]
         self.mean_edge = float(np.linalg.norm(edges, axis=2).mean())
         """Mean length of an edge of the surface, m."""
@@ -104,17 +104,17 @@ class Organ:
         self.held[node] = False
 
     def let_touch(self, body: int, *, on: bool) -> None:
-        """Let a rigid body of Bullet collide with the organ, or pass through it."""
+        """Let a rigid body of Bullet collide with the organ, or pass through."""
         import pybullet as bullet
 
         bullet.setCollisionFilterPair(self._body, body, -1, -1, int(on), physicsClientId=self._client)
 
     def stand(self, nodes: Vector | None = None) -> None:
-        """Bring all nodes to a standstill, at `nodes`, shape (n, 3), m in `world`, or where they are.
+        """Bring all nodes to a standstill, at `nodes`, shape (n, 3), m in `world`, or in place.
 
-        Bullet reads no velocities of nodes and sets none; but an angular velocity replaces that of every node
-        by that of the whole, and a linear one shifts them all to a mean (`btSoftBody.cpp`). What remains
-        after each round is an error of rounding.
+        Bullet neither reads nor sets velocities of nodes; but setting an angular velocity replaces the
+        velocity of every node by the rigid motion of the whole, and a linear velocity shifts all to a mean
+        (`btSoftBody.cpp`). The remainder after each round is an error of rounding.
         """
         import pybullet as bullet
 

@@ -31,13 +31,13 @@ __all__ = ["OrganParams"]
 _NODES = 250
 _POISSON_RATIO = 0.4
 _DENSITY = 1000.0
-"""Of water, kg/m^3."""
+"""Density of water, kg/m^3."""
 
 _UNITS = {"m": 1.0, "mm": 1e-3}
 
 
 class OrganParams(BaseModel):
-    """An organ of soft tissue: its shape, its material, where it lies and what holds it.
+    """An organ of soft tissue: shape, material, pose and anchors.
 
     SI units after validation.
     """
@@ -152,7 +152,7 @@ class OrganParams(BaseModel):
 
     @cached_property
     def contact_friction(self) -> float:
-        """Coulomb's coefficient against probes: as stated, else that of the material's file, if any."""
+        """Coulomb's coefficient against probes: as stated, else from the material file, if any."""
         own = self._own_material
         if own is None or own.friction is None or "friction" in self.model_fields_set:
             return self.friction
@@ -187,9 +187,9 @@ class OrganParams(BaseModel):
 
     @property
     def anchored_nodes(self) -> dict[str, NDArray[np.bool_]]:
-        """Which nodes are tied to `world` and to rigid parts, shapes (n,).
+        """Nodes tied to `world` and to rigid parts, shapes (n,).
 
-        Raises ValueError where a surface is unknown or has no node.
+        Raises ValueError for an unknown surface or a surface without nodes.
         """
         anchors = (
             [AnchorParams(surface=name) for name in self.body.anchors]
@@ -205,9 +205,10 @@ class OrganParams(BaseModel):
 
     @cached_property
     def frequencies(self) -> tuple[float, float | None]:
-        """Highest natural frequency, and that of the slowest swing, rad/s; None where nothing is anchored.
+        """Highest natural frequency, and frequency of the slowest swing, rad/s; None: no anchors.
 
-        They take a third of the time to make an organ, and each episode of learning makes it anew.
+        Kept, because the frequencies take a third of the time to make an organ, and each episode of learning
+        makes the organ anew.
         """
         tied = np.any(list(self.anchored_nodes.values()), axis=0)
         free = np.where(tied, 0.0, np.ones(len(self.rest.nodes)))
@@ -217,9 +218,9 @@ class OrganParams(BaseModel):
         )
 
     def surface(self, part: AnchorParams) -> NDArray[np.bool_]:
-        """Return which nodes belong to a part of the surface, shape (n,).
+        """Return the nodes of a part of the surface, shape (n,).
 
-        Raises ValueError where it is unknown or has no node.
+        Raises ValueError for an unknown part or a part without nodes.
         """
         nodes, chosen = np.unique(self.local.triangles), np.zeros(len(self.local.nodes), np.bool_)
         points = self.local.nodes[nodes]
@@ -236,7 +237,7 @@ class OrganParams(BaseModel):
     def contact_stiffness(self, radius: float) -> float:
         """Estimate the stiffness (N/m) against a sphere of `radius` (m).
 
-        It is that of a punch as wide as the sphere, or as a median edge of the surface if that is longer.
+        The estimate is for a punch as wide as the sphere, or as a longer median edge of the surface.
         """
         return self.elastic.contact_stiffness(max(radius, self._median_edge))
 

@@ -1,4 +1,4 @@
-"""What a shape of organ is: a mesh for a number of nodes, and surfaces with names."""
+"""The shape of an organ: a mesh for a number of nodes, and named surfaces."""
 
 from __future__ import annotations
 
@@ -18,49 +18,49 @@ from schemas.vectors import Vector
 __all__ = ["ROUNDING_DIGITS", "SIDES", "Shape", "Surface", "mesher", "on_side", "smooth_union"]
 
 Surface = Callable[[Vector], NDArray[np.bool_]]
-"""Of nodes on the surface at rest, shape (n, 3), m, in the organ's own frame: which of them belong to a named
-part, shape (n,).
+"""Maps surface nodes at rest, shape (n, 3), m, in the organ's own frame, to their membership in a named part,
+shape (n,).
 """
 
 ROUNDING_DIGITS = 6
-"""Nodes are rounded to a micrometre: sine and root differ in their last bit between processors, of which
-smoothing makes 1e-13 m; meshes must not differ.
+"""Digits of nodes: a micrometre. Sine and root differ in their last bit between processors, and smoothing
+makes 1e-13 m of this difference; meshes must not differ.
 """
 
 _COUNT_TOLERANCE = 0.02
 _SEARCHES = 8
-"""The spacing is varied until the number of nodes is this near to the requested one, at most so many times;
-then the nearest is taken.
+"""Most variations of the spacing to come near to the requested number of nodes; then the nearest mesh is
+used.
 """
 
 _SIDE_SHARE = 0.05
-"""A side takes what lies within this share of the organ's extent from its end."""
+"""Depth of a side, as a fraction of the organ's extent."""
 
 SIDES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1), "bottom": (2, -1), "top": (2, 1)}
-"""Axis and sign of the surfaces that every organ has: where it ends towards -x, +x, -y, +y, -z and +z of its
-own frame.
+"""Axis and sign of the surfaces of every organ: the ends towards -x, +x, -y, +y, -z and +z of the organ's
+frame.
 """
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A body that can be meshed with about as many nodes as requested."""
+    """A body for meshes with about the requested number of nodes."""
 
     description: str
-    """What it is, how it lies in its frame, and where its dimensions come from."""
+    """Organ, attitude in its frame, and sources of the dimensions."""
     mesh: Callable[[int], TetMesh]
-    """From the requested number of nodes to the nearest mesh that the method gives, in the organ's frame."""
+    """Maps the requested number of nodes to the nearest mesh of the method, in the organ's frame."""
     surfaces: Mapping[str, Surface]
     """Parts of the surface by name, besides `SIDES`."""
     anchors: tuple[str, ...]
-    """Surfaces that are anchored by default."""
+    """Surfaces anchored by default."""
     material: str | None
     """The default preset."""
 
     def surface(self, name: str, nodes: Vector) -> NDArray[np.bool_]:
-        """Return which nodes of the surface, shape (n, 3), belong to the part of it called `name`.
+        """Return the membership of surface nodes, shape (n, 3), in the part `name`, shape (n,).
 
-        Raises ValueError if it does not exist.
+        Raises ValueError for an unknown part.
         """
         if name in self.surfaces:
             return self.surfaces[name](nodes)
@@ -75,9 +75,9 @@ class Shape:
 
 
 def on_side(nodes: Vector, side: str, share: float) -> NDArray[np.bool_]:
-    """Return which nodes, shape (n, 3), lie near the end of the body on one of `SIDES`, shape (n,).
+    """Return whether nodes, shape (n, 3), are near the end of the body on a side of `SIDES`, shape (n,).
 
-    `share`: of the body's extent, within which they count as near.
+    `share`: depth of the side, as a fraction of the body's extent.
     """
     axis, sign = SIDES[side]
     along = sign * nodes[:, axis]
@@ -90,16 +90,15 @@ def mesher(
     low: tuple[float, float, float],
     high: tuple[float, float, float],
 ) -> Callable[[int], TetMesh]:
-    """Return the function that meshes a body with a number of nodes.
+    """Return the mesher of a body for a number of nodes.
 
-    The lattice cannot hold what is thinner than itself, so a body that is thick everywhere is meshed and then
-    given its form.
+    The lattice cannot hold parts thinner than itself, so a thick body is meshed and then deformed.
 
     Args:
-        field: of the thick body.
-        formed: map of points, shape (n, 3), from the thick body to the real one.
+        field: field of the thick body.
+        formed: map of points, shape (n, 3), from the thick body to the real body.
         low: corner of a box around the thick body, m.
-        high: its opposite corner.
+        high: opposite corner of the box, m.
     """
 
     @lru_cache(maxsize=16)
@@ -122,5 +121,5 @@ def mesher(
 
 
 def smooth_union(one: Vector, other: Vector, blend: float) -> Vector:
-    """Return the field of two bodies that blend where their fields differ by less than `blend` (m)."""
+    """Return the field of two bodies, blended within a difference of their fields of `blend` (m)."""
     return np.maximum(one, other) + np.maximum(blend - np.abs(one - other), 0.0) ** 2 / (4.0 * blend)

@@ -1,1 +1,1 @@
-"""The probes that press on tissue and grasp it."""
+"""The probes pressing on and grasping tissue."""

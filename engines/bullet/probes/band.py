@@ -1,4 +1,4 @@
-"""How much stiffer than its tissue a mesh is, and where the spring that mends it holds, for each organ."""
+"""Stiffness of a mesh relative to its tissue, and range of the correcting spring, for each organ."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from engines.bullet.organs.params import OrganParams
 __all__ = ["Band", "band"]
 
 _DEPTH = 0.2
-"""Of the press in radii: the contact is smaller than a face, as the compliance of the mesh takes it."""
+"""Depth of the press, in radii: the contact is smaller than a face, as assumed in the mesh's compliance."""
 
 _TENTHS = (0.1, 0.9)
-"""Of the places, those whose ratios are reported."""
+"""Quantiles of the ratios over all places in the report."""
 
 
 @dataclass(frozen=True)
 class Band:
-    """Of a mesh under a sphere, over its faces and its nodes."""
+    """How much stiffer a mesh is than its tissue under a sphere."""
 
     radius: float
     """m."""
@@ -31,11 +31,11 @@ class Band:
     softer: float
     """Share of the places where the mesh is softer than the tissue: there the spring is rigid."""
     deepest: float
-    """Depth (m) up to which the tissue's force is known."""
+    """Largest depth with a known force of the tissue, m."""
 
     @property
     def mesh_alone(self) -> str:
-        """What the mesh does without the spring, in words."""
+        """Error of the mesh without the spring, in words."""
         low, high = self.stiffer
         softer = f", and softer than the tissue at {self.softer:.0%} of the places" if self.softer else ""
         return f"{low:.1f} to {high:.1f} times too stiff under a sphere of {self.radius * 1e3:g} mm{softer}"
@@ -47,7 +47,7 @@ class Band:
 def band(organ: OrganParams, radius: float) -> Band | None:
     """Return the band for a sphere of `radius` (m).
 
-    None where there is no correction: the organ has more than `MOST_NODES` nodes, or nothing holds it.
+    None: no correction, for an organ of more than `MOST_NODES` nodes, or without anchors.
     """
     mesh, anchored = organ.rest, np.zeros(len(organ.rest.nodes), dtype=np.bool_)
     for tied in organ.anchored_nodes.values():

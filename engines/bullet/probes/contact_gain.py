@@ -1,12 +1,12 @@
-"""The share of a force that Bullet's contacts lose, and the gain that compensates for it.
+"""The loss of force in Bullet's contacts, and the compensating gain.
 
 Where a rigid body touches a face of a soft body at barycentric coordinates w, Bullet spreads the impulse over
 the three nodes with weights 2 w / (1 + s), s = w . w, and takes the sum of w times weight as the inverse mass
-of the face (btSoftBodyInternals.h, CollideSDF_RDF). Of an impulse J on the rigid body the soft body then
-receives only 4 s / (1 + s)^2 J: all of it at a node, 8/9 in the middle of an edge, 3/4 in the middle of a
-face. A force on the rigid body must be larger by the inverse for the tissue to feel it whole: by 1 to 4/3.
-How several faces share the force of a sphere cannot be read from Bullet; so the gain is measured, from the
-elastic forces on the nodes that are touched. See docs/decisions/0015-contact-force.md.
+of the face (btSoftBodyInternals.h, CollideSDF_RDF). From an impulse J on the rigid body the soft body then
+receives only 4 s / (1 + s)^2 J: all at a node, 8/9 in the middle of an edge, 3/4 in the middle of a face. A
+force on the rigid body must be larger by the inverse, 1 to 4/3, for the tissue to receive the whole force.
+The division of a sphere's force among several faces cannot be read from Bullet; so the gain is measured, from
+the elastic forces on the touched nodes. See docs/decisions/0015-contact-force.md.
 """
 
 from __future__ import annotations
@@ -27,28 +27,27 @@ from schemas.vectors import Vector
 __all__ = ["BAND_M", "CONTACT_PERIOD_NS", "Contacts", "Tissue"]
 
 CONTACT_PERIOD_NS = 8_000_000
-"""How often the nodes are read to find where probes touch and what force they receive."""
+"""Period of readings of the nodes, for the places of contact and the received forces."""
 
 BAND_M = 6e-4
-"""Faces nearer to the sphere than this may share its force; the first guess is that the nearest bears most.
-"""
+"""Largest distance of faces sharing the force of a sphere; in the first guess the nearest face bears most."""
 
 _LARGEST_GAIN = 4.0 / 3.0
 
 _FILTER = 0.2
-"""Share of the way to the measured gain gone at each reading: a time constant of 36 ms, in which waves in the
+"""Fraction of the way to the measured gain at each reading: a time constant of 36 ms, in which waves in the
 tissue even out.
 """
 
 _LEAST_PART = 1e-3
-"""Of a force, on every node of the faces that may be touched."""
+"""Least part of a force on every node of possibly touched faces."""
 
 _LEAST_FORCE_N = 5e-3
-"""Below this the inertia of the touched nodes, of some 0.1 g each, counts in what they receive."""
+"""Least force for a correction: below, the inertia of the touched nodes (some 0.1 g each) matters."""
 
 
 class Tissue:
-    """An organ as far as contacts go: where it is touched, and what its nodes receive."""
+    """An organ for contacts: touched places, and forces on the nodes."""
 
     def __init__(self, organ: Organ, material: Material, gravity: float) -> None:
         """Watch `organ`, in `gravity` (m/s^2) along -z."""
@@ -60,10 +59,10 @@ class Tissue:
         self._before = organ.nodes
 
     def received(self, nodes: Indices) -> Vector:
-        """Return the force (N) with which contacts push these nodes, shape (n, 3), zero for all others.
+        """Return the contact force (N) on these nodes, shape (n, 3), zero elsewhere.
 
-        It is what balances elasticity, damping and weight. As damping is proportional to stiffness,
-        elasticity is taken where the nodes will be a damping time later.
+        The contact force balances elasticity, damping and weight. As damping is proportional to stiffness,
+        elasticity is evaluated at the nodes' places a damping time later.
         """
         at = np.zeros(len(self.organ.nodes), dtype=np.bool_)
         at[nodes] = True
@@ -74,7 +73,7 @@ class Tissue:
         return force
 
     def advance(self) -> None:
-        """Keep the present nodes as those before the next ones."""
+        """Store the present nodes as the previous nodes."""
         self._before = self.organ.nodes
 
 
@@ -85,28 +84,28 @@ class _Touch:
     probe: Probe
     sphere: int
     distance: float
-    """Of its centre from the nearest face, m."""
+    """Distance of the centre from the nearest face, m."""
     guess: float
-    """Gain that the faces' distances suggest."""
+    """Gain from the faces' distances."""
     nodes: Indices
-    """Of these faces, shape (k,)."""
+    """Nodes of the faces, shape (k,)."""
     parts: Vector
-    """Of the force, that fall to each of the nodes by the same guess, shape (k,)."""
+    """Parts of the force on each node by the same guess, shape (k,)."""
 
     @property
     def push(self) -> Vector:
-        """Force (N) with which Bullet let it press, shape (3,)."""
+        """Force of the sphere in Bullet, N, shape (3,)."""
         return self.probe.contacts[self.sphere]
 
 
 class Contacts:
-    """Finds which spheres touch organs, and sets their gains."""
+    """Finds the spheres touching organs, and sets their gains."""
 
     def __init__(self, tissues: Sequence[Tissue]) -> None:
         self._tissues = tissues
 
     def update(self, probes: Sequence[Probe]) -> None:
-        """Note which faces each probe is near to, and correct every gain by what the tissue receives.
+        """Find the faces near each probe, and correct every gain by the force on the tissue.
 
         The organs' nodes have just been read.
         """
@@ -130,13 +129,13 @@ class Contacts:
 
 
 def _near(organ: Organ, probe: Probe, loose: Indices) -> NearFaces:
-    """Return the faces that the spheres `loose` are near to: as far as they touch, or the probe looks."""
+    """Return the faces near the spheres `loose`: in contact, or within the probe's sight."""
     reach = np.maximum(probe.radii[loose] + BAND_M, probe.sight)
     return near_faces(probe.positions[loose], reach, organ.nodes, organ.touchable)
 
 
 def _touches(near: NearFaces, probe: Probe, loose: Indices) -> dict[int, _Touch]:
-    """Return by number, of the spheres `loose`, those that touch."""
+    """Return the touches among the spheres `loose`, by number."""
     reach = probe.radii[loose] + BAND_M
     pairs, faces, weights, distances = near.within(reach)
     starts = np.searchsorted(pairs, np.arange(len(loose) + 1)).tolist()
@@ -158,9 +157,9 @@ def _touch(
 
 
 def _correct(tissue: Tissue, touches: Sequence[_Touch]) -> None:
-    """Correct the guesses by what the nodes receive.
+    """Correct the guesses by the forces on the nodes.
 
-    Where spheres share a node, the force on it is divided as the guesses say.
+    The force on a node shared by spheres is divided by the guesses.
     """
     tied = tissue.organ.anchored | tissue.organ.held
     received = tissue.received(np.unique(np.concatenate([touch.nodes for touch in touches])))

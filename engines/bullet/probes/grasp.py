@@ -1,7 +1,7 @@
-"""Grasp of tissue: fingers that close on an organ hold its nodes; opening or too strong a pull frees them.
+"""Grasp of tissue: fingers closed on an organ hold nodes; opening or too strong a pull frees the nodes.
 
-Friction of spheres on Bullet's tissue creeps, so nodes that are held are anchored to the proxies, and an
-anchor passes on the whole force. Rules and figures: docs/decisions/0016-tissue-grasp.md.
+Friction of spheres on Bullet's tissue creeps, so held nodes are anchored to the proxies, and an anchor passes
+on the whole force. Rules and figures: docs/decisions/0016-tissue-grasp.md.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from schemas.vectors import Vector
 __all__ = ["Grasp", "grasp_ports", "nothing_held"]
 
 _CLOSING_M = 0.5e-3
-"""By how much the fingers must have closed on tissue to grasp it, and opened from there to release it.
+"""Closing of the fingers on tissue for a grasp, and opening from there for a release.
 
-It is half of the distance by which two jaws approach each other.
+Half of the distance between two jaws.
 """
 
 _SHUT_M = 0.5e-3
-"""Gap between fingers that have closed as far as they go."""
+"""Gap between fully closed fingers."""
 
 _SQUEEZE_N = 0.1
-"""Force with which tissue between fingers keeps each of them from closing, from which on they have it."""
+"""Least force of tissue against each closing finger for a grasp."""
 
 
 def grasp_ports(probe: str) -> tuple[Port, ...]:
-    """Return the ports of a probe that may grasp."""
+    """Return the ports of a grasping probe."""
     return (
         signal_out(f"{probe}/held", Float64Message, "1 while tissue is held, else 0"),
         signal_out(
@@ -53,7 +53,7 @@ def grasp_ports(probe: str) -> tuple[Port, ...]:
 
 
 def nothing_held(probe: str) -> dict[str, Value]:
-    """Return the outputs of a probe that touches nothing."""
+    """Return the outputs of a probe without contact."""
     return {
         f"{probe}/held": np.zeros(1),
         f"{probe}/pull": np.zeros(3),
@@ -64,7 +64,7 @@ def nothing_held(probe: str) -> dict[str, Value]:
 
 @dataclass(frozen=True)
 class _Hold:
-    """What is held of one organ."""
+    """The held part of an organ."""
 
     organ: Organ
     nodes: NDArray[np.int64]
@@ -74,21 +74,19 @@ class _Hold:
 
 
 class Grasp:
-    """Watches the fingers of one probe, and ties tissue to them."""
+    """Watches the fingers of a probe, and ties tissue to the fingers."""
 
     def __init__(
         self, params: GraspParams, probe: Probe, organs: list[Organ], surfaces: Sequence[Surface] = ()
     ) -> None:
-        """Watch `probe`, whose fingers may grasp `organs`; with a `width` their `surfaces` are known."""
+        """`organs`: organs for the fingers of `probe`; `surfaces`: their surfaces, with a `width`."""
         self._params, self._probe, self._organs = params, probe, organs
         self._surfaces = {surface.organ.name: surface for surface in surfaces}
         self._spheres = np.arange(len(probe.radii)).reshape(params.fingers, -1)  # (fingers, spheres of each)
         self._rest = [organ.nodes[:, 2].copy() for organ in organs]
         self._holds: list[_Hold] = []
         self._widest = 0.0
-        """Spread of the fingers when they were widest since they touch tissue, or, while they hold it, when
-        they took hold, m.
-        """
+        """Widest spread of the fingers since first contact; during a grasp the spread at its beginning, m."""
         self._held, self._pull, self._lift = np.zeros(1), np.zeros(3), np.zeros(1)
         self.outputs = nothing_held(probe.name)
 
@@ -109,7 +107,7 @@ class Grasp:
         self._say(events)
 
     def untie(self) -> None:
-        """Untie what is held, and let the spheres that held it touch it again."""
+        """Untie the held tissue, and let the holding spheres touch the tissue again."""
         for hold in self._holds:
             for node, anchor in zip(hold.nodes.tolist(), hold.anchors, strict=True):
                 hold.organ.release(node, anchor)
@@ -131,7 +129,7 @@ class Grasp:
         return float(np.linalg.norm(middles - middles.mean(axis=0), axis=1).mean())
 
     def _watch_hold(self, t: int) -> tuple[TissueGrasp, ...]:
-        """Release the tissue if the fingers have opened; else measure how far it is lifted."""
+        """Release the tissue if the fingers have opened; else measure the lift."""
         if self._spread() > self._widest + _CLOSING_M:
             return self._let_go("released", t)
         self._lift[0] = np.concatenate(
@@ -166,7 +164,7 @@ class Grasp:
         return arms / np.maximum(np.linalg.norm(arms, axis=1, keepdims=True), 1e-12)
 
     def _gap(self, fingers: NDArray[np.bool_]) -> float:
-        """Return the least gap (m) between spheres of different ones of these fingers."""
+        """Return the least gap (m) between spheres of different fingers."""
         spheres = self._spheres[fingers]
         of = np.repeat(np.arange(len(spheres)), spheres.shape[1])
         positions, radii = self._probe.positions[spheres.ravel()], self._probe.radii[spheres.ravel()]
@@ -202,7 +200,7 @@ class Grasp:
         return self._events("grasped", t)
 
     def _patch(self, spheres: NDArray[np.int64]) -> HeldPatch | None:
-        """Return the spring in series with these spheres, if a `width` is stated and one organ is held."""
+        """Return the spring in series with these spheres, given a `width` and a single held organ."""
         width = self._params.width
         if width is None:
             return None
@@ -233,7 +231,7 @@ class Grasp:
     def _set_held(self, spheres: NDArray[np.int64], *, held: bool) -> None:
         """Mark these spheres as holding tissue or not.
 
-        Spheres pass through the organs that they hold, so that all force goes through the anchors.
+        Spheres pass through the held organs, so all force goes through the anchors.
         """
         self._probe.held[spheres] = held
         self._probe.gains[spheres] = 1.0

@@ -1,8 +1,8 @@
-"""A spring in series with a jaw that holds tissue: the compliance that the held nodes of a coarse mesh lack.
+"""A spring in series with a jaw holding tissue: the missing compliance of the held nodes of a coarse mesh.
 
-A jaw holds a patch as wide as its pad, the mesh some nodes, which may stand two pads apart. What a patch of
-that width gives way is known, and what the mesh does between the held nodes too; both are linear, up to a
-lift of three pads within 5 percent. Their difference yields to the pull of all held spheres together. See
+A jaw holds a patch as wide as its pad, the mesh some nodes, perhaps two pads apart. The compliance of a patch
+of this width is known, and the compliance of the mesh between the held nodes too; both are linear, up to a
+lift of three pads within 5 percent. The difference yields to the pull of all held spheres together. See
 docs/decisions/0099-rims-and-held-patches.md.
 """
 
@@ -20,23 +20,23 @@ from schemas.vectors import Vector
 __all__ = ["HeldPatch", "missing_compliance"]
 
 _ZETA = 0.3
-"""Damping ratio of the proxies on the spring alone. It delays a pull by some 10 ms; at 1 by 40 ms, and a lift
-in 0.1 s then costs more than the tissue gives back.
+"""Damping ratio of the proxies on the spring alone. A pull is delayed by some 10 ms; at a ratio of 1 by 40
+ms, and a lift in 0.1 s then costs more than the tissue gives back.
 """
 
 
 def missing_compliance(
     surface: SurfaceCompliance, material: Material, nodes: Indices, width: float
 ) -> Vector:
-    """Return how much more (m/N) a patch of tissue gives way than the mesh where it is held, shape (3, 3).
+    """Return the compliance (m/N) of a patch of tissue in excess of the mesh at held nodes, shape (3, 3).
 
-    Symmetric, in `world`; below 0 in a direction in which the mesh is too soft.
+    Symmetric, in `world`; negative in directions of too soft a mesh.
 
     Args:
-        surface: of the organ.
-        material: of its tissue.
-        nodes: held, moved alike, shape (k,).
-        width: of the patch, m.
+        surface: surface of the organ.
+        material: material of the tissue.
+        nodes: held nodes with a common motion, shape (k,).
+        width: width of the patch, m.
     """
     held = surface.on_surface(nodes)
     along, across = patch_compliance(0.5 * width, material)
@@ -51,15 +51,15 @@ def missing_compliance(
 
 
 class HeldPatch:
-    """Spring and damper in series with one jaw that holds tissue: how far they have yielded.
+    """Spring and damper in series with a jaw holding tissue: their present yield.
 
-    Without the damper the proxies would swing on the spring, as that of the coupling moves with them.
+    Without the damper the proxies would swing on the spring, as the coupling's spring moves with the proxies.
     """
 
     def __init__(self, spheres: Indices, coupling: Coupling, compliance: Vector) -> None:
         """Yield to the sum of the forces on the `spheres`, shape (k,), by `compliance` (m/N), shape (3, 3).
 
-        It is rigid in directions in which that is below 0, as nothing in series stiffens.
+        Rigid in directions of negative compliance, as no spring in series stiffens.
         """
         self._spheres, self._coupling = spheres, coupling
         values, self._directions = np.linalg.eigh(compliance)
@@ -68,11 +68,11 @@ class HeldPatch:
         """m, in `world`, shape (3,)."""
 
     def give_way(self, springs: Vector, dampers: Vector, since: float, *, keep: bool) -> None:
-        """Take from the forces (N, shape (n, 3)) of a rigid coupling what the spring in series spares them.
+        """Reduce the forces (N, shape (n, 3)) of a rigid coupling by the yield of the spring in series.
 
-        since: s since its yield was last kept. Along each axis of the compliance C the yield s follows from
-        s + C d s' = C f, with the damper d = 2 zeta sqrt(mass / C), the sum of the forces f = sum k (e - s) +
-        b (e' - s') over the spheres that hold, and s' = (s - s_before) / since.
+        since: time since the yield was last kept, s. Along each axis of the compliance C the yield s follows
+        from s + C d s' = C f, with the damper d = 2 zeta sqrt(mass / C), the sum of the forces f = sum k (e -
+        s) + b (e' - s') over the holding spheres, and s' = (s - s_before) / since.
         """
         coupling, at, count = self._coupling, self._spheres, len(self._spheres)
         compliances, directions = self._compliances, self._directions

@@ -1,4 +1,4 @@
-"""Which faces of an organ are near the spheres of a probe, and their points that are nearest."""
+"""Faces of an organ near the spheres of a probe, and their nearest points."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ALL_SIDES = 0b111111
 
 
 class NearFaces(NamedTuple):
-    """Pairs of a sphere and a face that it is near to, in the order of the spheres, then of the faces."""
+    """Pairs of a sphere and a near face, in the order of the spheres, then of the faces."""
 
     spheres: Indices
     """Numbers of the spheres, shape (p,)."""
@@ -29,7 +29,7 @@ class NearFaces(NamedTuple):
     weights: Vector
     """Barycentric coordinates of the faces' nearest points, shape (p, 3)."""
     distances: Vector
-    """Of these points from the centres, m, shape (p,)."""
+    """Distances of the nearest points from the centres, m, shape (p,)."""
 
     def within(self, reach: Vector) -> NearFaces:
         """Return the pairs with a distance below the `reach` (m) of the sphere, shape (k,)."""
@@ -38,13 +38,13 @@ class NearFaces(NamedTuple):
 
 
 def near_faces(centres: Vector, reach: Vector, nodes: Vector, faces: Indices) -> NearFaces:
-    """Return which spheres are near which faces: all pairs with a distance below the sphere's `reach`.
+    """Return all pairs of spheres and faces at a distance below the sphere's `reach`.
 
     Args:
-        centres: of the spheres, m, shape (k, 3).
-        reach: of each, m, shape (k,).
-        nodes: m, shape (n, 3).
-        faces: the three nodes of each, shape (f, 3).
+        centres: centres of the spheres, m, shape (k, 3).
+        reach: reach of each sphere, m, shape (k,).
+        nodes: nodes of the mesh, m, shape (n, 3).
+        faces: the three nodes of each face, shape (f, 3).
     """
     low, high = centres - reach[:, None], centres + reach[:, None]
     close = np.flatnonzero(((nodes.min(axis=0) < high) & (nodes.max(axis=0) > low)).all(axis=1))
@@ -61,10 +61,10 @@ def near_faces(centres: Vector, reach: Vector, nodes: Vector, faces: Indices) ->
 
 
 def closest_points(point: Vector, corners: Vector) -> tuple[Vector, Vector]:
-    """Return the points of triangles that are nearest to `point` (m), one for all or one for each.
+    """Return the points of triangles nearest to `point` (m), common to all or one for each.
 
-    They come as barycentric coordinates, shape (f, 3), with their distances (m), shape (f,). The nearest
-    point is the foot of the perpendicular if that lies inside the triangle, else it lies on an edge.
+    The result has barycentric coordinates, shape (f, 3), and distances (m), shape (f,). The nearest point is
+    the foot of the perpendicular inside the triangle, else a point on an edge.
     """
     edges = corners.take(_NEXT, axis=1) - corners  # (f, 3, 3): edge k from corner k
     to_point = np.reshape(point, (-1, 1, 3)) - corners  # (f, 3, 3)

@@ -1,4 +1,4 @@
-"""Parameters of a probe: its spheres, their virtual coupling, and fingers that grasp."""
+"""Parameters of a probe: spheres, virtual coupling, and grasping fingers."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from schemas.vectors import Vector
 __all__ = ["Coupling", "GraspParams", "ProbeParams"]
 
 _STIFFNESS_RATIO = 20.0
-"""Virtual coupling to contact: a quick press loses 1/21, 5 %, of its way to the coupling; what lasts loses
-nothing, see `Coupling.reset_time`.
+"""Stiffness of the virtual coupling over the contact's: a quick press loses 1/21, 5 %, of its way to the
+coupling; a lasting press loses nothing, see `Coupling.reset_time`.
 """
 
 _SUB_GRID_RATIO = 12.0
-"""The same where the mesh's lacking compliance is in series (`sub_grid`): its law counts the coupling's own
-yield. Stiffer, and so heavier, proxies bounce off soft contacts; softer ones follow a quick press worse.
+"""Stiffness ratio with the mesh's missing compliance in series (`sub_grid`): the law counts the coupling's
+own yield. Stiffer, and so heavier, proxies bounce off soft contacts; softer proxies follow a quick press
+worse.
 """
 
 _STEP_SHARE = 0.5
@@ -33,7 +34,7 @@ _RESET_SHARE = 4.0
 """Reset time times sqrt(k / m): slow beside the proxy's own oscillation."""
 
 _PASSIVE_SHARE = 0.5
-"""Of the tissue's damping, what the reset may use up: contacts may be twice as stiff as estimated, and a
+"""Fraction of the tissue's damping usable by the reset: contacts may be twice as stiff as estimated, and a
 scheme of finite steps lags too.
 """
 
@@ -42,7 +43,7 @@ Radius = Annotated[Length, Field(ge=0.5e-3)]
 
 @dataclass(frozen=True)
 class Coupling:
-    """The spring and damper between each proxy and its sphere on the instrument, and the proxy's mass."""
+    """The spring and damper between each proxy and the instrument's sphere, and the proxy's mass."""
 
     stiffness: float
     """k, N/m."""
@@ -51,10 +52,10 @@ class Coupling:
     damping: float
     """b, N s/m."""
     reset_time: float | None
-    """T, s, of a spring that is proportional and integral: with it, the proxy of an instrument at rest stands
-    where its sphere is, whatever the force.
+    """Reset time T of a proportional and integral spring, s: at rest, the proxy stands at the instrument's
+    sphere for any force.
 
-    None: the spring is proportional, and yields by force / k.
+    None: a proportional spring, with a yield of force / k.
     """
 
     @property
@@ -64,7 +65,7 @@ class Coupling:
 
 
 class GraspParams(BaseModel):
-    """Fingers that may grasp tissue. SI units after validation."""
+    """Fingers grasping tissue. SI units after validation."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -154,12 +155,12 @@ class ProbeParams(BaseModel):
     def coupling(
         self, contact_stiffness: float, contact_damping: float, timestep: float, *, sub_grid: bool = False
     ) -> Coupling:
-        """Return what is stated, and the rest by rule from the tissue and the sub-step (s).
+        """Return the coupling as stated, completed by rule from the tissue and the sub-step (s).
 
-        contact_stiffness: k_c of the tissue, N/m. contact_damping: its ratio d of damping to stiffness, s. A
-        spring with reset gives back more than it took, in cycles of frequency w at most the share w T k_c /
-        k; the tissue's damping takes up w d. So there is a reset where T <= 0.5 d k / k_c. None with
-        `sub_grid`, whose law counts what the spring yields.
+        contact_stiffness: k_c of the tissue, N/m. contact_damping: ratio d of damping to stiffness of the
+        tissue, s. A spring with reset returns more energy than stored, in cycles of frequency w at most the
+        share w T k_c / k; the tissue's damping dissipates w d. So there is a reset if T <= 0.5 d k / k_c. No
+        reset with `sub_grid`: the law counts the spring's yield.
         """
         ratio = _SUB_GRID_RATIO if sub_grid else _STIFFNESS_RATIO
         stiffness = self.stiffness or ratio * contact_stiffness

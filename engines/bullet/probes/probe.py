@@ -1,4 +1,4 @@
-"""A probe: proxies, in the tissue's world, of the spheres of an instrument that another engine moves."""
+"""A probe: proxies in the tissue's world for the spheres of an instrument in another engine."""
 
 from __future__ import annotations
 
@@ -22,19 +22,18 @@ if TYPE_CHECKING:
 __all__ = ["Probe"]
 
 _LOCKED_INERTIA = 1e3
-"""Moment of inertia (kg m^2) that keeps a sphere from rolling off on friction, which the instrument does not
-let it do.
+"""Moment of inertia (kg m^2) against rolling of a sphere by friction, impossible for a part of an instrument.
 """
 
 _PROXY_GROUP, _ALL_BUT_PROXIES = 1 << 6, ~(1 << 6)
-"""Collision filter: proxies pass through each other, as neighbours on an instrument overlap.
+"""Collision filter: proxies pass through one another, as neighbours on an instrument overlap.
 
 Bullet's own groups end at 1 << 5.
 """
 
 
 class Probe:
-    """Proxies in Bullet; a virtual coupling pulls each after the predicted motion of its sphere."""
+    """Proxies in Bullet; a virtual coupling pulls each proxy after the predicted motion of a sphere."""
 
     def __init__(
         self,
@@ -45,7 +44,7 @@ class Probe:
         gravity: float,
         client: int,
     ) -> None:
-        """Create the spheres far above everything; the first step moves them to the instrument."""
+        """Create the spheres far above everything; the first step moves the spheres to the instrument."""
         import pybullet as bullet
 
         self.name = bond.name
@@ -57,23 +56,18 @@ class Probe:
         self.velocities = np.zeros((n, 3))
         """m/s, frame `world`, shape (n, 3)."""
         self.gains = np.ones(n)
-        """How much larger the force in Bullet is than that of the coupling, to make up for what contacts lose
-        (see `contact`), shape (n,).
+        """Force in Bullet over force of the coupling, to compensate the loss in contacts (see
+        `contact_gain`), shape (n,).
         """
         self.corrections = np.ones(n)
-        """How much the measured gains differ from those that the geometry of the contact suggests, shape
-        (n,).
-        """
+        """Measured gains over gains from the geometry of the contact, shape (n,)."""
         self.held = np.zeros(n, dtype=np.bool_)
-        """Which spheres have tissue anchored to them; anchors lose nothing of a force, so their gain is 1.
-
-        Shape (n,).
-        """
+        """Spheres with anchored tissue, shape (n,); anchors lose nothing of a force: gain 1."""
         self.touching = np.zeros(n, dtype=np.bool_)
-        """Which spheres touched an organ at the last reading of the contacts, shape (n,)."""
+        """Spheres touching an organ at the last reading of the contacts, shape (n,)."""
         self._side = ForceSide(bond, plan)
         self.coupling = coupling
-        """Of every proxy with its sphere on the instrument."""
+        """Coupling of every proxy with the instrument's sphere."""
         self._weight = np.array([0.0, 0.0, coupling.mass * gravity])
         self._spring, self._damper = np.zeros(bond.size), np.zeros(bond.size)
         # (n, 3) each: views of the same numbers
@@ -89,11 +83,11 @@ class Probe:
         self._reset = np.zeros((n, 3))  # force of the spring when the proxy is at its target
         self._reset_rate = 1.0 / coupling.reset_time if coupling.reset_time else 0.0
         self.sub_grid: SubGrid | None = None
-        """What the only sphere's mesh lacks in compliance; with it the coupling needs no reset."""
+        """Missing compliance of the mesh under a single sphere; the coupling then needs no reset."""
         self.held_patch: HeldPatch | None = None
-        """What the mesh lacks in compliance where it is held."""
+        """Missing compliance of the mesh at the held nodes."""
         self.near: Sequence[NearFaces] = ()
-        """Faces near the spheres that are not held, at the last reading of the contacts, of each organ."""
+        """Faces of each organ near the free spheres at the last reading of the contacts."""
         self._placed = False
         self._client = client
         self.bodies: list[int] = [self._sphere(radius) for radius in self.radii.tolist()]
@@ -108,31 +102,28 @@ class Probe:
     def forces(self) -> Vector:
         """Force (N) of the coupling on every proxy, shape (n, 3).
 
-        It is that of the last sub-step, or of the end of the last step.
+        The force of the last sub-step, or of the end of the last step.
         """
         return self._springs + self._dampers
 
     @property
     def sight(self) -> float:
-        """How far from its centre (m) a sphere looks for faces that it does not touch yet."""
+        """Distance from a sphere's centre for the search of faces before contact, m."""
         return 0.0 if self.sub_grid is None else self.sub_grid.sight(self.velocities[0])
 
     @property
     def contacts(self) -> Vector:
-        """Force (N) with which each proxy pressed on what it touched in the last sub-step, shape (n, 3).
-
-        As Bullet has it.
-        """
+        """Contact force (N) of each proxy in the last sub-step, as in Bullet, shape (n, 3)."""
         return self._applied - self.coupling.mass / self._dt * (self.velocities - self._velocities_before)
 
     def begin(self, inputs: Inputs, h: float) -> None:
-        """Take the other side's motion at the start of a step of `h` seconds."""
+        """Store the motion of the motion side at the start of a step of `h` seconds."""
         self._side.begin(inputs, h)
         if not self._placed:
             self._place()
 
     def push(self, tau: float, dt: float) -> None:
-        """Apply the coupling forces of the sub-step of `dt` seconds around `tau`, taken at its middle."""
+        """Apply the coupling forces of the sub-step of `dt` seconds around `tau`, evaluated at the middle."""
         self._stretch(tau, 0.5 * dt)
         if self.sub_grid is not None:
             self.sub_grid.give_way(self._springs[0], self._dampers[0], dt, keep=True)
@@ -149,9 +140,9 @@ class Probe:
             apply(body, -1, force, position, frame, client)
 
     def read(self, dt: float) -> None:
-        """Take velocities from Bullet after a sub-step of `dt` seconds, and move as it does.
+        """Read velocities from Bullet after a sub-step of `dt` seconds, and move as Bullet does.
 
-        A multi-body moves by its velocity times the sub-step, so the positions need not be read.
+        A multi-body moves by velocity times sub-step, so the positions need not be read.
         """
         read, client = self._read_velocity, self._client
         self._dt, self._velocities_before = dt, self.velocities
@@ -161,10 +152,9 @@ class Probe:
     def result(self, t: int, h: float) -> dict[str, Vector]:
         """Return force or wrench, and work, at the end `t` (ns) of a step of `h` seconds.
 
-        Raises SessionError if they are not finite.
+        Raises SessionError for non-finite values.
 
-        A wrench acts at the centre of its sphere: its torque is zero, as the sphere does not resist being
-        turned.
+        A wrench acts at the centre of the sphere, without torque: the sphere does not resist rotation.
         """
         self._stretch(h, 0.0)
         if self.sub_grid is not None:
@@ -203,7 +193,7 @@ class Probe:
     def _stretch(self, tau: float, ahead: float) -> None:
         """Set spring and damper `tau` seconds into the step.
 
-        The proxies are taken where they will be `ahead` seconds from now.
+        The proxies are predicted `ahead` seconds from now.
         """
         self.targets, velocities = self._motion(tau)
         springs, dampers = self._springs, self._dampers
@@ -240,7 +230,7 @@ class Probe:
         self._placed = True
 
     def _sphere(self, radius: float) -> int:
-        """Create a proxy of `radius` (m); return its number."""
+        """Create a proxy of `radius` (m); return the number in Bullet."""
         import pybullet as bullet
 
         client = self._client

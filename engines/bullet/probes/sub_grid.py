@@ -1,11 +1,11 @@
-"""A spring in series with the virtual coupling: the compliance that a coarse mesh lacks under a small sphere.
+"""A spring in series with the virtual coupling: the missing compliance of a coarse mesh under a small sphere.
 
-Where a sphere of a few millimetres presses a mesh with edges of as many, the mesh cannot form the dent, and
-its force is a multiple of the tissue's. The missing yield is known: the tissue's at a force is that of a
-half-space (`elasticity/half_space.py`) and of what the other boundaries of the body change
-(`elasticity/compliance.py`); the mesh's own is that of its linear compliance at the place, times a ratio that
-is measured while it is pressed. Their difference is a nonlinear spring along the normal of the surface, in
-series with spring and damper of the coupling. See docs/decisions/0086-force-of-tissue.md.
+Under a sphere as small as the edges of the mesh, the mesh cannot form the dent, and the force is a multiple
+of the tissue's. The missing yield is known: the tissue's yield at a force is the half-space's
+(`elasticity/half_space.py`) with the effect of the other boundaries of the body (`elasticity/compliance.py`);
+the mesh's own yield is the linear compliance at the place, times a ratio measured during the press. The
+difference is a nonlinear spring along the normal of the surface, in series with spring and damper of the
+coupling. See docs/decisions/0086-force-of-tissue.md.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from schemas.vectors import Vector
 __all__ = ["SubGrid", "Surface"]
 
 _GRID = 160
-"""Points of the spring's law; they are close together at small forces, where it is steep."""
+"""Number of points of the spring's law, dense at small forces with a steep law."""
 
 _GRID_DEPTH = 4.0
-"""Depth in radii up to which the law goes on; beyond the table with its last share of Hertz's force."""
+"""Largest depth of the law, in radii; beyond the table with the last share of Hertz's force."""
 
 _NEAR_M = 1e-3
 """How far before the surface the spring is ready, beside the way of two readings."""
@@ -41,16 +41,16 @@ _FILTER = 0.2
 """Share of the way to a measured value gone at each reading: a time constant of 36 ms."""
 
 _LEAST_FORCE_N = 5e-3
-"""Below this the inertia of the touched nodes counts in what the mesh yields."""
+"""Least force for a measured ratio: below, the inertia of the touched nodes matters."""
 
 _SPREAD_POWER, _MOST_SPREAD = 2.0 / 3.0, 2.0
-"""How the force spreads from the face that is touched first to those around it: with this power of the force,
-as a contact of Hertz's grows, up to this multiple of the force at which the parts are known.
+"""Spreading of the force from the first touched face to its neighbours: power of the force (growth of a
+Hertzian contact), and limit as a multiple of the force with known parts.
 """
 
 _RIM_BEGINS, _RIM_ENDS = 1.0, 1.6
 """Distances from a rim, in radii: up to the first the law is a quarter-space's, from the second on a
-half-space's, whose error there is 5 % (docs/decisions/0095-converged-truth.md).
+half-space's, with an error of 5 % there (docs/decisions/0095-converged-truth.md).
 """
 
 _RATIOS = (0.2, 2.0)
@@ -58,10 +58,10 @@ _RATIOS = (0.2, 2.0)
 
 
 class Surface:
-    """The surface of an anchored organ at rest under its weight, and its compliance."""
+    """The surface of an anchored organ at rest under its weight, with compliance."""
 
     def __init__(self, organ: Organ, material: Material) -> None:
-        """Take an organ that has settled."""
+        """`organ`: a settled organ."""
         self.organ, self.material = organ, material
         self.settled = organ.nodes
         """m, shape (n, 3)."""
@@ -74,21 +74,21 @@ class _Place:
 
     surface: Surface
     nodes: Indices
-    """Of the faces, shape (k,)."""
+    """Nodes of the faces, shape (k,)."""
     parts: Vector
-    """Of the force that fall to each, shape (k,); they sum to 1."""
+    """Parts of the force on each node, shape (k,), with sum 1."""
     first_parts: Vector
-    """The same where the force begins: the sphere has not sunk in and touches one face, shape (k,)."""
+    """Parts at the beginning of the force: the sphere touches a single face, shape (k,)."""
     point: Vector
-    """Of the settled surface, m, shape (3,)."""
+    """Point of the settled surface, m, shape (3,)."""
     inward: Vector
-    """Its normal into the tissue, shape (3,)."""
+    """Normal of the surface into the tissue, shape (3,)."""
     distance: float
-    """Of the sphere's centre from the nearest face, m."""
+    """Distance of the sphere's centre from the nearest face, m."""
 
 
 class SubGrid:
-    """The spring of one sphere: how far it has yielded, and its law where the sphere is."""
+    """The spring of a sphere: present yield, and law at the sphere's place."""
 
     def __init__(self, radius: float, coupling: Coupling, surfaces: Sequence[Surface]) -> None:
         self._radius, self._coupling, self._surfaces = radius, coupling, surfaces
@@ -97,9 +97,9 @@ class SubGrid:
         self.yielded = 0.0
         """How far the spring is compressed, m."""
         self.inward = np.zeros(3)
-        """Its direction, in `world`, shape (3,); zeros: it is rigid, as nothing is near."""
+        """Direction of the spring in `world`, shape (3,); zeros: rigid, away from tissue."""
         self.ratio = 1.0
-        """What the mesh yields, over its linear compliance times the force."""
+        """Yield of the mesh over linear compliance times force."""
         self.is_beyond = False
         """Whether the sphere has been deeper than `DEEPEST` radii: there the law is extrapolated."""
         self._speed: float = 0.0  # of the yield, m/s
@@ -109,16 +109,16 @@ class SubGrid:
 
     @property
     def state(self) -> Vector:
-        """Yield and its speed, direction, ratio, and the last point of the law, shape (8,)."""
+        """Yield, speed of the yield, direction, ratio, and the last point of the law, shape (8,)."""
         last = self._forces[-1], self._yields[-1]
         return np.array([self.yielded, self._speed, *self.inward, self.ratio, *last])
 
     def give_way(self, spring: Vector, damper: Vector, since: float, *, keep: bool) -> None:
-        """Take from the forces (N, shape (3,)) of a rigid coupling what the spring in series spares them.
+        """Reduce the forces (N, shape (3,)) of a rigid coupling by the yield of the spring in series.
 
-        since: s since its yield was last kept. The yield s follows from S(s) = k (e - s) + b (e' - s'), with
-        the law S, the stretch e along the normal, and s' = (s - s_before) / since. A law that has just been
-        taken keeps s': if it kept s, its force would leap.
+        since: time since the yield was last kept, s. The yield s follows from S(s) = k (e - s) + b (e' - s'),
+        with the law S, the stretch e along the normal, and s' = (s - s_before) / since. A new law keeps s':
+        keeping s would make the force leap.
         """
         coupling, inward = self._coupling, self.inward
         rate = 0.0 if self._is_new else coupling.damping / since
@@ -140,12 +140,12 @@ class SubGrid:
         return self._radius + _NEAR_M + 2e-9 * CONTACT_PERIOD_NS * float(np.sqrt(velocity @ velocity))
 
     def update(self, centre: Vector, force: Vector, near: Sequence[NearFaces]) -> None:
-        """Take the law of the place where the sphere is; the organs' nodes have just been read.
+        """Set the law of the sphere's place; the organs' nodes have just been read.
 
         Args:
-            centre: of the sphere, m, in `world`, shape (3,).
-            force: of the coupling on it, N, shape (3,).
-            near: the faces in its `sight`, of each surface.
+            centre: centre of the sphere, m, in `world`, shape (3,).
+            force: force of the coupling on the sphere, N, shape (3,).
+            near: faces in the sphere's `sight`, of each surface.
         """
         places = [
             (self._place(surface, faces), forces)
@@ -167,9 +167,9 @@ class SubGrid:
         return list(zip(self._surfaces, self._half_spaces, strict=True))
 
     def _at_rim(self, place: _Place, centre: Vector) -> _Place:
-        """Take the forces of a quarter-space where a rim is near, and pass to those of a half-space.
+        """Set the forces of a quarter-space near a rim, with a transition to a half-space.
 
-        Return the place with the direction in which the sphere presses a rim.
+        Return the place with the sphere's direction of pressing on a rim.
         """
         surface, radius = place.surface, self._radius
         self._rim = 0.0
@@ -205,9 +205,9 @@ class SubGrid:
         return between
 
     def _missing(self, place: _Place, between: Vector, pressed: float) -> Vector:
-        """Return by force the body's depth less what mesh and coupling yield, m, shape (`_GRID`,).
+        """Return the body's depth less the yield of mesh and coupling, m, by force, shape (`_GRID`,).
 
-        `pressed`: the force (N) at which the parts are those of now.
+        `pressed`: force of the present parts, N.
         """
         forces, first, more = self._forces, place.first_parts, place.parts - place.first_parts
         spread = np.minimum(forces / pressed, _MOST_SPREAD) ** _SPREAD_POWER
@@ -223,7 +223,7 @@ class SubGrid:
         return np.maximum.accumulate(np.maximum(missing, 0.0))
 
     def _place(self, surface: Surface, near: NearFaces) -> _Place:
-        """Return where the sphere is that is near these faces."""
+        """Return the place of the sphere near these faces."""
         _, faces, weights, distances = near
         share = np.maximum(self._radius + BAND_M - distances, 0.0)
         if not share.any():
