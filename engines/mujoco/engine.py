@@ -1,8 +1,7 @@
 """The MuJoCo engine: dVRK arms, objects, power bonds at instruments, and exact checkpoints.
 
 A sub-step is `mj_step2` (actuation to integration) followed by `mj_step1` (kinematics, velocities, sensors):
-the same work as `mj_step`, in the order that leaves every output at the end of the step instead of one
-sub-step behind.
+the same work as `mj_step`, in an order with every output at the end of the step instead of a sub-step behind.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ __all__ = ["MujocoEngine"]
 
 
 class _Keeper(Protocol):
-    """A part with a state of its own, which MuJoCo's does not contain."""
+    """A part with state beyond MuJoCo's."""
 
     @property
     def state(self) -> Vector: ...
@@ -60,7 +59,7 @@ class MujocoEngine(Stepped):
     def ports(self) -> tuple[Port, ...]:
         """Commands and measured state of every arm, `qpos` of the whole model, and the state of every object.
 
-        The state of an object is its pose, who holds it, its slip, turn and lift.
+        The state of an object: pose, holding arm, slip, turn and lift.
         """
         return scene_ports(self.params)
 
@@ -68,8 +67,8 @@ class MujocoEngine(Stepped):
     def bonds(self) -> tuple[BondSide, ...]:
         """The sphere of every palpation probe, `<arm>/probe`, and the contact spheres of instruments.
 
-        The latter are called `<arm>/contact`; positions are those of the spheres' centres, in the world.
-        Of needles, `<needle>/wire` is base, middle and tip.
+        Contact spheres are called `<arm>/contact`; positions are the spheres' centres, in the world. Of
+        needles, `<needle>/wire` is base, middle and tip.
         """
         return tuple(
             side.model_copy(update={"effective_mass": self._effective_mass.get(side.name)})
@@ -193,9 +192,9 @@ class MujocoEngine(Stepped):
             self._outputs.update(wire.outputs)
 
     def _feel_needles(self) -> None:
-        """Give what a bond does to a held needle to the arm that holds it, as `tip_wrench`.
+        """Give the bond's force on a held needle to the holding arm, as `tip_wrench`.
 
-        It comes through the jaws, so it is taken out of the arm's `rigid_wrench`.
+        The force comes through the jaws, so the arm's `rigid_wrench` is less by as much.
         """
         for wrench in self._untouched:
             wrench[:] = 0.0
@@ -205,9 +204,9 @@ class MujocoEngine(Stepped):
                 self._rigid.give(arm, wire.wrench, self._felt[arm])
 
     def _what_is_state(self) -> int:
-        """Return which parts of MuJoCo's data are state.
+        """Return the parts of MuJoCo's data to hash and save.
 
-        Applied forces are left out where there is no bond: they stay 0, and are half of the numbers.
+        Applied forces are left out without bonds: half of the numbers, all 0.
         """
         state = self._mujoco.mjtState
         applied = int(state.mjSTATE_QFRC_APPLIED | state.mjSTATE_XFRC_APPLIED)
@@ -235,7 +234,7 @@ class MujocoEngine(Stepped):
         return self._outputs
 
     def _place(self, inputs: Inputs) -> None:
-        """Put objects where events want them."""
+        """Put objects where events say."""
         from engines.mujoco.interaction.placing import place
 
         for thing in self.params.objects:
@@ -243,9 +242,9 @@ class MujocoEngine(Stepped):
                 place(self._model, self._data, thing, cast("PoseStamped", message))
 
     def _sub_steps(self, count: int) -> None:
-        """Take sub-steps between which nothing is read or renewed, but for the last one's `mj_step1`.
+        """Take sub-steps without reading or renewing between, all but the last `mj_step1`.
 
-        Sensors are computed in the last one alone.
+        Sensors are computed in the last sub-step alone.
         """
         model, data, option = self._model, self._data, self._model.opt
         self._mujoco.mj_step2(model, data)
@@ -258,7 +257,7 @@ class MujocoEngine(Stepped):
             self._mujoco.mj_step(model, data)
 
     def _coupled_sub_steps(self, h: int, inputs: Inputs) -> None:
-        """Take the sub-steps of `h` nanoseconds, and sum what bonds and contacts do in them."""
+        """Take the sub-steps of `h` nanoseconds, and sum the effects of bonds and contacts."""
         for touching in self._touching:
             touching.begin(inputs)
         if self._at_once and not self._renewed:
@@ -276,7 +275,7 @@ class MujocoEngine(Stepped):
             self._feel_needles()
 
     def _watched_sub_steps(self, h: int) -> None:
-        """Take the sub-steps of `h` nanoseconds; between them renew bonds, and sum what contacts do."""
+        """Take the sub-steps of `h` nanoseconds; renew bonds, and sum forces of contacts in between."""
         model, data, step1, step2 = self._model, self._data, self._mujoco.mj_step1, self._mujoco.mj_step2
         add_rigid = (lambda: None) if self._rigid is None else self._rigid.add
         for tau in range(0, h, self.params.timestep):
@@ -316,7 +315,7 @@ class MujocoEngine(Stepped):
         return state_hash(self._state)
 
     def save(self) -> bytes:
-        """Return MuJoCo's integration state and the state of the other parts.
+        """Return MuJoCo's integration state and the state of all parts.
 
         MuJoCo's is `mjSTATE_INTEGRATION`, with applied forces only where there are bonds.
         """
@@ -324,7 +323,7 @@ class MujocoEngine(Stepped):
         return self._state.tobytes()
 
     def restore(self, state: bytes) -> None:
-        """Return to a saved state, bit for bit. Raises StateError if it does not fit this model."""
+        """Return to a saved state, bit for bit. Raises StateError if the state does not fit this model."""
         if len(state) != self._state.nbytes:
             raise StateError(
                 f"participant '{self.name}': a saved state of {len(state)} bytes, this model's has"

@@ -68,7 +68,7 @@ class _Wire(_Object):
 
 
 class RingParams(_Wire):
-    """A torus; its frame is in the middle, z along the axis."""
+    """A torus; frame in the middle, z along the axis."""
 
     kind: Literal["ring"]
     radius: Length = Field(default=8e-3, gt=0.0, description="of the centre line")
@@ -84,9 +84,9 @@ class RingParams(_Wire):
 class NeedleParams(_Wire):
     """A round wire bent to an arc.
 
-    Its frame is in the arc's centre, z normal to its plane, x to the middle of the wire. The default is the
-    needle of unina-icaros/dvrk-vrep (dVRK-suturing.ttt): an arc of 180.9 degrees, centre line 11.44 mm, wire
-    0.8 mm.
+    Frame in the arc's centre, z normal to the plane of the arc, x to the middle of the wire. The default is
+    the needle of unina-icaros/dvrk-vrep (dVRK-suturing.ttt): an arc of 180.9 degrees, centre line 11.44 mm,
+    wire 0.8 mm.
     """
 
     kind: Literal["needle"]
@@ -111,7 +111,7 @@ class NeedleParams(_Wire):
     @model_validator(mode="before")
     @classmethod
     def _named_wire(cls, given: Any) -> Any:
-        """Take the measures of the named needle where none are given; what is not a name is refused later."""
+        """Fill in the measures of the named needle; a value of another type is refused later."""
         if not isinstance(given, dict):
             return given
         stated = cast("dict[str, Any]", given)
@@ -130,9 +130,9 @@ class NeedleParams(_Wire):
 
 
 class BlockParams(_Object):
-    """A box; its frame is in the middle.
+    """A box; frame in the middle.
 
-    The default size is that of the small objects in unina-icaros/dvrk-vrep, dVRK-training_pick&place.ttt.
+    Default size: the small objects in unina-icaros/dvrk-vrep, dVRK-training_pick&place.ttt.
     """
 
     kind: Literal["block"]
@@ -147,25 +147,25 @@ class PieceParams(_Object):
 
 
 class TriangleParams(_Object):
-    """A triangular ring of a peg board; its frame is in the middle, z along its axis, y to a corner."""
+    """A triangular ring of a peg board; frame in the middle, z along the axis, y to a corner."""
 
     kind: Literal["triangle"]
     ring: BoardName = Field(description="the board that it belongs to, which states its measures")
 
     @property
     def measures(self) -> Ring:
-        """Its measures, mass and friction."""
+        """Measures, mass and friction."""
         return BOARDS[self.ring].ring
 
 
 ObjectParams = Annotated[
     RingParams | NeedleParams | BlockParams | PieceParams | TriangleParams, Field(discriminator="kind")
 ]
-"""One thing that can be moved."""
+"""A movable object."""
 
 
 class TableParams(Params):
-    """A fixed slab with a level top. The default size is that of all scenes of unina-icaros/dvrk-vrep."""
+    """A fixed slab with a level top. Default size: as in all scenes of unina-icaros/dvrk-vrep."""
 
     position: tuple[Length, Length, Length] = Field(description="of the middle of its top in the world")
     size: tuple[_Side, _Side, _Side] = Field(default=(0.4972, 0.6952, 0.02), description="along x, y and z")

@@ -1,4 +1,4 @@
-"""Parameters of the MuJoCo engine: the scene, and how it is stepped.
+"""Parameters of the MuJoCo engine: scene and stepping.
 
 Lengths in m, angles in rad, quaternions (x, y, z, w), poses in the world unless a field says otherwise.
 """
@@ -34,7 +34,7 @@ class _SetupJoints(TypedDict, total=False):
 
 
 def _validated_as(form: Any) -> GetPydanticSchema:
-    """Validate a mapping by `form`, in which each key has a type of its own."""
+    """Validate a mapping by `form`, with a type for each key."""
     return GetPydanticSchema(lambda _source, handler: handler(form))
 
 
@@ -49,7 +49,7 @@ def _object_names(objects: Mapping[str, ObjectParams]) -> Mapping[str, ObjectPar
 
 
 class SceneParams(Params):
-    """What stands where: arms of a da Vinci Research Kit, a table and things to hold."""
+    """A scene: arms of a da Vinci Research Kit, a table, fixtures and objects."""
 
     model: Literal["dvrk"] = "dvrk"
     arms: Annotated[dict[CartArm, MountedPsm | MountedEcm], _validated_as(MountedArms), Field(min_length=1)]
@@ -124,7 +124,7 @@ class SceneParams(Params):
 
 
 class MujocoParams(SceneParams):
-    """A scene, and how it is stepped."""
+    """A scene and stepping."""
 
     open_to_pages: ClassVar[bool] = True
 

@@ -1,4 +1,4 @@
-"""The ports of the MuJoCo engine, with CRTK's names where CRTK has one."""
+"""The ports of the MuJoCo engine, with CRTK's names where there are any."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _MODES = (
     " without gravity compensation"
 )
 WIRE = "wire"
-"""Name of a needle's bond at three points of its wire."""
+"""Name of a needle's bond at three points of the wire."""
 _FREE_BODY = 7
 """Position and quaternion."""
 
 
 def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
-    """Return all ports but those of bonds."""
+    """Return all ports but the ports of bonds."""
     slow = params.publish_period
     ports = [
         port
@@ -136,7 +136,7 @@ def _object_ports(thing: str, slow: int) -> Iterator[Port]:
 def position_count(scene: SceneParams) -> int:
     """Return the size of `qpos`, without building the model.
 
-    It has the joints, linkage and end effector of every arm, then the pose of every object.
+    The joints, linkage and end effector of every arm, then the pose of every object.
     """
     count = _FREE_BODY * len(scene.objects)
     for name, arm in scene.arms.items():

@@ -31,8 +31,8 @@ __all__ = ["ENDOSCOPE_MASS", "SHAFT_MASS", "ecm", "instrument", "psm"]
 SHAFT_MASS = 0.0117201
 """Mass of an instrument's shaft, kg, as modelled in unina-icaros/dvrk-vrep (body L1_respondable_TOOL1)."""
 _YAW_LINK_MASS = 6.63661e-6
-"""kg of what turns with the wrist yaw beside the fingers (dvrk_env tool_lnd.urdf.xacro, CAD of the large
-needle driver, for all).
+"""Mass of the wrist yaw link without fingers, kg (dvrk_env tool_lnd.urdf.xacro, CAD of the large needle
+driver, for all).
 """
 ENDOSCOPE_MASS: Mapping[str, float] = MappingProxyType(
     {"Classic_SD": 1.5, "Classic_HD": 2.5, "Si_HD": 1.8, "Custom": 0.8, "none": 0.1}
@@ -86,9 +86,9 @@ _ECM_CAD = {
     "pitch_bottom": (0.35928, (0.0, -0.2975, 0.3135), (0.050, 0.408, 0.074)),
     "pitch_top": (0.43851, (0.0, -0.2787, 0.3242), (0.012, 0.358, 0.018)),
 }
-"""By link: mass, centre (dvrk_env, CAD, carried from the link's frame to the base frame), and the size of its
-mesh (jhu-dvrk/dvrk_model, bounds): the tensors that the CAD exports are zero or no body's, so a uniform box
-of that size stands in.
+"""Mass by link, centre (dvrk_env, CAD, carried from the link's frame to the base frame), and size of the mesh
+(jhu-dvrk/dvrk_model, bounds): the tensors of the CAD are zero or no body's, so a uniform box of this size
+stands in.
 """
 
 

@@ -1,4 +1,4 @@
-"""The kinematics of any arm of the da Vinci Research Kit by its name."""
+"""The kinematics of any arm of the da Vinci Research Kit by name."""
 
 from __future__ import annotations
 

@@ -33,13 +33,13 @@ _INSERTION = 2
 
 @dataclass(frozen=True)
 class Cannula:
-    """The rule for one arm. Depths count from the RCM, m, inwards."""
+    """The rule for an arm. Depths count from the RCM, m, inwards."""
 
     what: str
     offset: float
-    """What the depth is more than the insertion."""
+    """Depth beyond the insertion."""
     start: float
-    """Least depth at which Cartesian control begins."""
+    """Least depth for Cartesian control to begin."""
     safe: float
     """Least depth of a goal."""
 

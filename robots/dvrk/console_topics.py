@@ -104,7 +104,7 @@ TELEOPERATION = Topics(
         "set_align_MTM": _BOOL,
     },
 )
-"""Of one component, such as `MTMR_PSM1`."""
+"""Topics of a component, such as `MTMR_PSM1`."""
 
 PARTS = {"system": SYSTEM, "console": CONSOLE, "footpedals": PEDALS, "SUJ": SETUP_JOINTS}
 """What there is once, by the first part of its topics' names."""

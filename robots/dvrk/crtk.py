@@ -116,7 +116,7 @@ EVENTS = {
     "warning": StringMessage.ros_type,
     "status": StringMessage.ros_type,
 }
-"""From every arm."""
+"""Events of every arm."""
 
 PSM_COMMANDS = {
     "set_tool_type": StringMessage.ros_type,
@@ -145,7 +145,7 @@ MTM_EVENTS = {
     "gripper/closed": BoolMessage.ros_type,
     "orientation_locked": BoolMessage.ros_type,
 }
-"""Of one kind of arm alone, beside `COMMANDS` and `EVENTS`."""
+"""Topics of a kind of arm alone, beside `COMMANDS` and `EVENTS`."""
 
 SETUP_JOINT_COMMANDS = {
     "state_command": StringStamped.ros_type,
@@ -158,7 +158,7 @@ SETUP_JOINT_EVENTS = {
     "warning": StringMessage.ros_type,
     "status": StringMessage.ros_type,
 }
-"""Of the setup joints that carry an arm, under `SUJ/<arm>/`."""
+"""Topics of the setup joints under an arm, under `SUJ/<arm>/`."""
 
 MEASURED: tuple[Literal["position", "velocity", "effort"], ...] = ("position", "velocity", "effort")
 """What `measured_js` and `setpoint_js` state of every joint."""
@@ -204,7 +204,7 @@ def reference_frame(arm: str, arms: Collection[str], mounting: Mounting, referen
     cart.
 
     Args:
-        arm: its name, such as `PSM1`.
+        arm: name, such as `PSM1`.
         arms: the names of all arms that are there; without an ECM there is no camera to refer to.
         mounting: how the arms stand.
         reference: what the scenario refers to.
@@ -224,7 +224,7 @@ def frame_of(arm: str, state: str, reference: str) -> str:
     the reference.
 
     Args:
-        arm: its name, such as `PSM1`.
+        arm: name, such as `PSM1`.
         state: name of the state.
         reference: `frame_id` of states that are not `local/` (`reference_frame`).
     """
@@ -233,15 +233,15 @@ def frame_of(arm: str, state: str, reference: str) -> str:
 
 
 def is_ready(message: OperatingState) -> bool:
-    """Say whether an arm in this operating state executes motion commands."""
+    """Return whether an arm in this operating state executes motion commands."""
     return message.state == "ENABLED" and message.is_homed
 
 
 def is_stream(command: str) -> bool:
-    """Say whether a command is one of a stream: `servo_jp`, `body/servo_cf`, `jaw/servo_jp`."""
+    """Return whether a command is one of a stream: `servo_jp`, `body/servo_cf`, `jaw/servo_jp`."""
     return command.rpartition("/")[2].startswith("servo_")
 
 
 def is_move(command: str) -> bool:
-    """Say whether a command starts a trajectory to a goal: `move_jp`, `jaw/move_jp`."""
+    """Return whether a command starts a trajectory to a goal: `move_jp`, `jaw/move_jp`."""
     return command.rpartition("/")[2].startswith("move_")

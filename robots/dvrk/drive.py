@@ -1,4 +1,4 @@
-"""The drive of one joint, and a disc of an instrument that turns several joints.
+"""The drive of a joint, and a disc of an instrument, coupled to several joints.
 
 Sources: SAW = jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68), share/pid/sawControllersPID-PSM.json. SI
 units, radians.
@@ -22,7 +22,7 @@ SMOOTHING = 50.0
 JAW_COLUMN = 3
 """Column of the jaw in `disc_shares`, after roll, wrist pitch and wrist yaw."""
 _ROUNDING = 1e-9
-"""Turn of a disc below which it does not turn with a joint at all."""
+"""Turn of a disc below this is rounding."""
 
 _STIFFNESS, _DAMPING = 6.0, 0.09
 """N m/rad, N m s/rad of all four discs (SAW)."""
@@ -35,16 +35,16 @@ WPI-AIM/dvrk_dynamics_identification finds negative ones); this is the value tha
 
 @dataclass(frozen=True)
 class Drive:
-    """The drive of one joint; rad, N m and kg m^2, or m, N and kg."""
+    """The drive of a joint; rad, N m and kg m^2, or m, N and kg."""
 
     stiffness: float
     """Proportional gain of the servo."""
     damping: float
     """Derivative gain, on the error of the velocity."""
     viscous_friction: float
-    """Effort per velocity; 0 where the discs hold it."""
+    """Effort per velocity; 0 where the discs have the friction."""
     coulomb_friction: float
-    """Effort; 0 where the discs hold it."""
+    """Effort; 0 where the discs have the friction."""
     elasticity: float
     """Effort per position: the joint asks for elasticity * q + offset."""
     offset: float
@@ -59,13 +59,13 @@ class Drive:
     static_friction: float = 0.0
     """Effort at rest beyond Coulomb's friction (Stribeck)."""
     stribeck_velocity: float = inf
-    """Velocity at which static friction has fallen to 1/e."""
+    """Velocity of a fall of static friction to 1/e."""
 
     @classmethod
     def of_disc(
         cls, share: float, effort: float, velocity: float, elasticity: float = 0.0, offset: float = 0.0
     ) -> Drive:
-        """Return the drive of a joint that discs turn.
+        """Return the drive of a joint turned by discs.
 
         Args:
             share: sum over the discs of the square of their turn (rad) for a unit of the joint.
@@ -80,7 +80,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Disc:
-    """One disc of an instrument: it turns by the sum over the joints of share * position; rad, N m."""
+    """A disc of an instrument: turn = sum over the joints of share * position; rad, N m."""
 
     shares: Mapping[str, float]
     viscous_friction: float
@@ -93,7 +93,7 @@ class Disc:
 def disc_shares(actuator_to_joint: Vector) -> Vector:
     """Return the turn of each disc for a radian of each joint, shape (disc, joint).
 
-    It is the inverse of SAW's matrix from discs to joints: roll, wrist pitch, wrist yaw, jaw.
+    The inverse of SAW's matrix from discs to joints: roll, wrist pitch, wrist yaw, jaw.
     """
     shares = np.linalg.inv(actuator_to_joint)
     return np.where(np.abs(shares) > _ROUNDING, shares, 0.0)

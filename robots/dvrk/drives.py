@@ -1,6 +1,6 @@
 """The drives of PSM and ECM: servo, friction, elasticity, rotor inertia and limits of every joint.
 
-It also has what compensates for the losses.
+The friction is here too, for compensation.
 
 Sources: SAW = jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68), share/pid/sawControllersPID-{PSM,ECM}.json;
 FONT = gafontanelli/DVRK-dynamicModel (commit 51c55d75), PSM_robot.cpp with PSM1_param.txt. SI units, radians.
@@ -36,7 +36,7 @@ _ARM = {
 _DISC_FRICTION = ((0.0013, 0.0077), (0.0104, 0.0198), (0.0047, 0.0152), (0.0061, 0.0081))
 """Fv, Fs of the four discs (FONT, motors 4 to 7)."""
 _COLUMNS = ("roll", "wrist_pitch", "wrist_yaw")
-"""Joints by column of `disc_shares`, before the jaw; both pitch joints of a snake add up to its pitch."""
+"""Joints by column of `disc_shares`, before the jaw; both pitch joints of a snake add up to a pitch."""
 _ROLL_ELASTICITY, _ROLL_OFFSET = 0.0025, 0.0038
 """N m/rad, N m at the joint (FONT, K4 and O4)."""
 
@@ -50,7 +50,7 @@ _ECM_GAINS = {
 
 
 def psm(tool: Instrument) -> Mapping[str, Drive]:
-    """Return the drives of a PSM with `tool` by joint, then those of its end effector by motor."""
+    """Return the drives of a PSM with `tool` by joint, then of the end effector by motor."""
     drives = {
         joint.name: Drive(*_ARM[joint.name], 0.0, joint.effort, joint.velocity)
         for joint in psm_arm.ARM_JOINTS
@@ -65,7 +65,7 @@ def psm(tool: Instrument) -> Mapping[str, Drive]:
 
 
 def discs(tool: Instrument) -> tuple[Disc, ...]:
-    """Return the discs that turn roll, wrist and jaw of `tool`."""
+    """Return the discs of roll, wrist and jaw of `tool`."""
     columns = {joint.name: _column(joint.name) for joint in tool.joints}
     for motor in tool.end_effector.motors:
         if motor.kind == "disc":
@@ -84,8 +84,8 @@ def _column(joint: str) -> int:
 def _of_ecm() -> Mapping[str, Drive]:
     """Return the drives of an ECM by joint.
 
-    No friction is published: it is taken to be the same share of the largest effort as in the PSM's joint of
-    that name.
+    No friction is published: the same share of the largest effort as in the PSM's joint of the same name
+    stands in.
     """
     # of disc 1 at the joint of a needle driver 400006
     friction_of_roll = np.array(_DISC_FRICTION[0]) * [0.6397**2, 0.6397]
@@ -111,7 +111,7 @@ def friction(
 ) -> dict[str, float]:
     """Return the friction (N m, N) by joint at the velocities `dq`, as FONT has it: smooth around zero.
 
-    Of an identified arm it may be larger at rest (Stribeck).
+    For an identified arm friction at rest may be larger (Stribeck).
 
     Args:
         drives: by joint.

@@ -35,10 +35,7 @@ _INSTANT = 1e-4
 
 
 class _Motion(NamedTuple):
-    """How a body moves against its parent.
-
-    It moves by `ratio` times joint `joint` along `twist`, shape (4, 4), in the base frame at q = 0.
-    """
+    """Motion of a body against its parent: `ratio` times `joint` along `twist`, (4, 4), base frame, q = 0."""
 
     parent: int
     joint: int
@@ -53,9 +50,9 @@ class Dynamics:
     def __init__(
         self, chain: SerialChain, bars: Linkage, bodies: Mapping[str, Inertia], rotors: Vector
     ) -> None:
-        """Take kinematics, linkage, bodies by link, and the inertia of the drives at the joints, shape (n,).
+        """`rotors`: inertia of the drives at the joints, shape (n,).
 
-        A body that is neither a joint's nor the linkage's (a finger of the jaw) moves with the last link.
+        A body beside joints and linkage (a finger of the jaw) moves with the last link.
         """
         self._chain, self._joints = chain, len(chain.joints)
         self._rotors = np.diag(rotors)

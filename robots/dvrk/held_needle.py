@@ -8,7 +8,7 @@ to the right (clockwise, seen along the shaft) drives it on: forehand; at +90 de
 way: backhand. Its own frame has the origin in the arc's centre, x to the middle of the wire and z normal to
 its plane, so that a turn about z drives it on.
 
-Seven joints for six coordinates: of the rolls on a lattice over the range, that is taken from which the
+Seven joints for six coordinates: of the rolls on a lattice over the range, taken from which the
 joints are farthest from their limits, as the sum of ((q - middle) / half range)^2 counts it (Liegeois,
 "Automatic supervisory control of the configuration and behavior of multibody mechanisms", IEEE Transactions
 on Systems, Man, and Cybernetics 7(12), 1977).
@@ -38,18 +38,16 @@ _STEP = radians(15.0)
 
 @dataclass(frozen=True)
 class Needle:
-    """A wire bent to an arc: that of unina-icaros/dvrk-vrep (dVRK-suturing.ttt)."""
+    """A wire bent to an arc, as in unina-icaros/dvrk-vrep (dVRK-suturing.ttt)."""
 
     radius: float = 11.44e-3
-    """Of the centre line, m."""
+    """Radius of the centre line, m."""
     arc: float = radians(180.9)
-    """From end to end, rad; the tip is the end towards which a positive turn about z drives it."""
+    """Arc from end to end, rad; a positive turn about z drives the tip ahead."""
 
 
 def chain(tool: Instrument, needle: Needle, held: float) -> SerialChain:
     """Return the kinematics from `<arm>_base` to the frame of `needle`, along seven joints.
-
-    The needle is held at the angle `held` (rad) behind its tip.
 
     Raises MotionError if `tool` has no rolling jaw or the needle does not reach so far.
     """

@@ -22,9 +22,9 @@ _G = 9.81
 """m/s^2, as in FONT."""
 
 INSERTION_MASS = 0.2377
-"""kg that go down with the insertion, instrument included (mass5)."""
+"""Mass moving down with the insertion, instrument included, kg (mass5)."""
 COUNTERWEIGHT_MASS = 0.179
-"""kg that go up with the insertion (mass9)."""
+"""Mass moving up with the insertion, kg (mass9)."""
 
 _SLIDING = INSERTION_MASS + COUNTERWEIGHT_MASS
 _SLIDING_MOMENT = -0.01381624
@@ -45,12 +45,12 @@ _PITCH_INSERTION = 0.033
 """kg m (mpx5)."""
 
 _YAW_MOMENT = (0.010492589, 0.009989)
-"""kg m: first moment that turns with the yaw alone, along -z and across (mpy3 - mpx1; mpy4 + mpy5 - mpz1 -
-mpz2 - mpz3).
+"""kg m: first moment turning with the yaw alone, along -z and across (mpy3 - mpx1; mpy4 + mpy5 - mpz1 - mpz2
+- mpz3).
 """
 _PITCH_MOMENT = (0.0124121174, 0.0155191211)
-"""kg m: first moment that turns with the pitch, along the instrument and across (the terms of G in cos q2;
-mpx4 + mpx5 + mpy2).
+"""kg m: first moment turning with the pitch, along the instrument and across (the terms of G in cos q2; mpx4
++ mpx5 + mpy2).
 """
 
 _ELASTIC = ((0.135144709, 0.00726440463), (0.35571592, 0.0758960511), (0.0, 0.0), (0.0025, 0.0038))

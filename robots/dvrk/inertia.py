@@ -1,4 +1,4 @@
-"""Mass, centre and inertia tensor of one body. SI units."""
+"""Mass, centre and inertia tensor of a body. SI units."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Inertia:
     def of_rod(cls, mass: float, start: Vector, end: Vector, radius: float) -> Inertia:
         """Return the inertia of a thin tube from `start` to `end` (m), shape (3,).
 
-        Where both are one point it is the inertia of a ring without direction.
+        For `start` = `end`: the inertia of a ring without direction.
         """
         along = np.outer(end - start, end - start)
         length_squared = np.trace(along)
@@ -54,7 +54,7 @@ class Inertia:
     def pseudo_inertia(self) -> Vector:
         """Integral of r r^T over the mass, r = (x, y, z, 1), shape (4, 4).
 
-        It is positive definite if and only if a body can have this inertia.
+        Positive definite if and only if a body can have this inertia.
         """
         result = np.empty((4, 4))
         result[:3, :3] = (

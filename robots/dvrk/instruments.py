@@ -1,8 +1,8 @@
 """Instruments of the PSM: joints, tip frame, end effector, and the masses of their links. SI units, radians.
 
-The numbers of all 54 instruments that the dVRK's controller knows are in `data/instruments.json`, each with
-the file they come from; right angles are exact there. An instrument is called by its name
-(`LARGE_NEEDLE_DRIVER_400006`) or by its number alone.
+The numbers of all 54 instruments of the dVRK's controller are in `data/instruments.json`, each with the
+source file; right angles are exact there. An instrument is called by name (`LARGE_NEEDLE_DRIVER_400006`) or
+by number alone.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ _JAW_LENGTHS = {
     "205": 0.021,
     "309": 0.0155,
 }
-"""Length of jaws from the wrist yaw axis (m), by the last digits of the number, which name its type
-(jhu-dvrk/dvrk_model, urdf/common/instruments/tip; the fenestrated bipolar forceps, 205, taken as long as
-the Maryland ones, 172).
+"""Length of jaws from the wrist yaw axis (m), by the last digits of the number, the type
+(jhu-dvrk/dvrk_model, urdf/common/instruments/tip; the fenestrated bipolar forceps, 205, taken as long as the
+Maryland ones, 172).
 """
 
 _OTHER_JAW_LENGTH = _JAW_LENGTHS["049"]
-"""Length of jaws that no public model states (m): that of the Cadiere forceps."""
+"""Length of jaws without a public model (m): the length of the Cadiere forceps."""
 
 _PROBE = "palpation-probe"
 """A steel sphere centred on the tip frame in place of the jaws of a large needle driver 400006."""
@@ -69,11 +69,11 @@ ROLLING = "ROLLING_NEEDLE_DRIVER"
 
 @dataclass(frozen=True)
 class Instrument:
-    """What is mounted on the arm: joints from the shaft to the wrist, a tip, and an end effector."""
+    """A tool of the arm: joints from the shaft to the wrist, a tip, and an end effector."""
 
     name: str
     number: str
-    """Intuitive's part number, first six digits; empty for what Intuitive does not make."""
+    """Intuitive's part number, first six digits; empty for tools not made by Intuitive."""
     joints: tuple[Joint, ...]
     """Roll, wrist pitch, wrist yaw; roll and four wrist joints where the wrist is a snake; roll alone where a
     hand is in place of the wrist.
@@ -82,12 +82,12 @@ class Instrument:
     """Pose of the tip frame in the frame of the last link, shape (4, 4)."""
     end_effector: EndEffector
     actuator_to_joint: Vector
-    """Joint positions (roll, wrist pitch, wrist yaw, jaw; with a hand roll and the closings of its fingers)
-    of disc positions (rad), shape (4, 4).
+    """Joint positions (roll, wrist pitch, wrist yaw, jaw; with a hand roll and closings of the fingers) of
+    disc positions (rad), shape (4, 4).
     """
     source: str
     roll_mass: float = 3.428938e-4
-    """Mass of the link that rolls, kg (WPI-AIM/dvrk_env, tool_lnd.urdf.xacro: CAD of the large needle driver,
+    """Mass of the rolling link, kg (WPI-AIM/dvrk_env, tool_lnd.urdf.xacro: CAD of the large needle driver,
     taken for all).
     """
     pitch_mass: float = 2.491212e-4
@@ -100,29 +100,29 @@ class Instrument:
 
     @property
     def has_snake_wrist(self) -> bool:
-        """Whether it is a 5 mm instrument, with four bending joints instead of wrist pitch and yaw."""
+        """Whether the instrument is a 5 mm tool, with four bending joints instead of wrist pitch and yaw."""
         return len(self.joints) > 3
 
     @property
     def jaw(self) -> Jaw | None:
-        """The end effector, if it is a jaw, for what only a jaw can do: grasp a needle, a ring."""
+        """The end effector, if a jaw: only a jaw grasps needles and rings."""
         return self.end_effector if isinstance(self.end_effector, Jaw) else None
 
     @property
     def jaw_joints(self) -> tuple[Joint, ...]:
-        """Joints of the jaw; empty without one."""
+        """Joints of the jaw; empty without a jaw."""
         return () if self.jaw is None else self.jaw.joints
 
     @cached_property
     def spheres(self) -> tuple[ContactSphere, ...]:
-        """The spheres that touch tissue; none of a palpation probe, whose own sphere does."""
+        """Contact spheres for tissue; none for a palpation probe, a sphere by itself."""
         return self.end_effector.spheres(self.tip)
 
 
 def instrument(name: str) -> Instrument:
     """Return the instrument of this name or number.
 
-    Raises MotionError if there is none, saying which there are.
+    Raises MotionError if there is none, with a list of near names.
     """
     found = instruments().get(name) or _by_number().get(name)
     if found is None:
@@ -148,9 +148,9 @@ def instruments() -> Mapping[str, Instrument]:
 
 
 def _with_hand(name: str, hand: Hand, shaft: Instrument) -> Instrument:
-    """Return an instrument that has `hand` on the shaft of another one.
+    """Return an instrument with `hand` on the shaft of another instrument.
 
-    Its tip is the end of the straight fingers, and has at home the orientation of the other one's.
+    The tip is the end of the straight fingers, with the orientation of the other instrument's tip at home.
     """
     tip = np.diag([-1.0, -1.0, 1.0, 1.0])
     tip[2, 3] = hand.reach
@@ -195,7 +195,7 @@ def _from_data(name: str, row: dict[str, Any], data: dict[str, Any]) -> Instrume
 def _jaw_numbers(
     number: str, row: dict[str, Any], coupling: Vector
 ) -> tuple[float, float, float, float, float]:
-    """Return the numbers of the jaw that `row` describes, in the order of the fields of `Jaw`."""
+    """Return the numbers of the jaw in `row`, in the order of the fields of `Jaw`."""
     lower, upper, effort = row["jaw"]
     share = plain_sum(turn**2 for turn in disc_shares(coupling)[:, JAW_COLUMN].tolist())
     return lower, upper, effort, _JAW_LENGTHS.get(number[3:], _OTHER_JAW_LENGTH), share

@@ -39,7 +39,7 @@ from schemas.vectors import Vector
 __all__ = ["ORIENTATION_TOLERANCE", "branches", "inverse"]
 
 ORIENTATION_TOLERANCE = radians(45.0)
-"""Between the ECM's goal and the nearest orientation at its position, rad.
+"""Angle between the ECM's goal and the nearest orientation at the position, rad.
 
 The real controller (jhu-dvrk/sawIntuitiveResearchKit, robManipulatorECM.cpp) has no bound: programs command
 positions and keep the orientation. dvrk_arm_test.py of jhu-dvrk/dvrk_python moves the ECM by 40 mm along x
@@ -48,7 +48,7 @@ order are about 90 degrees away and refused.
 """
 
 _RIGID = 1e-6
-"""Largest entry of R^T R - 1 that is taken for rounding, of a pose that was written with 7 digits."""
+"""Largest entry of R^T R - 1 taken for rounding, of a pose written with 7 digits."""
 _FAR = 1e3
 """m: no arm reaches so far, and the squares of what is much further are no numbers."""
 _POINT = 1e-9
@@ -61,7 +61,7 @@ _BRANCH_SIGNS = (
     np.array([1.0, -1.0, 1.0, -1.0])[:, None, None],
     np.array([1.0, 1.0, -1.0, -1.0])[:, None, None],
 )
-"""Of x5 and of the shaft's direction, in the four branches of a PSM."""
+"""Signs of x5 and of the shaft's direction, in the four branches of a PSM."""
 _WRIST_ALPHAS = (0.0, -pi / 2, -pi / 2)
 _CHAINS = 64
 """Whose constants are kept: some times the arms of a session."""
@@ -74,12 +74,12 @@ class _Form:
     from_tip: Vector
     """Pose of the last link in the tip's frame, shape (4, 4)."""
     theta: Vector
-    """Of the joints after the insertion."""
+    """DH angles of the joints after the insertion."""
     lowest: Vector
     highest: Vector
     """Ends of the joint ranges, widened by `ANGLE_TOLERANCE`, shape (n,)."""
     middle: Vector
-    """Of the joint ranges, shape (n,)."""
+    """Middle of the joint ranges, shape (n,)."""
     numbers: tuple[Vector, Vector, Vector, Vector]
     """What the compiled function takes, with the offsets of roll, insertion and wrist yaw."""
 

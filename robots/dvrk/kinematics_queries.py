@@ -28,11 +28,11 @@ from schemas.vectors import Vector
 __all__ = ["Answer", "KinematicsQueries"]
 
 _QUATERNION_TOLERANCE = 1e-3
-"""Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
+"""Tolerance of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
 
 
 class Answer(NamedTuple):
-    """What a service returns."""
+    """Answer of a service."""
 
     value: Vector
     """Pose (x, y, z, qx, qy, qz, qw), or joint positions, shape (n,)."""
@@ -44,7 +44,7 @@ class KinematicsQueries:
     """Answers for an arm with a given instrument or endoscope; keeps no state."""
 
     def __init__(self, chain: SerialChain) -> None:
-        """Take the kinematics of a PSM or the ECM, rows in modified Denavit-Hartenberg form."""
+        """`chain`: kinematics of a PSM or the ECM, rows in modified Denavit-Hartenberg form."""
         self._chain, self._cannula = chain, Cannula.of(chain)
 
     def forward(self, jp: Vector, base: Vector | None = None) -> Answer:

@@ -1,4 +1,4 @@
-"""One moving link of an arm: its joint, and how it stands."""
+"""A moving link of an arm, with joint and pose."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["Follow", "Link", "Spring"]
 
 @dataclass(frozen=True)
 class Follow:
-    """Tie of a passive joint: its position is `ratio` times that of `joint`."""
+    """Tie of a passive joint: position = `ratio` * position of `joint`."""
 
     joint: str
     ratio: float
@@ -32,7 +32,7 @@ class Spring:
 
 @dataclass(frozen=True)
 class Link:
-    """One link, and the joint along or about its z axis that joins it to its parent."""
+    """A link, and the joint to the parent, along or about the link's z axis."""
 
     name: str
     parent: str

@@ -23,9 +23,9 @@ __all__ = ["ECM", "INSERTION_AXIS", "LINKAGES", "PITCH_AXIS", "PSM", "Linkage", 
 Point = tuple[float, float, float]
 
 PITCH_AXIS: Point = (-1.0, 0.0, 0.0)
-"""Of the pitch joint and of every pivot, in the base frame with every joint at 0."""
+"""Axis of the pitch joint and of every pivot, in the base frame with every joint at 0."""
 INSERTION_AXIS: Point = (0.0, 0.0, -1.0)
-"""Of the insertion, same frame."""
+"""Direction of the insertion, same frame."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class PassiveJoint:
     """A body of the linkage and the joint that joins it to its parent, followed one to one or in reverse."""
 
     name: str
-    """Of the body and of its joint."""
+    """Name of the body and of the joint."""
     parent: str
     follows: Literal["pitch", "insertion"]
     """The joint of the arm that decides the position of this one: a hinge follows the pitch, a slide the
@@ -74,11 +74,11 @@ _PSM_BACK = (-0.516, 0.0)
 _PSM_FRONT = (-0.420, 0.0)
 """Front pivot on the yaw link, 0.096 m before the back one."""
 _PSM_LOWER = (-0.04300, 0.14371)
-"""From the back pivot to the lower bar; also from the front pivot to it, and from the RCM to the lower bar's
-pivot on the column.
+"""Vector from the back pivot to the lower bar; also from the front pivot to it, and from the RCM to the lower
+bar's pivot on the column.
 """
 _PSM_UPPER = (-0.03912, 0.18003)
-"""From the back pivot to the upper bar; also from the RCM to the upper bar's pivot on the column."""
+"""Vector from the back pivot to the upper bar; also from the RCM to the upper bar's pivot on the column."""
 
 PSM = Linkage(
     joints=(
@@ -105,11 +105,11 @@ _ECM_FRONT = (-0.3404, 0.0)
 _ECM_BACK = (-0.37697, -0.0098)
 """Back pivot on the yaw link."""
 _ECM_LOWER = (-0.10300, 0.28681)
-"""From the front pivot to the lower bar; also from the back pivot to it, and from the RCM to the lower bar's
-pivot on the column.
+"""Vector from the front pivot to the lower bar; also from the back pivot to it, and from the RCM to the lower
+bar's pivot on the column.
 """
 _ECM_UPPER = (-0.10847, 0.32426)
-"""From the front pivot to the upper bar; also from the RCM to the upper bar's pivot on the column."""
+"""Vector from the front pivot to the upper bar; also from the RCM to the upper bar's pivot on the column."""
 
 ECM = Linkage(
     joints=(
@@ -126,4 +126,4 @@ ECM = Linkage(
 )
 
 LINKAGES: Mapping[str, Linkage] = {"PSM1": PSM, "PSM2": PSM, "PSM3": PSM, "ECM": ECM}
-"""By the arm's name."""
+"""Linkage by the arm's name."""

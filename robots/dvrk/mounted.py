@@ -1,4 +1,4 @@
-"""The arms of a patient cart as a scenario states them: where each stands, what it holds, where it starts.
+"""The arms of a patient cart in a scenario: base pose, tool and start of each arm.
 
 SI units, radians.
 """
@@ -58,7 +58,7 @@ _Published = tuple[Mapping[str, Inertia], Mapping[str, Drive], tuple[Disc, ...]]
 
 
 class MountedArm(BaseModel):
-    """One arm: where it stands unless setup joints carry it."""
+    """An arm: base pose, unless setup joints carry the arm."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -81,7 +81,7 @@ class MountedArm(BaseModel):
 
     @property
     def end_effector(self) -> EndEffector:
-        """What stands at the end of what the arm holds; nothing moves at that of an endoscope."""
+        """End effector of the arm's tool; without joints for an endoscope."""
         return EndEffector()
 
     @property
@@ -96,7 +96,7 @@ class MountedArm(BaseModel):
 
     @property
     def spheres(self) -> tuple[ContactSphere, ...]:
-        """Spheres with which the arm touches tissue."""
+        """Contact spheres for tissue."""
         return ()
 
     @property
@@ -105,7 +105,7 @@ class MountedArm(BaseModel):
 
     @property
     def _driven(self) -> list[str]:
-        """The joints that may be in a file of `dynamics`; the last one, a jaw, need not be."""
+        """Joints allowed in a file of `dynamics`; the last, a jaw, may be missing."""
         return [joint.name for joint in self.chain.joints]
 
     @field_validator("dynamics")
@@ -137,13 +137,13 @@ class MountedArm(BaseModel):
 
     @cached_property
     def bodies(self) -> Mapping[str, Inertia]:
-        """The inertia of its bodies by link, those of what it holds included."""
+        """Inertia of the bodies by link, tool included."""
         published = self._published[0]
         return published if self._own is None else self._own.bodies_of(published)
 
     @cached_property
     def drives(self) -> Mapping[str, Drive]:
-        """The drives by joint, those of the end effector by motor."""
+        """Drives by joint, and by motor of the end effector."""
         published = self._published[1]
         return published if self._own is None else self._own.drives_of(published)
 
@@ -155,7 +155,7 @@ class MountedArm(BaseModel):
 
 
 class PsmTool(BaseModel):
-    """What a patient-side manipulator holds, and where both start."""
+    """Instrument of a patient-side manipulator, and start of both."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -170,7 +170,7 @@ class PsmTool(BaseModel):
 
     @property
     def _stated(self) -> Mapping[str, Sequence[float]]:
-        """Positions at time 0 by the name of the end effector that they are for."""
+        """Stated positions at time 0, by the name of the end effector."""
         return {"jaw": (self.jaw,)}
 
     @property
@@ -185,7 +185,7 @@ class PsmTool(BaseModel):
 
     @property
     def spheres(self) -> tuple[ContactSphere, ...]:
-        """Spheres with which the instrument touches tissue."""
+        """Contact spheres of the instrument, for tissue."""
         return self.tool.spheres
 
     @cached_property
@@ -205,7 +205,7 @@ class PsmTool(BaseModel):
 
 
 class MountedPsm(PsmTool, MountedArm):
-    """A patient-side manipulator: where it stands, what it holds and where it starts."""
+    """A patient-side manipulator: base pose, instrument and start."""
 
     probe_radius: Length = Field(
         default=PROBE_RADIUS, gt=0.0, description="radius of the sphere of a palpation probe"
@@ -217,7 +217,7 @@ class MountedPsm(PsmTool, MountedArm):
 
     @cached_property
     def tool(self) -> Instrument:
-        """The instrument's numbers; a palpation probe has the radius that the scene states."""
+        """The instrument's numbers; a palpation probe with the scene's radius."""
         tool = super().tool
         is_probe = isinstance(tool.end_effector, Probe)
         return replace(tool, end_effector=Probe(self.probe_radius)) if is_probe else tool
@@ -237,7 +237,7 @@ class MountedPsm(PsmTool, MountedArm):
 
 
 class MountedEcm(MountedArm):
-    """The endoscope camera manipulator: which endoscope it holds and where it starts."""
+    """The endoscope camera manipulator: endoscope and start."""
 
     endoscope: ecm.Endoscope = Field(
         default="straight", description="where it looks: along its shaft, or 30 degrees up or down"
@@ -270,7 +270,7 @@ class MountedEcm(MountedArm):
 
 @with_config(ConfigDict(extra="forbid"))
 class MountedArms(TypedDict, total=False):
-    """The arms of a cart by name, as pydantic validates them."""
+    """The arms of a cart by name, for validation."""
 
     PSM1: MountedPsm
     PSM2: MountedPsm

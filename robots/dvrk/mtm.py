@@ -28,7 +28,7 @@ _RANGES = {
     "MTML": ((-0.698132, 1.13446), (-0.261799, 1.13446), (-3.5779, 1.6580)),
     "MTMR": ((-1.13446, 0.698132), (-0.31416, 1.13446), (-1.6580, 3.5779)),
 }
-"""Of outer yaw, shoulder pitch and wrist platform, in which left and right differ."""
+"""Numbers of outer yaw, shoulder pitch and wrist platform, different left and right."""
 
 ACTUATOR_TO_JOINT = np.eye(7)
 """Joint positions of actuator positions, shape (7, 7): the elbow hangs on a parallelogram, the platform on

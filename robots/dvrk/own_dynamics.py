@@ -1,7 +1,7 @@
-"""The dynamics of the reader's own arm, as `trocar identify` writes them and a scenario names them.
+"""The dynamics of the reader's own arm, written by `trocar identify` and named in a scenario.
 
-A file of YAML: the inertia of the arm's bodies, the losses of its joints and of the discs of its instrument,
-and how it was found. SI units, radians; bodies stand in the arm's base frame with every joint at 0.
+A file of YAML: the inertia of the arm's bodies, the losses of joints and discs, and the fit. SI units,
+radians; bodies stand in the arm's base frame with every joint at 0.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from schemas.errors import MotionError
 __all__ = ["JAW", "BodyInertia", "DiscLosses", "JointLosses", "OwnDynamics"]
 
 JAW = "jaw"
-"""The joint that stands for the two fingers of an instrument."""
+"""The joint for the two fingers of an instrument."""
 
 _LARGEST = 2**20
-"""Bytes of a file; one has 4 KiB."""
+"""Most bytes of a file; usual are 4 KiB."""
 
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -44,7 +44,7 @@ class _Part(BaseModel):
 
 
 class BodyInertia(_Part):
-    """Mass (kg), centre (m) and inertia tensor about the centre (kg m^2) of one body."""
+    """Mass (kg), centre (m) and inertia tensor about the centre (kg m^2) of a body."""
 
     mass: _Positive
     centre: _Row
@@ -91,7 +91,7 @@ class DiscLosses(_Part):
 
 
 class JointLosses(DiscLosses):
-    """Of one joint: effort = armature ddq + stiffness q + offset + friction."""
+    """Losses of a joint: effort = armature ddq + stiffness q + offset + friction."""
 
     armature: _NotNegative
     stiffness: _Positive
@@ -102,16 +102,16 @@ class OwnDynamics(_Part):
     """The content of a file."""
 
     instrument: str
-    """With which it was identified; of an ECM its endoscope."""
+    """Instrument during identification; endoscope of an ECM."""
     bodies: dict[str, BodyInertia]
     joints: dict[str, JointLosses]
     discs: list[DiscLosses]
     fit: dict[str, Any] = Field(default_factory=dict[str, Any])
-    """How it was found and how well it fits; for the reader."""
+    """Method and quality of the fit; for the reader."""
 
     @classmethod
     def load(cls, file: Path) -> Self:
-        """Return the content of `file`. Raises MotionError if it cannot be read or is not valid."""
+        """Return the content of `file`. Raises MotionError if the file is unreadable or invalid."""
         try:
             if file.stat().st_size > _LARGEST:
                 raise MotionError(
@@ -136,11 +136,11 @@ class OwnDynamics(_Part):
         return stream.getvalue()
 
     def bodies_of(self, published: Mapping[str, Inertia]) -> Mapping[str, Inertia]:
-        """Return `published` with the bodies that were identified."""
+        """Return `published` with the bodies identified."""
         return {**published, **{name: body.inertia for name, body in self.bodies.items()}}
 
     def drives_of(self, published: Mapping[str, Drive]) -> Mapping[str, Drive]:
-        """Return `published` with the losses that were identified."""
+        """Return `published` with the losses identified."""
         drives = dict(published)
         for name, losses in self.joints.items():
             # the effort of a jaw turns two fingers by half the angle each
@@ -155,5 +155,5 @@ class OwnDynamics(_Part):
         return drives
 
     def discs_of(self, published: tuple[Disc, ...]) -> tuple[Disc, ...]:
-        """Return `published` with the friction that was identified."""
+        """Return `published` with the friction identified."""
         return tuple(own.of(disc) for disc, own in zip(published, self.discs, strict=True))

@@ -1,4 +1,4 @@
-"""Types of scenario parameters that speak of arms."""
+"""Types of scenario parameters about arms."""
 
 from __future__ import annotations
 
@@ -70,16 +70,16 @@ InstrumentName = Annotated[
         }
     ),
 ]
-"""Name or number of an instrument that can be mounted on a PSM; the name, once it is validated."""
+"""Name or number of an instrument for a PSM; after validation the name."""
 
 EcmPositions = tuple[Angle, Angle, Length, Angle]
 """Positions of the ECM's four joints (rad, m)."""
 
 SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
-"""Positions of the setup joints that carry one arm: the lift (m), then five angles."""
+"""Positions of the setup joints of an arm: the lift (m), then five angles."""
 
 MountedPositions = tuple[Angle, Angle, Length, Angle] | tuple[Angle, Angle, Length, Angle, Angle, Angle]
-"""Positions of a PSM's joints (rad, m), as many as it has with its instrument: four with a hand, else six."""
+"""Positions of a PSM's joints (rad, m): four with a hand, else six."""
 
 UnitQuaternion = Annotated[tuple[float, float, float, float], AfterValidator(_unit)]
 """A rotation as quaternion (x, y, z, w)."""
@@ -90,7 +90,7 @@ FOLDED: HandPositions = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def home(arm: dict[str, Any]) -> MountedPositions:
-    """Return `psm.home` for the `instrument` of an arm whose fields are being validated."""
+    """Return `psm.home` for the `instrument` of an arm under validation."""
     try:
         return cast("MountedPositions", psm.home(instrument(arm.get("instrument", ""))))
     except MotionError:
@@ -110,9 +110,9 @@ def check_start(
 
     Args:
         chain: the arm's kinematics.
-        start: its joint positions, shape (n,).
-        end_effector: what the arm moves at its tip.
-        given: positions that the scenario states for joints of end effectors, by the effector's name.
+        start: joint positions, shape (n,).
+        end_effector: end effector of the arm.
+        given: positions from the scenario for joints of end effectors, by the effector's name.
     """
     try:
         chain.check(np.array(start, np.float64))
@@ -135,7 +135,7 @@ def start_positions(end_effector: EndEffector, given: Mapping[str, Sequence[floa
 
 
 def settable(arm: setup_joints.CartArm) -> AfterValidator:
-    """Return a validator of `SetupPositions` that the setup joint of `arm` can reach."""
+    """Return a validator of `SetupPositions` within reach of the setup joint of `arm`."""
 
     def check(positions: tuple[float, ...]) -> tuple[float, ...]:
         try:

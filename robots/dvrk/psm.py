@@ -19,8 +19,8 @@ of joint 3).
 """
 
 _TURN, _SLIDE = radians(90.0), 0.2
-"""Of the trajectories (SAW core/components/code/mtsIntuitiveResearchKitPSM.cpp, v_max and a_max): rad/s and
-rad/s^2; m/s and m/s^2.
+"""Limits of the trajectories (SAW core/components/code/mtsIntuitiveResearchKitPSM.cpp, v_max and a_max):
+rad/s and rad/s^2; m/s and m/s^2.
 """
 
 ARM_JOINTS = (
@@ -61,7 +61,7 @@ taken as pi/2).
 """
 
 JOINT_NAMES = ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw")
-"""As SAW names them in share/kinematic/PSM.json and share/tool/*.json."""
+"""Names as in SAW share/kinematic/PSM.json and share/tool/*.json."""
 
 HOME = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
 """Where the real controller homes a simulated arm (SAW mtsIntuitiveResearchKitPSM.cpp): straight, insertion

@@ -1,4 +1,4 @@
-"""What is repeated on the way to an arm: commands that are delivered again, and refusals in the same words.
+"""What is repeated on the way to an arm: commands delivered again, and refusals in the same words.
 
 The controllers and the gateways to ROS follow these rules. What is remembered stands in arrays, which the
 records of a controller hold as they are.
@@ -21,9 +21,9 @@ _QUIET_S = 2.0
 
 
 class RememberedCommands:
-    """Finds state commands that are delivered twice.
+    """Finds state commands delivered twice.
 
-    They are latched, so a client that connects again delivers its last one again.
+    State commands are latched: a client connecting again delivers the last again.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class RememberedCommands:
         """Stamps (s, ns) and checksums of the last commands that were new, the newest first."""
 
     def is_repeated(self, sec: int, nanosec: int, text: str = "") -> bool:
-        """Say whether a command was delivered before; otherwise remember it.
+        """Return whether a command was delivered before; otherwise remember it.
 
         A command without a stamp is always new.
 
@@ -68,5 +68,5 @@ def refusals_to_report(last: Vector, words: str, now_ns: int) -> int:
 
 
 def is_recent(last: Vector, now_ns: int) -> bool:
-    """Say whether a refusal (see `refusals_to_report`) is not reported again yet."""
+    """Return whether a refusal (see `refusals_to_report`) is not reported again yet."""
     return bool(now_ns * 1e-9 - last[1] < _QUIET_S)

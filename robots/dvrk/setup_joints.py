@@ -20,7 +20,7 @@ from schemas.vectors import Vector
 __all__ = ["CART_MASS", "JOINT_NAMES", "MASSES", "SIMULATED", "CartArm", "base_pose", "chain", "joint_names"]
 
 CartArm = Literal["PSM1", "PSM2", "PSM3", "ECM"]
-"""The arms that the cart carries."""
+"""The arms on the cart."""
 
 JOINT_NAMES = ("lift", "shoulder", "elbow", "wrist", "tilt", "mount")
 
@@ -30,9 +30,7 @@ SIMULATED: Mapping[CartArm, tuple[float, ...]] = {
     "PSM3": (-0.0261, -1.5892, 1.3076, 0.6994, 0.1361, 0.3359),
     "ECM": (0.6647, 0.5782, -1.2662, 3.7818, 0.0, 0.0),
 }
-"""Positions that the dVRK's simulation gives them (SAW, simulated_position): three arms about the endoscope's
-view.
-"""
+"""Positions in the dVRK's simulation (SAW, simulated_position): three arms about the endoscope's view."""
 
 CART_MASS = 251.3
 """kg: base and column (dvrk_env, CAD, base_link)."""

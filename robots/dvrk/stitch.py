@@ -20,17 +20,17 @@ from schemas.vectors import Vector
 __all__ = ["EMERGE", "Stitch", "lattice", "path", "tissue"]
 
 EMERGE = radians(15.0)
-"""Of the arc, beyond the point of exit: 3 mm of the needle, for another instrument to take."""
+"""Length of the arc beyond the point of exit, rad: 3 mm of the needle, for another instrument to take."""
 _STEP = radians(7.5)
 """Largest turn of the needle between points of a path."""
 
 _DEPTH = 0.15
-"""From the remote centre to the middle of the tissue, straight down, m: reached half way along the
+"""Distance of the middle of the tissue from the remote centre, straight down, m: reached half way along the
 insertion's range.
 """
 _TILTS = tuple(radians(angle) for angle in (0.0, 30.0, 60.0))
-"""Of the tissue against the plane across the shaft, about the base's y axis: instruments come in steeply at
-best, and often flat.
+"""Tilt of the tissue against the plane across the shaft, about the base's y axis: instruments come in steeply
+at best, and often flat.
 """
 _PLACES = (-0.03, 0.0, 0.03)
 """Along either axis of the tissue, m: a patch of 60 mm."""
@@ -47,14 +47,14 @@ back leaves more room.
 
 @dataclass(frozen=True)
 class Stitch:
-    """One stitch in tissue that is tilted, at a place on it and in a direction."""
+    """A stitch in tissue tilted, at a place on it and in a direction."""
 
     tilt: float
-    """Of the tissue, rad."""
+    """Tilt of the tissue, rad."""
     place: tuple[float, float]
     """Half way between entry and exit, on the tissue, m."""
     direction: float
-    """From entry to exit, about the tissue's normal, from its x axis on, rad."""
+    """Direction from entry to exit, about the tissue's normal, from the x axis on, rad."""
     entry: float
     """Angle between needle and surface at entry and exit, rad."""
     hold: float

@@ -46,9 +46,9 @@ class Study:
     rolls: Vector
     """Lattice of rolls, shape (m,), rad."""
     constant: Mask
-    """By stitch and roll, shape (n, m): with the needle grasped at this roll and kept there."""
+    """Feasible by stitch and roll, shape (n, m): with the needle grasped at this roll and kept there."""
     rolling: Mask
-    """By stitch, shape (n,): with any roll to begin with, and rolling on the way."""
+    """Feasible by stitch, shape (n,): with any first roll, and rolling on the way."""
 
     @cached_property
     def best(self) -> int:

@@ -1,1 +1,1 @@
-"""The arms of the running model: servos, brakes, and what they report."""
+"""The arms of the running model: servos, brakes and readings."""

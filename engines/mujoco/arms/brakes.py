@@ -1,4 +1,4 @@
-"""The brakes of the ECM, which hold its joints where they are when its drives go off."""
+"""The brakes of the ECM: they hold the joints while the drives are off."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ __all__ = ["Brakes"]
 
 
 class Brakes:
-    """The brakes of the ECM, which hold its joints where they are when its drives go off."""
+    """The brakes of the ECM: they hold the joints while the drives are off."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scene: SceneParams) -> None:
-        """Find the brakes that `engines.mujoco.model.ties` added."""
+        """Find the brakes added by `engines.mujoco.model.ties`."""
         arm = scene.arms.get(ties.BRAKED)
         joints = [] if arm is None else [joint.name for joint in arm.chain.joints]
         self._model, self._data = model, data
@@ -26,17 +26,14 @@ class Brakes:
         self._state = np.array([*model.eq_data[self._locks, 0], self._on], float)
 
     def set(self, on: bool) -> None:
-        """Close or open the brakes; closed ones keep the positions at which they closed."""
+        """Close or open the brakes; closed brakes keep the positions of closing."""
         if on != self._on:
             self._data.eq_active[self._locks] = on
             self.state = np.array([*self._data.qpos[self._positions], on])
 
     @property
     def state(self) -> Vector:
-        """What MuJoCo's own state does not contain: where the brakes closed, and whether they are closed.
-
-        It is the same array at every call.
-        """
+        """State beyond MuJoCo's: positions of closing, then 1 if closed; the same array at every call."""
         return self._state
 
     @state.setter

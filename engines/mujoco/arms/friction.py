@@ -8,20 +8,20 @@ import numpy as np
 __all__ = ["Friction"]
 
 _DRY_REFERENCE = (1e-3, 1.0)
-"""Time constant (s) and damping ratio: twice the default sub-step, the shortest that MuJoCo takes."""
+"""Time constant (s) and damping ratio: twice the default sub-step, the shortest allowed by MuJoCo."""
 _DRY_IMPEDANCE = (0.9999, 0.9999, 1e-3, 0.5, 2.0)
 
 
 class Friction:
-    """The dry friction of one arm.
+    """The dry friction of an arm.
 
-    MuJoCo's friction creeps under a load below its limit, in proportion to the load. Under a servo that is
-    of use: without it the servo would come to rest anywhere within friction over gain. An arm in effort mode
-    would creep along on its own springs.
+    MuJoCo's friction creeps under a load below its limit, in proportion to the load. Under a servo creep is
+    of use: otherwise the servo would come to rest anywhere within friction over gain. An arm in effort mode
+    would creep along on the springs.
     """
 
     def __init__(self, model: mujoco.MjModel, arm: str) -> None:
-        """Take the friction of the joints and discs of `arm`."""
+        """Find the friction of the joints and discs of `arm`."""
         self._model, own = model, f"{arm}/"
         joints = [i for i in range(model.njnt) if model.joint(i).name.startswith(own)]
         self._dofs = model.jnt_dofadr[joints]
@@ -34,7 +34,7 @@ class Friction:
         )
 
     def set(self, *, dry: bool) -> None:
-        """Make the friction hard, or as soft as it was."""
+        """Make the friction hard, or as soft as before."""
         reference, impedance = np.array(_DRY_REFERENCE), np.array(_DRY_IMPEDANCE)
         hard = (reference, impedance, reference, impedance)
         model, values = self._model, hard if dry else self._soft

@@ -31,7 +31,7 @@ class Motors:
         self._rows: list[tuple[Vector, Vector, Vector, list[int], list[int]]] = []
 
     def add(self, arm: CartArm, params: MountedPsm | MountedEcm, sensed: Vector) -> Vector:
-        """Return the joint state of `arm`, shape (3 n,), of what its sensors report, same shape."""
+        """Return the joint state of `arm`, shape (3 n,), from the sensors' joint state, same shape."""
         names = [f"{arm}/{joint.name}" for joint in params.chain.joints]
         whole = np.empty_like(sensed)
         self._rows.append(

@@ -1,4 +1,4 @@
-"""Joint states and poses that the arms report, out of the model's sensors."""
+"""Joint states and poses of the arms, from the model's sensors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _EFFORT = 2
 
 
 class Readings:
-    """Views of the model's sensors by output port; what is no view is copied when it is due."""
+    """Views of the model's sensors by output port; other values are copied when due."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class Readings:
     ) -> None:
         """Report on `arms`; `weighs`: by the whole efforts of their motors.
 
-        `positions` is the matrix to the positions of the whole model, where this one is lean.
+        `positions`: for a lean model, the matrix to the positions of the whole model.
         """
         self._whole = positions
         self._sensors = data.sensordata
@@ -64,7 +64,7 @@ class Readings:
         self.update()
 
     def _add_end_effector(self, model: mujoco.MjModel, arm: str, params: MountedArm) -> None:
-        """Report the joints of an end effector, and its links that are read by themselves."""
+        """Report the joints of an end effector, and links with readings."""
         effector = params.end_effector
         if not effector.joints:
             return
@@ -87,14 +87,14 @@ class Readings:
                 at += size
 
     def update(self) -> None:
-        """Update what is due in every step."""
+        """Update the outputs due in every step."""
         for to_joints, sensed, joints in self._end_effectors:
             to_joints.dot(sensed, joints)
         if self._motors is not None:
             self._motors.update()
 
     def refresh(self) -> None:
-        """Update what is published less often: the tips' poses and the model's positions."""
+        """Update the outputs published less often: the tips' poses and the model's positions."""
         self._sensors.take(self._where, None, self._poses, "clip")  # three times as fast as the default mode
         if self._whole is None:
             self._qpos[:] = self._positions
@@ -105,8 +105,8 @@ class Readings:
 def _to_joints(effector: EndEffector) -> Vector:
     """Return the matrix from the sensors of an end effector's motors to its joint state.
 
-    The joint state has positions, velocities and efforts of all joints. Positions of motors that serve one
-    joint add up; efforts do by the motors' shares, so that their work is that of the joint.
+    The joint state has positions, velocities and efforts of all joints. Positions of motors of the same joint
+    add up; efforts add up by the motors' shares, for equal work.
     """
     joints = [joint.name for joint in effector.joints]
     columns: list[Vector] = []

@@ -1,9 +1,9 @@
 """The drives of all arms of a scene: commands in, inputs of MuJoCo's servos out.
 
-All joints of all arms stand in one vector, in the order of the arms: the arm's, then those of its end
-effector. The setpoints follow the commands at most as fast as joints may move, so no command, however it
-jumps, closes a jaw through an object between its fingers. One matrix product gives the inputs of the
-servos: position, its slope as velocity, and a feed-forward effort.
+All joints of all arms stand in one vector, in the order of the arms: joints of the arm, then of the end
+effector. The setpoints follow the commands at most as fast as joints may move, so no jump of a command closes
+a jaw through an object between the fingers. A matrix product gives the inputs of the servos: position, its
+slope as velocity, and a feed-forward effort.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ __all__ = ["Servos"]
 _OFF, _POSITION, _EFFORT = 0.0, 1.0, 2.0
 """Control modes: no torque, position servo, effort. The latter two with gravity compensation."""
 _BARE = 2.0
-"""Added to the latter two: without the gravity compensation that the real controller can switch off, see
+"""Added to position servo and effort: without gravity compensation, as on the real controller, see
 docs/decisions/0010.
 """
 
@@ -39,30 +39,28 @@ _Share = tuple[int, int, float]
 
 
 class _Axes(NamedTuple):
-    """Joints that are commanded together, where they start, and what serves them."""
+    """Joints commanded together, with start and motors."""
 
     joints: Sequence[Joint]
     start: Sequence[float]
     motors: Sequence[tuple[str, str, float]]
-    """Name of a motor, of the joint that it serves, and its share of the joint's position."""
+    """Name of a motor, name of the joint, and the motor's share of the joint's position."""
 
 
 @dataclass
 class _Group:
-    """Joints commanded through one pair of ports: those of an arm, or of its end effector."""
+    """Joints with a common pair of ports: joints of an arm, or of an end effector."""
 
     arm: str
     ports: str
-    """Names of its ports up to `servo_jp` and `servo_jf`."""
+    """Names of the ports up to `servo_jp` and `servo_jf`."""
     bodies: list[int]
-    """Bodies whose weight its controller bears."""
+    """Bodies with weight on the controller."""
     part: slice = field(default_factory=lambda: slice(0))
     """Place in the vectors of all joints."""
     actuators: list[int] = field(default_factory=list[int])
     weighed: list[int] = field(default_factory=list[int])
-    """Of `bodies`, those whose weight the real controller bears: the endoscope. Springs and weights balance
-    all else.
-    """
+    """Bodies with weight on the real controller too: the endoscope. Springs and weights balance all else."""
     mode: float = _POSITION
 
 
@@ -76,7 +74,7 @@ class Servos:
         arms: Mapping[CartArm, MountedPsm | MountedEcm],
         period: float,
     ) -> None:
-        """Drive `arms`, which are stepped every `period` seconds, from where they start."""
+        """Drive `arms`, stepped every `period` seconds, from the start."""
         self._model, self._data = model, data
         self._groups: list[_Group] = []
         rows: list[_Row] = []
@@ -112,15 +110,15 @@ class Servos:
         self._taken = np.concatenate([self._modes, start])
         self._asked, self._command = np.split(self._taken, [2 * len(arms)])
         self.off: frozenset[str] = frozenset()
-        """The arms whose joints have no torque."""
+        """Arms without torque in the joints."""
         self._holding = True
         self._at_rest = b""
-        """The commands and modes that have been reached; empty while setpoints move."""
+        """The commands and modes reached; empty while setpoints move."""
         np.multiply(self._springs, start - self._rest, out=self._effort)
         self._layout.dot(self._inputs, data.ctrl)
 
     def _add_group(self, group: _Group, axes: _Axes, rows: list[_Row], shares: list[_Share]) -> None:
-        """Add joints that are commanded together, and the motors that serve them."""
+        """Add joints commanded together, and their motors."""
         model, first = self._model, len(rows)
         places = {joint.name: first + i for i, joint in enumerate(axes.joints)}
         for motor, joint, share in axes.motors:
@@ -137,7 +135,7 @@ class Servos:
     def _matrices(self, shares: list[tuple[int, int, float]], n: int, period: float) -> tuple[Vector, Vector]:
         """Return two matrices, from the servos' inputs to `ctrl` and from `qpos` to the drives' positions.
 
-        The servos' inputs are the setpoint, the setpoint one step ago, and the effort.
+        The servos' inputs are the setpoint, the setpoint a step ago, and the effort.
         """
         model = self._model
         layout, measure = np.zeros((model.nu, 3 * n)), np.zeros((n, model.nq))
@@ -152,10 +150,7 @@ class Servos:
         return layout, measure
 
     def _moved(self, actuator: int) -> list[tuple[int, float]]:
-        """Return the joints whose positions, each times its factor, add up to the position of the actuator.
-
-        It is one joint, or those of a tendon from the palm outwards.
-        """
+        """Return the joints of an actuator, each with the factor of its share in the actuator's position."""
         model, target = self._model, int(self._model.actuator_trnid[actuator, 0])
         if model.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_TENDON:
             return [(target, 1.0)]
@@ -175,11 +170,11 @@ class Servos:
         return stiffness, rest
 
     def arm_setpoint(self, arm: str) -> Vector:
-        """Return the view of `setpoint` that is the joints of `arm`."""
+        """Return the joints of `arm` as a view of `setpoint`."""
         return self.setpoint[next(group.part for group in self._groups if group.arm == arm)]
 
     def begin(self, inputs: Inputs) -> None:
-        """Take commands and modes for the step that begins; where they are reached, there is nothing to do.
+        """Apply commands and modes at the beginning of a step; unchanged and reached commands cost nothing.
 
         Raises SessionError for an unknown mode.
         """
@@ -206,10 +201,7 @@ class Servos:
         self._at_rest = asked if is_at_rest else b""
 
     def _let_go(self, inputs: Inputs) -> None:
-        """Where no position is held, apply the commanded effort and let the setpoint follow the joint.
-
-        The joint is held there when its position servo is switched on again.
-        """
+        """Apply the commanded effort where no position is held, and let the setpoint follow the joint."""
         measured = np.clip(self._measure @ self._data.qpos, self._lower, self._upper)
         for group in self._groups:
             part = group.part
@@ -218,7 +210,7 @@ class Servos:
                 self.setpoint[part] = self._previous[part] = measured[part]
 
     def _set_modes(self, modes: Vector) -> None:
-        """Switch the drives; `modes`, shape (2 arms,), are those of the joints and the jaw of every arm."""
+        """Switch the drives; `modes`, shape (2 arms,): joints and end effector of every arm."""
         gain, bias = self._gains
         for (arm, port), asked in zip(self._mode_ports.items(), modes.reshape(-1, 2), strict=True):
             if not np.isin(asked, (_OFF, _POSITION, _EFFORT, _POSITION + _BARE, _EFFORT + _BARE)).all():
@@ -246,7 +238,7 @@ class Servos:
 
     @property
     def state(self) -> Vector:
-        """What MuJoCo's own state does not hold: setpoints and modes; the same array at every call."""
+        """State beyond MuJoCo's: setpoints and modes; the same array at every call."""
         self._state[: self.setpoint.size] = self.setpoint
         return self._state
 

@@ -12,7 +12,7 @@ FOLDER = "assets"
 
 
 def numbers(values: object) -> str:
-    """Return numbers as text that reads back to the same bits."""
+    """Return numbers as text with all bits."""
     return " ".join(repr(float(value)) for value in np.asarray(values, float).ravel())
 
 
@@ -22,7 +22,7 @@ def file_of(mesh: str) -> str:
 
 
 def meshes(spec: mujoco.MjSpec) -> dict[str, str]:
-    """Return the content of every mesh's file, by its name."""
+    """Return the content of every mesh's file, by file name."""
     return {file_of(mesh.name): _obj(mesh) for mesh in spec.meshes}
 
 

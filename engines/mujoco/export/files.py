@@ -1,4 +1,4 @@
-"""Writing an exported model and its meshes."""
+"""Writing an exported model with meshes."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ __all__ = ["FORMATS", "START", "Format", "write"]
 Format = Literal["mjcf", "urdf"]
 
 FORMATS: Mapping[str, Format] = {".xml": "mjcf", ".mjcf": "mjcf", ".urdf": "urdf"}
-"""By the suffix of the file."""
+"""Format by the suffix of the file."""
 
 START = "start"
-"""Name of the keyframe with which a loaded model begins."""
+"""Name of the first keyframe of a loaded model."""
 
 
 def write(scene: SceneParams, path: Path, form: Format) -> list[Path]:
-    """Write the model of `scene` to `path`, its meshes to the folder `assets` beside it; return all files.
+    """Write the model of `scene` to `path`, the meshes to the folder `assets` there; return all files.
 
-    As in a session, two fingers are one jaw, and the ECM has brakes. They are open; `active` closes them,
-    where the ECM starts.
+    As in a session, fingers are tied, and the ECM has brakes, open; `active` closes the brakes, where the ECM
+    starts.
     """
     model = spec(scene)
     ties.add(model, scene)
@@ -52,9 +52,9 @@ def write(scene: SceneParams, path: Path, form: Format) -> list[Path]:
 
 
 def _add_start(spec: mujoco.MjSpec, scene: SceneParams) -> None:
-    """Add the keyframe `START`: joints where the scene starts, and servos whose goals hold them there.
+    """Add the keyframe `START`: joints at the scene's start, and goals of the servos there.
 
-    Without it a loaded model would begin with instruments drawn back and servos that pull them there.
+    Otherwise a loaded model would begin with instruments drawn back and servos pulling there.
     """
     model = spec.compile()
     data = mujoco.MjData(model)

@@ -1,7 +1,7 @@
 """The model as MJCF.
 
-MuJoCo writes numbers with six digits. All that carries a name gets its full numbers back here, so that the
-model reads back as it was.
+MuJoCo writes numbers with six digits. All named elements get full numbers here, so the model reads back
+unchanged.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from schemas.vectors import Vector
 __all__ = ["mjcf"]
 
 _INERTIAL = {"pos": "ipos", "quat": "iquat", "diaginertia": "inertia"}
-"""Attributes of the element `inertial` that a compiled body calls otherwise."""
+"""Attributes of the element `inertial` with another name in a compiled body."""
 _EQUALITY = {"polycoef": "data"}
 _DIGITS = 1e-5
-"""What six digits leave of a number, relative to the largest of its attribute."""
+"""Rounding by six digits, relative to the largest number of the attribute."""
 
 
 def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
-    """Return the root element of the model's MJCF, whose meshes are files in `FOLDER`."""
+    """Return the root element of the model's MJCF, with meshes as files in `FOLDER`."""
     model = spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
     (compiler,) = root.findall("compiler")
@@ -52,9 +52,9 @@ def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
 
 
 def _restore(element: ElementTree.Element, source: Any, names: dict[str, str]) -> None:
-    """Give the numbers of `element` all the digits that they have in `source`.
+    """Give the numbers of `element` all digits of `source`.
 
-    `names`: of attributes that have another name there.
+    `names`: names in `source` of attributes, where different.
     """
     for attribute, text in element.attrib.items():
         value: Any = getattr(source, names.get(attribute, attribute), None)

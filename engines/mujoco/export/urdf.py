@@ -31,10 +31,7 @@ __all__ = ["urdf"]
 _KINDS = {mujoco.mjtJoint.mjJNT_HINGE: "revolute", mujoco.mjtJoint.mjJNT_SLIDE: "prismatic"}
 _WORLD = "world"
 _FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-9
-"""kg, kg m^2, of a link that stands for a frame: less than a fifth of the lightest link.
-
-That is the wrist yaw with 6.6e-6 kg.
-"""
+"""kg, kg m^2, of a link for a frame: less than a fifth of the lightest link, the wrist yaw with 6.6e-6 kg."""
 _AT_ORIGIN, _UPRIGHT = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -43,15 +40,15 @@ class _Lead:
     """How a joint is driven."""
 
     joint: str
-    """Joint that it mimics; empty: none."""
+    """Leading joint; empty: none."""
     ratio: float
-    """Position over that of the joint that it mimics."""
+    """Position over position of the leading joint."""
     servo: str
-    """Servo whose limits are its own."""
+    """Servo with the joint's limits."""
 
 
 def urdf(spec: mujoco.MjSpec, arms: Mapping[CartArm, MountedArm]) -> Element:
-    """Return the root element `robot` of the model's URDF, whose meshes are files in `FOLDER`."""
+    """Return the root element `robot` of the model's URDF, with meshes as files in `FOLDER`."""
     model = spec.compile()
     robot = Element("robot", name=spec.modelname)
     # what MuJoCo needs to read it as it is
@@ -80,7 +77,7 @@ def urdf(spec: mujoco.MjSpec, arms: Mapping[CartArm, MountedArm]) -> Element:
 def _leads(arms: Mapping[CartArm, MountedArm]) -> dict[str, _Lead]:
     """Return by joint how the links of end effectors are driven.
 
-    Links that a motor moves as one mimic the joint that is commanded; those on a tendon move by themselves.
+    Links moved as a unit mimic the commanded joint; links on a tendon move freely.
     """
     leads: dict[str, _Lead] = {}
     for arm, params in arms.items():
@@ -178,7 +175,7 @@ def _add_joint(
 
 
 def _tied(spec: mujoco.MjSpec, joint: str) -> _Lead:
-    """Return how a joint of the arm or of its linkage is driven."""
+    """Return how a joint of the arm or of the linkage is driven."""
     tie = spec.equality(joint)
     return _Lead(tie.name2, float(tie.data[1]), tie.name2) if tie else _Lead("", 0.0, joint)
 
@@ -198,7 +195,7 @@ def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, servo_name: st
 
 
 def _add_leader(robot: Element, spec: mujoco.MjSpec, follower: mujoco.MjsBody, lead: _Lead) -> None:
-    """Add the joint that the joint of `follower` and its twin mimic."""
+    """Add the leading joint of `follower` and of the opposite link."""
     _add_frame_link(robot, _link(lead.joint))
     joint = SubElement(robot, "joint", name=_joint(lead.joint), type="revolute")
     SubElement(joint, "parent", link=_link(follower.parent.name))
@@ -233,7 +230,7 @@ def _add_origin(element: Element, pos: Vector, quat: Vector) -> None:
 
 
 def _turn_z_to(axis: Vector) -> Vector:
-    """Return a quaternion (w, x, y, z) that turns z to `axis`."""
+    """Return the quaternion (w, x, y, z) from z to `axis`."""
     quat = np.empty(4)
     mujoco.mju_quatZ2Vec(quat, np.ascontiguousarray(axis, float))
     return quat

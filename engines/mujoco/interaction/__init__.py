@@ -1,1 +1,1 @@
-"""What the arms of the running model touch: power bonds, rigid contacts, objects in jaws."""
+"""Contacts of the arms of the running model: power bonds, rigid contacts, objects in jaws."""

@@ -1,4 +1,4 @@
-"""Collisions of instruments, with one another and with what stands fast: boards, posts, walls, dishes."""
+"""Collisions of instruments, with each other and with fixtures: boards, posts, walls, dishes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Collisions:
     def __init__(
         self, model: mujoco.MjModel, owners: NDArray[np.intp], fixtures: Iterable[str], step: float
     ) -> None:
-        """Watch geoms of `model` that belong to the arms `owners` (-1: none) and to `fixtures`, by name.
+        """Watch geoms of `model` by owner: the arms `owners` (-1: none) and `fixtures`, by name.
 
         `step` is the sub-step, s.
         """
@@ -36,13 +36,13 @@ class Collisions:
         self.outputs = {name: self._shown[i : i + 1] for i, name in enumerate(COLLISIONS)}
 
     def kinds(self, geoms: NDArray[np.int32]) -> NDArray[np.intp]:
-        """Return for pairs of geoms, shape (n, 2), which of the sums their contact adds to, -1 for none."""
+        """Return for pairs of geoms, shape (n, 2), the index of the sum for the contact, -1 for none."""
         is_tool, is_fixed = self._owners[geoms] >= 0, self._fixed[geoms]
         tools, fixed = is_tool.all(axis=1), is_tool.any(axis=1) & is_fixed.any(axis=1)
         return np.where(tools, 0, np.where(fixed, 1, _NEITHER))
 
     def add(self, kinds: NDArray[np.intp], forces: Vector) -> None:
-        """Add the forces (N), shape (n, 3), of one sub-step in contacts of these kinds."""
+        """Add the forces (N), shape (n, 3), of a sub-step in contacts of these kinds."""
         for kind, force in zip(kinds.tolist(), forces, strict=True):
             if kind != _NEITHER:
                 self._sums[kind] += np.linalg.norm(force) * self._step

@@ -14,14 +14,13 @@ __all__ = ["Spheres"]
 
 
 class Spheres:
-    """Views of the model's data that belong to the spheres of one instrument.
+    """Views of the model's data for the spheres of an instrument.
 
-    A force stays with the sphere's centre, which moves against the centre of mass of the link that carries
-    it.
+    A force stays with the sphere's centre; the centre moves against the link's centre of mass.
     """
 
     acts_off_centre = True
-    """So its moment is renewed in every sub-step."""
+    """The moment is renewed in every sub-step."""
 
     def __init__(self, arm: str, motion: MotionSide, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Let `motion` act on the spheres of the instrument of `arm`."""
@@ -59,7 +58,7 @@ class Spheres:
         }
 
     def begin(self, inputs: Inputs) -> None:
-        """Apply the reaction of the step that begins."""
+        """Apply the reaction at the beginning of a step."""
         self.motion.begin(inputs, self._position, self._velocity)
         self._push(0.0)
 
@@ -74,12 +73,12 @@ class Spheres:
         self._update_tip_wrench()
 
     def refresh(self) -> None:
-        """Take the positions of the model's present state as those from which work counts."""
+        """Count work from the positions of the model's present state."""
         self._last[:] = self._position
 
     @staticmethod
     def least_mass(arm: str, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-        """Return the least mass (kg) that forces on the spheres of `arm` meet, in any directions."""
+        """Return the least mass (kg) under forces on the spheres of `arm`, in any directions."""
         sites = _sites(arm, model)
         jacobian = np.zeros((len(sites), 3, model.nv))
         for rows, site in zip(jacobian, sites, strict=True):
@@ -98,7 +97,7 @@ class Spheres:
         self._applied[self._bodies] = self._share @ self._loads
 
     def _set_moments(self, moments: Vector) -> None:
-        """Set `moments` (N m), shape (n, 3), to those of the forces at `_arms`."""
+        """Set `moments` (N m), shape (n, 3), to the moments of the forces at `_arms`."""
         first, second = np.multiply(self._arms, self._turned, out=self._terms)
         np.subtract(first, second, out=moments)
 
@@ -115,7 +114,7 @@ class Spheres:
 
 
 def _sites(arm: str, model: mujoco.MjModel) -> list[int]:
-    """Return the sites of the spheres in the order of their sensors, in which the instrument lists them."""
+    """Return the sites of the spheres in the order of their sensors, the order of the instrument's list."""
     sensors = [model.sensor(i) for i in range(model.nsensor)]
     return [
         int(sensor.objid[0])

@@ -1,8 +1,9 @@
-"""Which jaw holds which object.
+"""Objects held by jaws.
 
 An object is held by an arm once both fingers have touched it for `_SETTLED`. With `grasp: weld` a weld
 between wrist and object is active for as long; with `grasp: friction` only contact acts, and this module only
-observes. With `grasp: proximity` a ray takes the place of the contacts, and what it meets is welded at once.
+observes. With `grasp: proximity` a ray takes the place of the contacts, and an object on the ray is welded at
+once.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from schemas.vectors import Vector
 __all__ = ["Holding", "prepare"]
 
 _SETTLED = 0.1
-"""s; a jaw that closes at its greatest speed has come to rest on the object by then."""
+"""s; time for a jaw at greatest speed to come to rest on the object."""
 
 
 def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
-    """Add to the model of `scene` the welds between jaws and objects, which are not active yet."""
+    """Add to the model of `scene` the welds between jaws and objects, not active yet."""
     if scene.grasp != "friction":
         for thing in scene.objects:
             for arm in _jawed(scene):
@@ -41,7 +42,7 @@ def _jawed(scene: SceneParams) -> list[str]:
 
 
 def _jaws(scene: SceneParams) -> dict[str, float]:
-    """Return the length of the fingers of every arm that has a jaw, m."""
+    """Return the length of the fingers of every arm with a jaw, m."""
     return {
         name: arm.end_effector.length for name, arm in scene.arms.items() if isinstance(arm.end_effector, Jaw)
     }
@@ -138,12 +139,12 @@ class Holding:
                 self._values[i, :3] = self._numbers[holder], self._slip(i, holder), self._turn(i, holder)
 
     def holder(self, thing: str) -> str | None:
-        """Return the arm that holds an object, the first of two; None while none does."""
+        """Return the holding arm of an object, the first of two; None without."""
         holder = int(self._holder[self._things[thing]])
         return self._arms[holder] if holder >= 0 else None
 
     def _choose_holder(self, i: int) -> None:
-        """Keep the arm that holds object `i` as long as it does; then take the first that does."""
+        """Keep the holding arm of object `i` while holding; then choose the first holding arm."""
         holding = self._touched[i] >= self._settled
         holder = int(self._holder[i])
         if holder < 0 or not self._touched[i, holder]:
@@ -176,7 +177,7 @@ class Holding:
         )
 
     def _turn(self, i: int, j: int) -> float:
-        """Return the angle (rad) by which object `i` has turned in the left finger of arm `j` while held."""
+        """Return the turn (rad) of object `i` in the left finger of arm `j` while held."""
         w = abs(float(self._grip[i, j, 6:] @ self._orientation(i, j)))
         return 2.0 * acos(min(w, 1.0))
 
@@ -189,7 +190,7 @@ class Holding:
 
     @property
     def state(self) -> Vector:
-        """What MuJoCo's own state does not contain; the same array at every call."""
+        """State beyond MuJoCo's; the same array at every call."""
         return self._state
 
     @state.setter
@@ -200,7 +201,7 @@ class Holding:
 
 
 def _ends(model: mujoco.MjModel, things: list[str], fingers: list[str]) -> list[int]:
-    """Return what every geom of `model` belongs to.
+    """Return the owner of every geom of `model`.
 
     i + 1 stands for object i, -(i + 1) for finger i or a pad on it, 0 for anything else.
     """

@@ -1,4 +1,4 @@
-"""The least mass that a force on the model meets."""
+"""The least mass of the model under a force."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ TURNED = np.array([[1, 2, 0], [2, 0, 1]])
 
 
 def effective_mass(jacobian: Vector, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Return the least mass (kg) that a force meets in any direction: 1 / max eig(J M^-1 J^T).
+    """Return the least mass (kg) under a force in any direction: 1 / max eig(J M^-1 J^T).
 
-    The joints of the linkage move with those they follow: J and M are those of the independent joints.
+    The joints of the linkage follow others: J and M are of the independent joints.
 
     Args:
-        jacobian: J of the velocity J dq, shape (k, nv); those of several points one below the other.
+        jacobian: J of the velocity J dq, shape (k, nv); of several points stacked.
         model: the model.
-        data: computed at its present positions.
+        data: computed at the present positions.
     """
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
@@ -33,7 +33,7 @@ def effective_mass(jacobian: Vector, model: mujoco.MjModel, data: mujoco.MjData)
 def _followers(model: mujoco.MjModel) -> Vector:
     """Return T, shape (nv, independent), with dq = T dq_independent.
 
-    It contains the joint equalities of the model, as ratios of velocities.
+    Joint equalities of the model enter as ratios of velocities.
     """
     ties, led = np.eye(model.nv), list[int]()
     for i in range(model.neq):

@@ -1,4 +1,4 @@
-"""Objects that are put somewhere from outside, as a person does between two trials."""
+"""Objects put somewhere from outside, as a person does between two trials."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["place"]
 
 
 def place(model: mujoco.MjModel, data: mujoco.MjData, thing: str, message: PoseStamped) -> None:
-    """Put `thing` at a pose in the world, at rest, and see what it touches there."""
+    """Put `thing` at a pose in the world, at rest, and compute contacts there."""
     joint = model.joint(thing)
     position, turn = message.pose.position, message.pose.orientation
     at, velocity = int(joint.qposadr[0]), int(joint.dofadr[0])

@@ -18,11 +18,10 @@ _W_FIRST = [6, 3, 4, 5]
 
 
 class Probe:
-    """Views of the model's data that belong to one probe; nothing is allocated in a step."""
+    """Views of the model's data for a probe; nothing is allocated in a step."""
 
     acts_off_centre = False
-    """A wrench that does not change need not be renewed in a step: it acts at the centre of mass of its link.
-    """
+    """A constant wrench is not renewed within a step: the point of action is the link's centre of mass."""
 
     def __init__(self, arm: str, motion: MotionSide, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Let `motion` act on the probe of `arm`."""
@@ -46,7 +45,7 @@ class Probe:
         self.refresh()
 
     def begin(self, inputs: Inputs) -> None:
-        """Apply the reaction of the step that begins."""
+        """Apply the reaction at the beginning of a step."""
         self.motion.begin(inputs, self._pose, self._twist)
         self._wrench[:] = self.motion.force(0.0, self._pose, self._twist)
 
@@ -56,12 +55,12 @@ class Probe:
         self._wrench[:] = self.motion.force(tau, self._pose, self._twist)
 
     def end(self) -> None:
-        """Record the work done, and set the wrench at the tip, which is the probe's centre."""
+        """Record the work done, and set the wrench at the tip, the probe's centre."""
         self._record_work()
         self._to_base.dot(self._wrench, self._tip_wrench)
 
     def _record_work(self) -> None:
-        """Record the work of the wrench since it was set, and update the pose."""
+        """Record the work of the wrench since the last call, and update the pose."""
         np.subtract(self._position, self._pose[:3], out=self._translation)  # the pose is still the one before
         if any(self._torque):  # a sphere in contact feels none
             # in the probe's own axes
@@ -76,7 +75,7 @@ class Probe:
 
     @staticmethod
     def least_mass(arm: str, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-        """Return the least mass (kg) that a force on the probe of `arm` meets in any direction."""
+        """Return the least mass (kg) under a force on the probe of `arm` in any direction."""
         jacobian = np.zeros((3, model.nv))
         mujoco.mj_jacBody(model, data, jacobian, None, model.body(probe_body(arm)).id)
         return effective_mass(jacobian, model, data)

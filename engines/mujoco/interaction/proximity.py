@@ -1,10 +1,10 @@
-"""The authors' rule of holding, without contact: what a ray ahead of a shut jaw meets is attached to it.
+"""The authors' rule of holding, without contact: an object on the ray ahead of a shut jaw is attached.
 
 Source: unina-icaros/dvrk-vrep (commit 88fe597), dVRK-training_pick&place.ttt: the proximity sensors of TOOL1
-and TOOL2 are rays of 8 mm that begin 5 mm ahead of the jaw, and their scripts attach the first thing that the
-ray meets while the jaw's command is at most 0, and release it when it is above. With a needle driver we count
-from the wrist yaw axis, so that the ray lies between the fingers and ends 2.8 mm past them; with fingers of
-another length it begins and ends as far from their ends.
+and TOOL2 are rays of 8 mm from 5 mm ahead of the jaw, and the scripts attach the first object on the ray
+while the jaw's command is at most 0, and release the object when the command is above. With a needle driver
+we count from the wrist yaw axis, so the ray lies between the fingers and ends 2.8 mm ahead of the fingers;
+with fingers of another length begin and end of the ray are as far from the ends of the fingers.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _DRIVER = 10.2e-3
 
 
 class Rays:
-    """The rays of some arms, and the things that they can meet."""
+    """The rays of some arms, and the objects in reach."""
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, things: list[str], jaws: Mapping[str, float]
@@ -41,7 +41,7 @@ class Rays:
         self._geoms = [np.flatnonzero(model.geom_bodyid == body).tolist() for body in bodies]
 
     def look(self, contacts: Vector, held: Vector) -> bool:
-        """Write for each thing and arm whether, and where, the arm has it: as a contact of both fingers.
+        """Write whether and where each arm has each object, as a contact of both fingers.
 
         Args:
             contacts: count and sum of the positions (m), shape (things, arms, 2, 4).
@@ -62,7 +62,7 @@ class Rays:
         return bool(contacts.any())
 
     def _first(self, start: Vector, ahead: Vector) -> tuple[int, float]:
-        """Return which thing the ray meets first, -1 for none, and after how many metres."""
+        """Return the index of the first object on the ray, -1 for none, and the distance in metres."""
         model, data = self._model, self._data
         first, nearest = -1, _RANGE
         for i, geoms in enumerate(self._geoms):

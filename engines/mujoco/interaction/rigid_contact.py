@@ -1,4 +1,4 @@
-"""The force of rigid contacts on an instrument: with table, objects, cart and other arms."""
+"""The force of rigid contacts on an instrument: with table, objects, cart and further arms."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ __all__ = ["RigidContact"]
 class RigidContact:
     """The mean contact force on the instruments of some arms over the sub-steps of a step.
 
-    The load of what an instrument holds counts through its contacts with it, or through the weld. Contacts of
-    an instrument with itself do not count.
+    The load of a held object counts through contacts or the weld. Contacts within an instrument do not count.
     """
 
     def __init__(
@@ -32,7 +31,7 @@ class RigidContact:
         fixtures: Iterable[str] = (),
         every: float = 0.0,
     ) -> None:
-        """Watch the instruments of `arms`, and how they collide if there are `fixtures`.
+        """Watch the instruments of `arms`, and collisions if there are `fixtures`.
 
         `add` is called for `every` seconds.
         """
@@ -51,18 +50,18 @@ class RigidContact:
         self._sums, self._means = np.zeros((len(arms), 6)), np.zeros((len(arms), 6))
         self._substeps, self._is_touched, self._was_touched = 0, False, False
         self._geoms, self._found, self._kinds = b"", np.zeros(0, np.intp), np.zeros(0, np.intp)
-        """Pairs of geoms in contact as they were last seen, which of them count, and as what collisions."""
+        """Last seen pairs of geoms in contact, indices of the counting pairs, and kinds of collisions."""
         self.collisions = Collisions(model, self._owner, fixtures, every) if fixtures else None
         self._sides = np.zeros((0, len(arms)))
-        """Of each of these whether its second geom (1), its first (-1) or none (0) is of an arm."""
+        """Side by pair and arm: 1 if the second geom is of the arm, -1 the first, 0 none."""
         self.outputs = {f"{arm}/rigid_wrench": mean for arm, mean in zip(arms, self._means, strict=True)}
         if self.collisions is not None:
             self.outputs |= self.collisions.outputs
 
     def add(self) -> None:
-        """Add the forces of a sub-step; call it between `mj_step2` and `mj_step1`.
+        """Add the forces of a sub-step, between `mj_step2` and `mj_step1`.
 
-        There the forces are solved, and the contacts are still those they belong to.
+        There the forces are solved, and the contacts are still the contacts of these forces.
         """
         self._substeps += 1
         if self._data.ncon:
@@ -85,14 +84,14 @@ class RigidContact:
         self._substeps, self._is_touched, self._was_touched = 0, False, True
 
     def refresh(self) -> None:
-        """Update the outputs that are not those of the last step."""
+        """Update the changed outputs."""
         if self.collisions is not None:
             self.collisions.refresh()
 
     def give(self, arm: str, wrench: Vector, to: Vector) -> None:
-        """Move the part of a mean that is `wrench` (N, N m about the world's origin) to another output.
+        """Move `wrench` (N, N m about the world's origin), a part of a mean, to another output.
 
-        Nothing moves in a step in which nothing rigid touches the arm.
+        Without rigid contact in a step nothing moves.
         """
         i = self._index[arm]
         if not self._means[i].any():
@@ -134,7 +133,8 @@ class RigidContact:
     def _add_weld(self, weld: int, owner: int) -> None:
         """Add the reaction of the object in a weld.
 
-        Its free joint has the force at its origin in the world, and the torque in its own frame.
+        The free joint has the force at the object's origin in the world, and the torque in the object's
+        frame.
         """
         self._is_touched = True
         model, data = self._model, self._data
@@ -153,7 +153,7 @@ class RigidContact:
 
 
 def _owners(model: mujoco.MjModel, arms: list[str]) -> NDArray[np.intp]:
-    """Return for every geom of `model` the index of the arm whose instrument it belongs to, else -1."""
+    """Return for every geom of `model` the index of the instrument's arm, else -1."""
     owners = np.full(model.nbody, -1)
     for i, arm in enumerate(arms):
         owners[model.body(instrument_body(arm)).id] = i
@@ -163,6 +163,6 @@ def _owners(model: mujoco.MjModel, arms: list[str]) -> NDArray[np.intp]:
 
 
 def _welded_to(model: mujoco.MjModel, equality: int) -> str | None:
-    """Return the arm that an equality would weld an object to, if it is such a weld."""
+    """Return the arm of a weld to an object; None for other equalities."""
     is_weld = model.eq_type[equality] == mujoco.mjtEq.mjEQ_WELD
     return model.body(int(model.eq_obj1id[equality])).name.partition("/")[0] if is_weld else None

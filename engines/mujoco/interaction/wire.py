@@ -1,4 +1,4 @@
-"""The bond at a needle: three points of its wire, which another engine pushes on.
+"""The bond at a needle: three points of the wire, pushed by another engine.
 
 A needle weighs a tenth of a gram. Where a jaw lets go of it in tissue, nothing but the tissue holds it, and
 its force, which is a step old, would throw it about. What tissue also has is viscosity: it acts here, in
@@ -21,7 +21,7 @@ __all__ = ["Wire"]
 
 
 class Wire:
-    """Views of the model's data that belong to one needle."""
+    """Views of the model's data for a needle."""
 
     acts_off_centre = False
     """Its moment is not renewed within a step: at 25 degrees a second that changes it by 1e-3 of itself."""
@@ -46,12 +46,12 @@ class Wire:
         self._position, self._velocity, self._last = np.zeros(9), np.zeros(9), np.zeros(9)
         self._force = np.zeros(9)
         self.wrench = np.zeros(6)
-        """Mean force (N) through the bond in the last step and its moment (N m) about the world's origin."""
+        """Mean force (N) through the bond in the last step and moment (N m) about the world's origin."""
         self.outputs = motion.result(self._position, self._velocity)
         self.refresh()
 
     def begin(self, inputs: Inputs) -> None:
-        """Apply the reaction of the step that begins, and the drag while there is one."""
+        """Apply the reaction at the beginning of a step, and the drag, if any."""
         self.motion.begin(inputs, self._position, self._velocity)
         self._push(0.0)
         is_pushed = bool(self._force.any())
@@ -75,7 +75,7 @@ class Wire:
         self.wrench /= self._substeps
 
     def refresh(self) -> None:
-        """Take the points of the model's present state as those from which work counts."""
+        """Count work from the points of the model's present state."""
         arms = self._marks @ self._axes.T
         self._position.reshape(3, 3)[:] = self._place + arms
         spin = self._axes @ self._speed[3:]
@@ -84,7 +84,7 @@ class Wire:
 
     @staticmethod
     def least_mass(thing: str, params: NeedleParams, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-        """Return the least mass (kg) that forces on the points meet in a sub-step, drag included."""
+        """Return the least mass (kg) under forces on the points in a sub-step, drag included."""
         first, arms = int(model.joint(thing).dofadr[0]), _marks(params)
         inertia = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, inertia)

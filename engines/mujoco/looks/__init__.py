@@ -1,6 +1,6 @@
-"""How the robot looks and what of it collides: meshes generated from published dimensions.
+"""Looks and collision shapes of the robot: meshes generated from published dimensions.
 
-Needs manifold3d, as the extra `mujoco` brings it.
+Needs manifold3d, from the extra `mujoco`.
 """
 
 from engines.mujoco.looks.catalogue import collision, parts

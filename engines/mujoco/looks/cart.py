@@ -1,7 +1,7 @@
 """Look of the patient's cart: column with rails for the four lifts, base on casters.
 
 Frame: z up, y towards the patient, z = -0.1675 m at the floor. Outer dimensions: bounding box of the CAD mesh
-in jhu-dvrk/dvrk_model (SUJ_cart) and its height over the floor; rails: `robots.dvrk.setup_joints`.
+in jhu-dvrk/dvrk_model (SUJ_cart) and height over the floor; rails: `robots.dvrk.setup_joints`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _TOP = 1.8007
 
 
 def parts() -> Looks:
-    """Return the meshes of the one body, `cart`."""
+    """Return the meshes of the body `cart`."""
     return {"cart": (*_column(), *_base(), *_handle())}
 
 

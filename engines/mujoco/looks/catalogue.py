@@ -42,7 +42,7 @@ def parts(what: str) -> Looks:
 
 @cache
 def collision(what: str) -> Collisions:
-    """Return what collides of `what` by body: of what `parts` knows, in the same frames.
+    """Return the collision shapes of `what` by body, in the frames of `parts`.
 
     Raises:
         MotionError: no such instrument, or nothing of this name.

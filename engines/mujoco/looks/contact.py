@@ -1,6 +1,6 @@
 """Collision shapes: convex hulls of covers, capsules for shafts, boxes for fingers.
 
-The covers are those of arms, setup joints and cart.
+Covers belong to arms, setup joints and cart.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ __all__ = ["cart", "ecm", "instrument", "psm", "setup_joint"]
 
 _ECM_SHAFT_RADIUS = 0.006
 _THIN = ("cannula", "endoscope_shaft")
-"""Parts that a hull of the whole link would swell."""
+"""Thin parts, left out of a link's hull."""
 _BULK = ("column", "housing", "deck")
-"""Parts of the cart that enclose the others, each with a hull of its own."""
+"""Enclosing parts of the cart, each with a separate hull."""
 
 
 def cart() -> Collisions:
-    """Return what collides of the cart."""
+    """Return the collision shapes of the cart."""
     return {
         body: tuple(_hull(p.name, (p,)) for p in shown if p.name in _BULK)
         for body, shown in cart_look.parts().items()
@@ -38,17 +38,17 @@ def cart() -> Collisions:
 
 
 def setup_joint(arm: CartArm) -> Collisions:
-    """Return what collides of the setup joint that carries `arm`."""
+    """Return the collision shapes of the setup joint under `arm`."""
     return {body: (_hull(body, shown),) for body, shown in setup_look.parts(arm).items() if shown}
 
 
 def psm() -> Collisions:
-    """Return what collides of a PSM without its instrument."""
+    """Return the collision shapes of a PSM without instrument."""
     return {body: (_hull(body, shown),) for body, shown in psm_look.parts().items()}
 
 
 def ecm() -> Collisions:
-    """Return what collides of an ECM with its endoscope."""
+    """Return the collision shapes of an ECM with endoscope."""
     hulls: dict[str, tuple[Part | Primitive, ...]] = {
         body: (_hull(body, shown),) for body, shown in ecm_look.parts().items()
     }
@@ -58,7 +58,7 @@ def ecm() -> Collisions:
 
 
 def instrument(tool: Instrument) -> Collisions:
-    """Return what collides of an instrument in its PSM: housing, shaft, wrist, and end effector."""
+    """Return the collision shapes of an instrument in a PSM: housing, shaft, wrist, and end effector."""
     looks: Looks = instruments.parts(tool)
     chain = psm_arm.chain(tool)
     shaft = looks["roll"][0].vertices[:, 2]

@@ -11,7 +11,7 @@ from robots.dvrk.end_effectors.end_effector import Mount
 __all__ = ["parts"]
 
 _LENGTH = 0.0155
-"""m; no public model states it: that of the Cadiere forceps, as for jaws in `robots.dvrk.instruments`."""
+"""m; without a public model: as long as the Cadiere forceps, as jaws in `robots.dvrk.instruments`."""
 
 
 def parts(_electrode: Electrode, _instrument: str, mount: Mount) -> Looks:

@@ -1,7 +1,7 @@
 """Looks and collision shapes of end effectors by kind; a new kind is registered here.
 
-Both are drawn in the PSM's base frame with every joint at 0. A kind that is not registered is not drawn and
-collides with nothing; it may have contact spheres for all that.
+Both are drawn in the PSM's base frame with every joint at 0. A kind not registered is not drawn and collides
+with nothing, contact spheres apart.
 """
 
 from __future__ import annotations

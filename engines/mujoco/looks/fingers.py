@@ -1,8 +1,8 @@
-"""Fingers of jaws: the shape of each kind, its mesh, and the box that grasps.
+"""Fingers of jaws: shape, mesh and grasping box of each kind.
 
-A finger is drawn with x the way the left one opens, y the wrist yaw axis, z to the tip, origin in the axis.
-Its pad is flat and lies in the plane x = 0, so that the pads of two fingers meet when the jaw is at 0; a
-curved one (Maryland) curves along y, within that plane. Metres.
+A finger is drawn with x in the opening direction of the left finger, y the wrist yaw axis, z to the tip,
+origin in the axis. The pad is flat in the plane x = 0: the pads of two fingers meet when the jaw is at 0; a
+curved pad (Maryland) curves along y, within the plane. Metres.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _HUB_RADIUS, _HUB_WIDTH = 0.0025, 0.00195
 med-air/SurRoL).
 """
 _ROOT = 0.0030
-"""Distance from the axis at which the pad's plane is free of the other finger's hub."""
+"""Distance from the axis at which the pad's plane is free of the opposite finger's hub."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Shape:
     curve: float = 0.0
     """How far the tip lies off the middle, along the yaw axis."""
     recess: float = 0.0
-    """How far the finger stands back from the pad's plane, where a pad slides before it."""
+    """Distance of the finger behind the plane of a sliding pad."""
 
 
 _DRIVER = Shape(0.0, 0.00235, 0.00170, 0.0024, 0.0014)
@@ -58,8 +58,8 @@ _KINDS = {
     "MARYLAND": _DISSECTOR,
     "SCISSORS": _DISSECTOR,
 }
-"""By a word in the instrument's name; widths within those of the jaw meshes in unina-icaros/dvrk-vrep (4.8
-mm, 3.0 mm for both), forms ours.
+"""Shapes by a word in the instrument's name; widths within the jaw meshes in unina-icaros/dvrk-vrep (4.8 mm,
+3.0 mm for both), forms ours.
 """
 
 
@@ -74,15 +74,15 @@ def collision(jaw: Jaw, instrument: str, mount: Mount) -> Collisions:
 
 
 def shape(instrument: str, jaw: Jaw, recess: float = 0.0) -> Shape:
-    """Return the shape of the fingers of an instrument, called by its name."""
+    """Return the shape of the fingers of an instrument, by name."""
     kind = next((kind for word, kind in _KINDS.items() if word in instrument), _FORCEPS)
     return replace(kind, length=jaw.length, recess=recess)
 
 
 def finger_frame(mount: Mount) -> Vector:
-    """Return the frame that fingers are drawn in, shape (4, 4).
+    """Return the frame of drawn fingers, shape (4, 4).
 
-    x is the direction in which the left one opens, y the wrist yaw axis, z points to the tip.
+    x: opening direction of the left finger; y: wrist yaw axis; z: to the tip.
     """
     pose = np.eye(4)
     pose[:3, 1], pose[:3, 2], pose[:3, 3] = mount.axis, (0.0, 0.0, -1.0), mount.pose[:3, 3]
@@ -143,7 +143,7 @@ def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
 def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
     """Return the collision box of a finger.
 
-    Its face is exactly the plane of the pad, or stands back from it.
+    The face is exactly the plane of the pad, or behind the plane.
     """
     centre = np.array(
         [side * (form.tip_thickness + form.recess) / 2.0, _curve(form, 0.7), (_ROOT + form.length) / 2.0]
@@ -167,8 +167,8 @@ def _top_view(form: Shape, start: float, end: float = 1.0, share: float = 1.0) -
 
     Args:
         form: of the finger.
-        start: where it begins, as a fraction of the length.
-        end: where it ends, as a fraction of the length.
+        start: beginning, as a fraction of the length.
+        end: end, as a fraction of the length.
         share: of the pad's width.
     """
     root = _ROOT / form.length

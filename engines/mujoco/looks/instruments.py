@@ -1,9 +1,9 @@
 """Look of the PSM's instruments: housing, shaft, wrist and end effector.
 
-They are drawn in the PSM's base frame with every joint at 0. The housing belongs to the body `insertion`, the
-shaft to `roll`; each wrist link and finger to the body of its name. Sources: shaft, wrist and jaw lengths
-from `robots.dvrk.instruments`; diameters and boxes of wrist and housing from unina-icaros/dvrk-vrep and the
-CAD meshes in med-air/SurRoL; forms of the fingers by the kind of instrument, ours.
+Drawn in the PSM's base frame with every joint at 0. The housing belongs to the body `insertion`, the shaft to
+`roll`; each wrist link and finger to the body of the same name. Sources: shaft, wrist and jaw lengths from
+`robots.dvrk.instruments`; diameters and boxes of wrist and housing from unina-icaros/dvrk-vrep and the CAD
+meshes in med-air/SurRoL; forms of the fingers by the kind of instrument, ours.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def _plain_shaft(end: Vector) -> tuple[Part, ...]:
 
 
 def _housing() -> tuple[Part, ...]:
-    """Housing before the sterile adapter, with the two levers that release it."""
+    """Housing before the sterile adapter, with the two release levers."""
     face = outline(
         [(0.430, -0.034), (0.5010, -0.030), (0.5010, 0.030), (0.430, 0.034), (0.418, 0.027), (0.418, -0.027)]
     )
@@ -57,7 +57,7 @@ def _housing() -> tuple[Part, ...]:
 
 
 def _shaft(pitch: Vector) -> tuple[Part, ...]:
-    """Shaft down to the clevis about the wrist pitch axis, which is z of `pitch`, shape (4, 4)."""
+    """Shaft down to the clevis about the wrist pitch axis, z of `pitch`, shape (4, 4)."""
     height = pitch[2, 3]
     tube = rod((0.0, 0.0, height + 0.0091), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS, segments=12)
     core = rod((0.0, 0.0, height - 0.0019), (0.0, 0.0, height + 0.0091), SHAFT_RADIUS - 4e-5, segments=12)
@@ -80,10 +80,7 @@ def _drawing(pitch: Vector) -> Vector:
 
 
 def _wrist_link(name: str, frame: Vector, below: Vector) -> Part:
-    """Link from its joint, z of `frame`, to the next one, z of `below`.
-
-    It has a hub in the clevis above it, and ears about the link below.
-    """
+    """Link from z of `frame` to z of `below`, with a hub in the clevis above, and ears below."""
     length = float(np.linalg.norm(below[:3, 3] - frame[:3, 3]))
     if length < 1e-6:  # two crossed joints of a snake wrist
         return part(

@@ -1,8 +1,8 @@
-"""Look of the MUSHA hand at the end of a PSM's shaft: palm and phalanges, and the capsules that collide.
+"""Look of the MUSHA hand at the end of a PSM's shaft: palm and phalanges, and collision capsules.
 
-They are drawn in the PSM's base frame with every joint at 0, a phalanx in the frame of its link: x along it,
-y to the side that closes, z along the joint's axis. Forms are ours, within the radius of the phalanges and,
-for the palm, of the trocar.
+Drawn in the PSM's base frame with every joint at 0, a phalanx in the frame of the link: x along the phalanx,
+y to the closing side, z along the joint's axis. Forms are ours, within the radius of the phalanges and, for
+the palm, of the trocar.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def collision(hand: Hand, _instrument: str, mount: Mount) -> Collisions:
 
 
 def _palm(hand: Hand, shaft: Vector) -> Part:
-    """A disc that is wider than the shaft, with a pair of ears for each finger."""
+    """A disc wider than the shaft, with a pair of ears for each finger."""
     radius, top = TROCAR_RADIUS - 1e-4, hand.palm - hand.radius
     body = turned(
         [(0.0, -0.004), (SHAFT_RADIUS, -0.004), (radius, 0.0), (radius, top), (0.0, top)], segments=14
@@ -61,13 +61,13 @@ def _palm(hand: Hand, shaft: Vector) -> Part:
 
 
 def _ears(end: float, start: float) -> Manifold:
-    """Return two cheeks beside a hub at x = `end`, which begin at x = `start`."""
+    """Return two cheeks beside a hub at x = `end`, from x = `start`."""
     cheek = block((start, -0.0012, _EAR - 0.0003), (end + 0.0012, 0.0012, _EAR_END - 0.0002))
     return cheek + cheek.mirror((0.0, 0.0, 1.0))
 
 
 def _phalanx(hand: Hand, link: HandLink, pose: Vector) -> tuple[Part, ...]:
-    """Return a hub in the joint, a barrel, a pad on its closing side, and ears or a round fingertip.
+    """Return a hub in the joint, a barrel, a pad on the closing side, and ears or a round fingertip.
 
     The ears hold the next joint.
     """

@@ -57,7 +57,9 @@ _TURNS = {
     "y": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
     "z": np.eye(3),
 }
-"""From (u, v, w), with w the axis of an extrusion, to (x, y, z): the plane is (y, z), (z, x) or (x, y)."""
+"""Matrices from (u, v, w), with w the axis of an extrusion, to (x, y, z): the plane is (y, z), (z, x) or (x,
+y).
+"""
 
 
 def outline(points: Sequence[Point2], radius: float = 0.0) -> CrossSection:

@@ -15,11 +15,11 @@ from schemas.visualization import ColorRGBA, Marker, MarkerType
 __all__ = ["MOST_LETTERS", "check", "orientation"]
 
 MOST_LETTERS = 256
-"""In one text, and in the name of a namespace."""
+"""Most letters in a text, and in the name of a namespace."""
 _FARTHEST = 100.0
 """m; of a position from its frame, and of a size: a scene has the size of a room."""
 _QUATERNION_TOLERANCE = 1e-3
-"""Of the norm, as for the values of signals (schemas.vectors)."""
+"""Tolerance of the norm, as for the values of signals (schemas.vectors)."""
 _SOLID = ("x", "y", "z")
 _SIZES: dict[MarkerType, tuple[str, ...]] = {
     MarkerType.ARROW: ("x", "y"),
@@ -54,7 +54,7 @@ def check(marker: Marker, points: Vector, frames: Collection[str], objects: Coll
 
     Args:
         marker: to add or change.
-        points: its points, or those of its mesh, shape (n, 3), m.
+        points: points, or points of the mesh, shape (n, 3), m.
         frames: that the scene has.
         objects: whose shapes a mesh may be.
     """

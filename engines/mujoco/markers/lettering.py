@@ -1,4 +1,4 @@
-"""Letters as strokes: a text becomes line segments, which are drawn at any size and depth like all else.
+"""Letters as strokes: a text becomes line segments, drawn at any size and depth like all else.
 
 MuJoCo's own labels have a fixed size in pixels and are not hidden by what is in front of them.
 """

@@ -1,6 +1,6 @@
 """The kind `markers`: keeps what ROS programs and controllers want to see in the pictures of a scene.
 
-Its output is all that is shown, so a camera that looks on in its own time may miss any value of it.
+The output is all shown markers, so an observing camera may miss any value.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Markers", "MarkersParams"]
 
 _MOST_REASONS = 8
-"""In one text: a message may have thousands of equal mistakes."""
+"""Most reasons in a text: a message may have thousands of equal mistakes."""
 
 
 class MarkersParams(SceneParams):
@@ -138,14 +138,14 @@ class Markers(Stepped):
         return outputs
 
     def state_hash(self) -> int:
-        """Return the hash of all that is shown."""
+        """Return the hash of all shown markers."""
         shown = self._store.shown
         if self._hashed[0] is not shown:
             self._hashed = shown, state_hash(encode(shown))
         return self._hashed[1]
 
     def save(self) -> bytes:
-        """Return all that is shown."""
+        """Return all shown markers."""
         return encode(self._store.shown)
 
     def restore(self, state: bytes) -> None:

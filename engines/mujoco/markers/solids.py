@@ -32,7 +32,7 @@ _TINY = np.finfo(np.float64).tiny
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """One thing to draw."""
+    """An object to draw."""
 
     type: int
     """An `mjtGeom`."""
@@ -49,7 +49,7 @@ class Solid:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One shape of an object, in the object's frame; as in `Solid`."""
+    """A shape of an object, in the object's frame; as in `Solid`."""
 
     type: int
     size: Vector
@@ -77,7 +77,7 @@ def solids(marker: ShownMarker, pose_of: PoseOf, camera: Vector, shapes_of: Shap
 
     Args:
         marker: to draw.
-        pose_of: where frames are in the state that is drawn.
+        pose_of: where frames are in the state drawn.
         camera: the optical frame in the world, shape (4, 4); texts face it.
         shapes_of: the shapes of the scene's objects.
     """

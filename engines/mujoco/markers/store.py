@@ -28,7 +28,7 @@ MOST_POINTS = 20_000
 """Points and letters of all markers together."""
 _WORLD = "world"
 _SHOWN_LETTERS = 40
-"""Of a namespace, in a reason."""
+"""Letters of a namespace shown in a reason."""
 
 S = TypeVar("S", bound=np.generic)
 
@@ -38,12 +38,12 @@ PoseOf = Callable[[str], Vector]
 
 @dataclass(frozen=True, slots=True)
 class ShownMarker:
-    """One marker as it is shown."""
+    """A marker as it is shown."""
 
     type: MarkerType
     frame: str
     pose: Vector
-    """In the frame, shape (7,)."""
+    """Pose in the frame, shape (7,)."""
     scale: Vector
     """Shape (3,), m; a number of a mesh."""
     color: NDArray[np.float32]

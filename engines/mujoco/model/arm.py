@@ -1,4 +1,4 @@
-"""One arm of the model: its bodies and joints, their masses, servos, ties, sites and sensors."""
+"""An arm of the model: bodies and joints, masses, servos, ties, sites and sensors."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from schemas.vectors import Vector
 __all__ = ["add"]
 
 _HIDDEN = 4
-"""A group that MuJoCo's viewer does not show unless asked."""
+"""A group hidden in MuJoCo's viewer by default."""
 
 
 def add(spec: mujoco.MjSpec, name: CartArm, params: MountedArm, base_pose: Vector) -> Bodies:
-    """Add the arm called `name`, and return its bodies by link.
+    """Add the arm called `name`, and return the bodies by link.
 
-    `base_pose`: pose of its base frame in the world, shape (4, 4).
+    `base_pose`: pose of the base frame in the world, shape (4, 4).
     """
     base = spec.worldbody.add_body(name=f"{name}/{BASE}", **placed(base_pose))
     base.add_site(name=f"{name}/base", group=_HIDDEN)
@@ -72,7 +72,7 @@ def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) 
 
 
 def _add_discs(spec: mujoco.MjSpec, arm: str, discs: Sequence[Disc]) -> None:
-    """Add the friction of an instrument's discs: a disc turns with more than one joint."""
+    """Add the friction of an instrument's discs: a disc turns with several joints."""
     for i, disc in enumerate(discs, 1):
         tendon = spec.add_tendon(
             name=f"{arm}/disc_{i}",
@@ -84,7 +84,7 @@ def _add_discs(spec: mujoco.MjSpec, arm: str, discs: Sequence[Disc]) -> None:
 
 
 def _set_inertias(bodies: Bodies, params: MountedArm) -> None:
-    """Carry the inertia of each link, given in the base frame with every joint at 0, to its body."""
+    """Set the inertia of each body from the base frame with every joint at 0."""
     for link, given in params.bodies.items():
         body, pose = bodies[link]
         turn = pose[:3, :3]

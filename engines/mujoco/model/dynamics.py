@@ -1,8 +1,8 @@
-"""The equations of motion of one arm: M(q) a + gravity(q) + elastic(q) + friction(v) = effort.
+"""The equations of motion of an arm: M(q) a + gravity(q) + elastic(q) + friction(v) = effort.
 
-They are in its independent joints. The linkage, and the fingers held closed, move with the joints that lead
-them: with v = G u, from the velocities u of the independent joints to those of all, the inertia is G' M G and
-a load G' f.
+Coordinates are the independent joints. The linkage, and the closed fingers, move with their leading joints:
+with v = G u, from the velocities u of the independent joints to the velocities v of all joints, the inertia
+is G' M G and a load G' f.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ UPRIGHT: Mapping[str, Any] = MappingProxyType({"mounting": "free"})
 
 @dataclass(frozen=True)
 class JointDynamics:
-    """At one configuration; rad, m, N m, N, by joint in the order of `joints`."""
+    """Dynamics at a configuration; rad, m, N m, N, by joint in the order of `joints`."""
 
     joints: tuple[str, ...]
     base: Vector
-    """Rotation from the arm's base frame to the world, whose z is up, shape (3, 3)."""
+    """Rotation from the arm's base frame to the world (z up), shape (3, 3)."""
     inertia: Vector
     """Joint-space inertia matrix, shape (n, n)."""
     gravity: Vector
-    """Effort that holds the arm against gravity as its base stands, shape (n,)."""
+    """Holding effort against gravity, with the base as given, shape (n,)."""
     viscous_friction: Vector
-    """Effort per velocity of a joint that moves alone, shape (n,); the discs of an instrument couple wrist
-    and jaw, see `friction`.
+    """Effort per velocity of a joint moving alone, shape (n,); the discs of an instrument couple wrist and
+    jaw, see `friction`.
     """
     coulomb_friction: Vector
-    """Effort of a joint that moves alone, shape (n,)."""
+    """Effort of a joint moving alone, shape (n,)."""
     friction: Vector
     """Effort against friction at the velocities asked for, shape (n,)."""
     elastic_stiffness: Vector
     """Shape (n,)."""
     elastic: Vector
-    """Effort that holds the arm against its springs, shape (n,)."""
+    """Holding effort against the springs, shape (n,)."""
 
 
 def dynamics(

@@ -1,4 +1,4 @@
-"""The motors of an end effector in the model: servos, tendons, springs and ties, and its sensors."""
+"""An end effector in the model: servos, tendons, springs, ties and sensors."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def add_motors(
 
 
 def _add_gear(spec: mujoco.MjSpec, arm: str, motor: Motor, drive: Drive, joint: Joint) -> None:
-    """Add a motor whose links move as one.
+    """Add a motor of links tied to each other.
 
-    The links share the inertia of the rotor: they are light, and MuJoCo's contacts give way in proportion to
-    the inverse of the masses they touch.
+    The links share the inertia of the rotor: links are light, and MuJoCo's contacts give way in proportion to
+    the inverse of the touching masses.
     """
     name = f"{arm}/{motor.name}"
     tendon = spec.add_tendon(name=name)
@@ -58,10 +58,10 @@ def _add_gear(spec: mujoco.MjSpec, arm: str, motor: Motor, drive: Drive, joint: 
 
 
 def _add_tendon(spec: mujoco.MjSpec, arm: str, motor: Motor, drive: Drive, joint: Joint) -> None:
-    """Add a motor that pulls.
+    """Add a pulling motor.
 
-    A motor that lets go turns its own rotor, with the torque for the joint's largest acceleration, and pushes
-    no harder: springs open the finger.
+    Letting go, the motor turns the rotor, with the torque for the joint's largest acceleration, and pushes no
+    harder: springs open the finger.
     """
     name = f"{arm}/{motor.name}"
     tendon = spec.add_tendon(name=name, armature=drive.armature)
@@ -75,7 +75,7 @@ def _add_tendon(spec: mujoco.MjSpec, arm: str, motor: Motor, drive: Drive, joint
 
 
 def _let_fingers_touch(spec: mujoco.MjSpec, arm: str, effector: EndEffector) -> None:
-    """Let fingers on tendons touch one another, which else nothing of an arm does."""
+    """Let fingers on tendons touch each other; no other links of an arm touch."""
     fingers = [motor.moves for motor in effector.motors if motor.kind == "tendon"]
     for one, other in combinations(fingers, 2):
         for a in one:
@@ -84,7 +84,7 @@ def _let_fingers_touch(spec: mujoco.MjSpec, arm: str, effector: EndEffector) -> 
 
 
 def add_ties(spec: mujoco.MjSpec, arm: str, effector: EndEffector) -> None:
-    """Tie the links of motors that serve one joint: a jaw does not give way to one side."""
+    """Tie the links of motors with the same joint: a jaw does not give way sideways."""
     for joint in effector.joints:
         motors = [motor for motor in effector.motors if motor.joint == joint.name]
         for one, other in pairwise(motors):
@@ -93,7 +93,7 @@ def add_ties(spec: mujoco.MjSpec, arm: str, effector: EndEffector) -> None:
 
 
 def add_sensors(spec: mujoco.MjSpec, arm: str, effector: EndEffector, links: Sequence[Link]) -> None:
-    """Add the sensors of the motors, then those of links that are read by themselves."""
+    """Add the sensors of the motors, then of links with readings."""
     at_joints, at_motors = sensed_motors(effector)
     add_joint_sensors(spec, arm, list(at_joints))
     add_motor_sensors(spec, arm, list(at_motors))
@@ -101,9 +101,9 @@ def add_sensors(spec: mujoco.MjSpec, arm: str, effector: EndEffector, links: Seq
 
 
 def sensed_motors(effector: EndEffector) -> tuple[Mapping[str, Motor], Mapping[str, Motor]]:
-    """Return the motors by the names of their sensors, in the order of the joints that they serve.
+    """Return the motors by the names of their sensors, in the order of their joints.
 
-    The motors of discs, which are measured at the joints of their links, come before all others.
+    Motors of discs, measured at the joints of their links, come first.
     """
     motors = [motor for joint in effector.joints for motor in effector.motors if motor.joint == joint.name]
     at_joints = {link: motor for motor in motors if motor.kind == "disc" for link in motor.moves}

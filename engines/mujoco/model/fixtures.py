@@ -1,6 +1,6 @@
-"""Boards, dishes, phantoms and boxes with discs, as bodies of the MuJoCo model that stand still.
+"""Boards, dishes, phantoms and boxes with discs, as fixed bodies of the MuJoCo model.
 
-Every post and dish is a body of its own: MuJoCo looks for contacts between bodies whose boxes overlap.
+Every post and dish is a separate body: MuJoCo looks for contacts between bodies with overlapping boxes.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ _BASE = [0.55, 0.5, 0.42, 1.0]
 _IN, _OUT = [0.1, 0.2, 0.9, 1.0], [0.85, 0.1, 0.1, 1.0]
 """Insertion blue, extraction red, as in the authors' scene."""
 _HOLE = 0.8e-3
-"""Radius of the dot that marks a hole, m."""
+"""Radius of the dot on a hole, m."""
 _RED, _WHITE = [0.8, 0.05, 0.05, 1.0], [1.0, 1.0, 1.0, 1.0]
 _SEEN: dict[str, Any] = {"contype": 0, "conaffinity": 0}
 _SEGMENTS = 24
-"""Boxes that make a rim: their inner faces are at most 0.25 mm off the circle."""
+"""Number of boxes in a rim: the inner faces are at most 0.25 mm off the circle."""
 _FILM = 1e-4
 """Thickness of the painted floor of a dish, m."""
 
 
 def add(spec: mujoco.MjSpec, name: str, params: FixtureParams) -> None:
-    """Add one fixture to the world, as bodies `name` and `name/...`."""
+    """Add a fixture to the world, as bodies `name` and `name/...`."""
     match params:
         case BoardParams():
             _add_board(spec, name, params)
@@ -86,7 +86,10 @@ def _add_dish(spec: mujoco.MjSpec, name: str, params: DishParams) -> None:
 
 
 def _add_phantom(spec: mujoco.MjSpec, name: str, params: PhantomParams) -> None:
-    """Add the base under the skin, which instruments and needles pass through: another engine has it."""
+    """Add the base under the skin.
+
+    Instruments and needles pass through the skin: another engine simulates the skin.
+    """
     x, y, z = params.measures.skin
     half = [x / 2.0, y / 2.0, params.measures.base / 2.0]
     body = _at(spec, name, params.pose, (0.0, 0.0, -z - half[2]))
@@ -120,7 +123,7 @@ def _add_disc_box(spec: mujoco.MjSpec, name: str, params: DiscBoxParams) -> None
 def _at(
     spec: mujoco.MjSpec, name: str, pose: np.ndarray, offset: tuple[float, float, float]
 ) -> mujoco.MjsBody:
-    """Add a body whose frame is `offset` (m) from that of the fixture at `pose`, shape (4, 4)."""
+    """Add a body at `offset` (m) in the frame of the fixture at `pose`, shape (4, 4)."""
     there = pose.copy()
     there[:3, 3] += pose[:3, :3] @ offset
     return spec.worldbody.add_body(name=name, **placed(there))

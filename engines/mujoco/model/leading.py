@@ -14,10 +14,10 @@ __all__ = ["to_all_joints"]
 
 
 def to_all_joints(model: mujoco.MjModel, arm: CartArm, params: MountedPsm | MountedEcm) -> Vector:
-    """Return the matrix from velocities of the n joints of `arm` to those of all joints, shape (nv, n).
+    """Return the matrix from velocities of the n joints of `arm` to velocities of all joints, shape (nv, n).
 
-    The linkage moves with the joints that lead it; the fingers of a jaw are held. The transpose takes loads
-    of all joints to those of the arm.
+    The linkage moves with the leading joints; the fingers of a jaw are held. The transpose maps loads of all
+    joints to loads of the arm's joints.
     """
     joints = [joint.name for joint in params.chain.joints]
     result = np.zeros((model.nv, len(joints)))

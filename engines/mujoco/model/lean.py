@@ -1,4 +1,4 @@
-"""Less of a model, for learning: arms without their linkage's own joints and without their covers' contacts.
+"""A reduced model, for learning: arms without joints of the linkage and without contacts of covers.
 
 The links of a parallelogram follow the joint that leads them, each by a tie that costs the solver a row and a
 degree of freedom. Here they stand still, and the leading joint has what they add to its inertia, where the
@@ -22,11 +22,11 @@ from schemas.vectors import Vector
 __all__ = ["lean"]
 
 _WRIST = ("roll", "wrist_pitch", "wrist_yaw")
-"""The links that, with those of an end effector, reach where objects are."""
+"""Links of the wrist, in reach of objects, as the links of an end effector are."""
 
 
 def lean(spec: mujoco.MjSpec, scene: SceneParams) -> tuple[mujoco.MjModel, Vector]:
-    """Return the lean model of `spec`, and the matrix from its `qpos` to that of the whole one."""
+    """Return the lean model of `spec`, and the matrix from its `qpos` to the `qpos` of the whole model."""
     whole = spec.compile()
     follows = {
         f"{arm}/{link.name}": Follow(f"{arm}/{link.follow.joint}", link.follow.ratio)
@@ -56,7 +56,7 @@ def lean(spec: mujoco.MjSpec, scene: SceneParams) -> tuple[mujoco.MjModel, Vecto
 def _carry(
     whole: mujoco.MjModel, model: mujoco.MjModel, scene: SceneParams, follows: Mapping[str, Follow]
 ) -> None:
-    """Give leading joints the inertia of what follows them."""
+    """Give leading joints the inertia of their following links."""
     inertias: list[Vector] = []
     for one in (whole, model):
         data, inertia = mujoco.MjData(one), np.zeros((one.nv, one.nv))
@@ -80,7 +80,7 @@ def _dof(model: mujoco.MjModel, joint: str) -> int:
 
 
 def _positions(whole: mujoco.MjModel, model: mujoco.MjModel, follows: Mapping[str, Follow]) -> Vector:
-    """Return the matrix from the positions of `model` to those of `whole`, shape (whole.nq, model.nq)."""
+    """Return the matrix from positions of `model` to positions of `whole`, shape (whole.nq, model.nq)."""
     matrix = np.zeros((whole.nq, model.nq))
     for i in range(whole.njnt):
         joint = whole.joint(i)  # its size is that of `qpos0`: 7 of a free one

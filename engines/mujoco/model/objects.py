@@ -1,8 +1,7 @@
-"""The table and the things that lie on it, as bodies of the MuJoCo model.
+"""The table and movable objects, as bodies of the MuJoCo model.
 
-A bent wire is a row of capsules. Its mass, centre and inertia are those of the smooth wire, so they do not
-depend on how many capsules there are. A triangular ring is three boxes with
-round edges.
+A bent wire is a row of capsules. Mass, centre and inertia of the smooth wire do not depend on the number of
+capsules. A triangular ring is three boxes with round edges.
 """
 
 from __future__ import annotations
@@ -50,13 +49,13 @@ MuJoCo's default; of tables; of wires among each other. A wire lies on a table w
 at rest costs a few contacts and not two for each of its capsules.
 """
 LEVEL = {"contype": _THINGS, "conaffinity": _TABLE}
-"""Collision bits of what things lie on."""
+"""Collision bits of surfaces under objects."""
 _PAD = {"contype": 0, "conaffinity": _TABLE}
-"""Of a soft table, which touches things and not the instruments."""
+"""Collision bits of a soft table: touched by objects, not by instruments."""
 _SOLID = {"contype": _THINGS | _TABLE, "conaffinity": _THINGS}
-"""Of a thing that lies on its own faces."""
+"""Collision bits of an object with flat faces."""
 _BALLS_APART = pi / 4.0
-"""Greatest angle between two of those balls, rad."""
+"""Greatest angle between two balls of a wire, rad."""
 _RGBA = {
     "ring": [0.85, 0.2, 0.15, 1.0],
     "needle": [0.8, 0.8, 0.85, 1.0],
@@ -74,15 +73,15 @@ _COLOURS = (
     [0.95, 0.45, 0.1, 1.0],
     [0.6, 0.3, 0.75, 1.0],
 )
-"""Of pieces and triangular rings, in the order of their names' numbers, so that they differ."""
+"""Colours of pieces and triangular rings, by the number in the name."""
 _CORE = 0.9
-"""Thickness of a ring's wall between its edges, as a share of theirs."""
+"""Thickness of a ring's wall between the edges, as a share of the edges' thickness."""
 _ROUNDNESS = 0.1
-"""Greatest distance of a wire's capsules from its centre line, as a share of its radius."""
+"""Greatest distance of a wire's capsules from the centre line, as a share of the wire's radius."""
 
 
 def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
-    """Add the table to the world, as a body of its own.
+    """Add the table to the world, as a separate body.
 
     MuJoCo pairs geoms of the world body with every link, however far away.
     """
@@ -98,7 +97,7 @@ def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
 def start_pose(name: str, params: ObjectParams, seed: int | None) -> tuple[Vector, Vector]:
     """Return where the object `name` starts in the world: position (m) and quaternion (x, y, z, w).
 
-    With a `seed` it is moved and turned by shares of its `scatter`, which are the same on every machine.
+    A `seed` moves and turns the start by shares of `scatter`, the same on every machine.
     """
     position, turn = np.array(params.position), np.array(params.orientation)
     if seed is None or not any(params.scatter):
@@ -110,7 +109,7 @@ def start_pose(name: str, params: ObjectParams, seed: int | None) -> tuple[Vecto
 
 
 def add(spec: mujoco.MjSpec, name: str, params: ObjectParams, seed: int | None = None) -> None:
-    """Add one movable object as the body `name`, in the object's frame, with the free joint `name`."""
+    """Add a movable object as the body `name`, in the object's frame, with the free joint `name`."""
     position, (x, y, z, w) = start_pose(name, params, seed)
     body = spec.worldbody.add_body(name=name, pos=position, quat=[w, x, y, z])
     body.add_freejoint(name=name)

@@ -1,4 +1,4 @@
-"""Poses in MuJoCo's order, in which quaternions are (w, x, y, z), and in ROS's, (x, y, z, w)."""
+"""Poses in MuJoCo's order, quaternions (w, x, y, z), and in ROS's, (x, y, z, w)."""
 
 from __future__ import annotations
 
@@ -14,6 +14,6 @@ ROS_ORDER = np.array([0, 1, 2, 4, 5, 6, 3])
 
 
 def placed(pose: Vector) -> dict[str, list[float]]:
-    """Return `pos` and `quat` of an element from its pose in its parent, shape (4, 4)."""
+    """Return `pos` and `quat` of an element from the pose in the parent, shape (4, 4)."""
     x, y, z, w = rotation.from_matrix(pose).tolist()
     return {"pos": pose[:3, 3].tolist(), "quat": [w, x, y, z]}

@@ -1,4 +1,4 @@
-"""Constraints that hardly give way: ties between joints, stops, and welds."""
+"""Stiff constraints: ties between joints, stops, and welds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import mujoco
 __all__ = ["RIGID", "tie"]
 
 RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
-"""A time constant of twice the default sub-step, the shortest that MuJoCo takes, and all but rigid."""
+"""A time constant of twice the default sub-step, the shortest allowed by MuJoCo, and all but rigid."""
 
 
 def tie(spec: mujoco.MjSpec, name: str, follower: str, leader: str, ratio: float = 1.0) -> None:

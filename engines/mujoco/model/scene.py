@@ -30,7 +30,7 @@ def build(scene: SceneParams, timestep: float = _TIMESTEP) -> mujoco.MjModel:
 
 
 def spec(scene: SceneParams) -> mujoco.MjSpec:
-    """Return the model of `scene` before it is compiled, to be exported or added to."""
+    """Return the uncompiled model of `scene`, for export or additions."""
     result = mujoco.MjSpec()
     result.modelname = scene.model
     result.compiler.degree = False
@@ -53,7 +53,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
 def place(
     model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, MountedPsm | MountedEcm]
 ) -> None:
-    """Put the joints of `arms`, with fingers and, unless the model is lean, linkages, where they start."""
+    """Put the joints of `arms`, with fingers and, unless the model is lean, linkages, at the start."""
     for name, params in arms.items():
         start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
         start |= params.end_effector.positions(np.array(params.end_effector_start))

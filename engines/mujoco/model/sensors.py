@@ -1,4 +1,4 @@
-"""Sensors of an arm, in the order that `engines.mujoco.model.names.first_sensor` documents."""
+"""Sensors of an arm, in the order documented by `engines.mujoco.model.names.first_sensor`."""
 
 from __future__ import annotations
 

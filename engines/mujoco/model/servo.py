@@ -1,4 +1,4 @@
-"""Servos of joints and tendons: PID actuators with feed-forward, and what a drive adds to its joint."""
+"""Servos of joints and tendons: PID actuators with feed-forward, with friction and rotor inertia."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["add_joint_drive", "add_servo"]
 
 
 def add_joint_drive(spec: mujoco.MjSpec, name: str, joint_name: str, drive: Drive) -> None:
-    """Add friction, elasticity and rotor inertia of a joint, and its servo called `name`."""
+    """Add friction, elasticity and rotor inertia of a joint, and the servo called `name`."""
     joint = spec.joint(joint_name)
     joint.damping, joint.frictionloss, joint.armature = (
         [drive.viscous_friction, 0.0, 0.0],
@@ -32,16 +32,16 @@ def add_servo(
     limits: tuple[float, float],
     least_force: float | None = None,
 ) -> None:
-    """Add a servo called `name`; its inputs are position, velocity and feed-forward effort.
+    """Add a servo called `name`, with the inputs position, velocity and feed-forward effort.
 
     Args:
         spec: the model.
         name: name of the actuator.
         target: joint or tendon.
-        kind: which of both it is.
+        kind: transmission of `target`: joint or tendon.
         drive: gains, and largest velocity and effort.
-        limits: range of its position.
-        least_force: lower limit of its force, where it is not as strong either way.
+        limits: range of the position.
+        least_force: lower limit of the force; -effort unless given.
     """
     actuator = spec.add_actuator(
         name=name,

@@ -1,6 +1,6 @@
-"""The patient cart and its setup joints: braked, so bodies that stand still where they are set.
+"""The patient cart and the braked setup joints, as fixed bodies.
 
-Their masses move nothing here; they are for those who take the model elsewhere.
+Masses have no effect here; exported models use the masses.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from schemas.vectors import Vector
 __all__ = ["CART", "add"]
 
 CART = "cart"
-"""The body of the cart, whose frame is the world's; the setup joints are given in it."""
+"""The body of the cart; the frame is the world's, and the frame of the setup joints."""
 
 
 def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:

@@ -1,8 +1,8 @@
-"""What arms, setup joints and cart look like, and what of them collides.
+"""Looks and collision shapes of arms, setup joints and cart.
 
 Looks and collision shapes come from `engines.mujoco.looks`, drawn in an arm's base frame (or the cart's) with
-every joint at 0, and are carried to the bodies here. What collides: cart, setup joints and every link of the
-arms with objects, the latter also with the table; shaft, wrist and fingers also with those of the other arms.
+every joint at 0, and are carried to the bodies here. Cart, setup joints and every link of the arms collide
+with objects, links also with the table; shaft, wrist and fingers also with the same parts of other arms.
 Covers of two arms pass through each other, as they do in the dVRK's own simulated setup (PSM2 and PSM3 stand
 in one another there), and no arm collides with itself.
 """
@@ -26,16 +26,14 @@ from schemas.vectors import Vector
 __all__ = ["Bodies", "add", "add_arm"]
 
 Bodies = Mapping[str, tuple[mujoco.MjsBody, Vector]]
-"""Per link: its body, and the body's pose, shape (4, 4), in the frame that the look is drawn in, with every
-joint at 0.
-"""
+"""Body by link, and the body's pose, shape (4, 4), in the frame of the look, with every joint at 0."""
 
 _SEEN, _COLLIDING = 1, 3
 """Groups of geoms; MuJoCo's viewer hides the latter unless asked."""
 _THINGS = 1
-"""The collision bit of table and objects, which is MuJoCo's default."""
+"""Collision bit of table and objects: MuJoCo's default."""
 _BIT: Mapping[str, int] = {arm: 2 << i for i, arm in enumerate(get_args(CartArm))}
-"""The collision bit of what each arm holds."""
+"""Collision bit of each arm's instrument."""
 _KINDS = {"box": mujoco.mjtGeom.mjGEOM_BOX, "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE}
 _UNSEEN_BY_PHYSICS = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": _SEEN}
 
@@ -43,7 +41,7 @@ _UNSEEN_BY_PHYSICS = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": _SEE
 def add_arm(
     spec: mujoco.MjSpec, arm: CartArm, params: MountedPsm | MountedEcm, bodies: Bodies, *, seen: bool
 ) -> None:
-    """Give an arm and its instrument collision shapes and, if they are to be `seen`, looks."""
+    """Give an arm and the instrument collision shapes and, if `seen`, looks."""
     whats = ("ecm",) if isinstance(params, MountedEcm) else ("psm", f"instrument/{params.tool.name}")
     for what in whats:
         add(spec, what, arm, bodies, seen=seen)
@@ -60,9 +58,9 @@ def add_arm(
 
 
 def add(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *, seen: bool) -> None:
-    """Give the bodies of `owner` collision shapes and, if they are to be `seen`, looks.
+    """Give the bodies of `owner` collision shapes and, if `seen`, looks.
 
-    `what`: a name that `looks.parts` knows.
+    `what`: a name known to `looks.parts`.
     """
     if seen:
         _add_looks(spec, what, bodies)
@@ -114,7 +112,7 @@ def _instrument(arm: str) -> dict[str, int]:
 
 
 def _mesh(spec: mujoco.MjSpec, name: str, part: looks.Part, pose: Vector) -> str:
-    """Add the mesh of `part` in the frame of a body at `pose`, unless another arm has brought it."""
+    """Add the mesh of `part` in the frame of a body at `pose`, unless there already by another arm."""
     if spec.mesh(name) is None:
         vertices = (part.vertices - pose[:3, 3]) @ pose[:3, :3]
         spec.add_mesh(name=name, uservert=vertices.ravel(), userface=np.asarray(part.faces, np.int32).ravel())

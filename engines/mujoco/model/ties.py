@@ -1,4 +1,4 @@
-"""Constraints that hold joints: ties that make two fingers one jaw, and the brakes of the ECM."""
+"""Constraints on joints: ties between the fingers of a jaw, and the brakes of the ECM."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from engines.mujoco.params import SceneParams
 __all__ = ["BRAKED", "add", "brake", "set_brake"]
 
 BRAKED = "ECM"
-"""The arm whose joints have brakes."""
+"""The arm with brakes."""
 
 
 def brake(joint: str) -> str:
-    """Return the name of the equality that brakes `joint` of the ECM; its first number is the position."""
+    """Return the name of the brake of `joint` of the ECM, an equality; the first number is the position."""
     return f"{BRAKED}/{joint}/brake"
 
 
 def set_brake(spec: mujoco.MjSpec, joint: str, position: float) -> None:
-    """Let the brake of `joint`, which `add` has added, close at `position` (rad, m)."""
+    """Let the brake of `joint`, from `add`, close at `position` (rad, m)."""
     if (equality := spec.equality(brake(joint))) is not None:
         equality.data[0] = position
 

@@ -1,7 +1,7 @@
 """The links of an arm as a tree, each with its pose in `<arm>_base` while every joint is at 0.
 
-The main chain has the frames of the arm's modified DH table, so that the tip is exact. The bars of the
-linkage and the end effector hang on it; the axis of every joint is z of its own frame.
+The main chain has the frames of the arm's modified DH table: the tip is exact. The bars of the linkage and
+the end effector hang on the main chain; the axis of every joint is z of the link's frame.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from robots.dvrk.setup_joints import CartArm
 __all__ = ["BASE", "links"]
 
 BASE = "base"
-"""The link that stands still; its frame has its origin in the remote centre of motion."""
+"""The fixed link; the origin of the frame is the remote centre of motion."""
 
 
 def links(arm: CartArm, params: MountedArm) -> tuple[Link, ...]:
     """Return all moving links of `arm`, parents before children.
 
-    They are those of its joints, of its linkage, and of its end effector.
+    The order: joints, linkage, end effector.
     """
     chain = params.chain
     poses = chain.frames(np.zeros(len(chain.joints)))

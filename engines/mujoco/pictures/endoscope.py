@@ -194,7 +194,7 @@ class Endoscope(Stepped):
         return np.frombuffer(file.getvalue(), np.uint8)
 
     def state_hash(self) -> int:
-        """Return the hash of the positions, nodes and markers that were drawn last.
+        """Return the hash of the positions, nodes and markers drawn last.
 
         Pixels are left out, since two machines need not draw the same ones.
         """

@@ -19,7 +19,7 @@ from schemas.scenario import Name
 __all__ = ["EndoscopeParams", "ViewParams"]
 
 _MOST_PIXELS = 2048
-"""Of a side: an uncompressed picture of 2048 x 2048 is the largest that fits into a message."""
+"""Most pixels of a side: an uncompressed picture of 2048 x 2048 is the largest in a message."""
 
 
 class ViewParams(Params):

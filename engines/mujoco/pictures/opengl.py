@@ -22,7 +22,7 @@ __all__ = ["REMEDY", "OpenGL", "check", "context", "find", "import_mujoco"]
 REMEDY = "apt-get install libosmesa6 (draws on the CPU), or libegl1 and the driver of the GPU"
 
 _CANDIDATES = {"linux": ("egl", "osmesa"), "darwin": ("cgl",)}
-"""By `sys.platform`, best first; elsewhere GLFW's hidden window."""
+"""OpenGL variants by `sys.platform`, best first; elsewhere GLFW's hidden window."""
 _OFF = ("disable", "disabled", "off", "false", "0")
 """Values of MUJOCO_GL that forbid OpenGL, as `mujoco.rendering.classic.gl_context` has them."""
 _SCREEN = ("glfw", "glx", "wgl", "enable", "enabled", "on", "true", "1")

@@ -37,7 +37,7 @@ _ASIDE = np.array([0.5, -0.72, 0.48])
 seen.
 """
 _DISTANCE, _LEAST = 1.4, 0.1
-"""Of the overview, in diagonals of the box around its subject; the least diagonal, m."""
+"""Distance of the overview, in diagonals of the box around the subject; the least diagonal, m."""
 _LENS = ("field_of_view", "baseline", "near", "far")
 _OVERSAMPLING = 2
 """Pixels drawn for each one of the picture, along either side: smooths edges."""

@@ -35,7 +35,7 @@ vertices, so large triangles show.
 class SkinMesh:
     """The displayed surface of a soft body.
 
-    A vertex on a sharp edge stands once for each smooth face that it bounds.
+    A vertex on a sharp edge is listed once for each adjacent smooth face.
     """
 
     def __init__(self, rest: Vector, triangles: Indices) -> None:

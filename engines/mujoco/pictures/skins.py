@@ -28,7 +28,7 @@ __all__ = ["Skins", "SoftBody"]
 _SHAPE = struct.Struct("<qq")
 """Number of nodes and of triangles."""
 _SPECULAR, _SHININESS = 0.5, 0.7
-"""Of wet tissue: highlights, small ones. Chosen by eye."""
+"""Shine of wet tissue: small highlights. Chosen by eye."""
 
 
 class SoftBody:
@@ -81,7 +81,7 @@ class SoftBody:
         self.triangles = triangles.reshape(-1, 3)
 
     def save(self) -> bytes:
-        """Return all that is known from the messages."""
+        """Return all soft bodies known from the messages."""
         return (
             _SHAPE.pack(len(self.rest), len(self.triangles))
             + self.rest.tobytes()

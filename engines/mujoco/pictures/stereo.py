@@ -19,8 +19,8 @@ __all__ = ["StereoRenderer"]
 
 _NO_SHADOWS = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
 _SHADOW_PIXELS = 2048
-"""Of the shadow map's side. MuJoCo's own 8192 takes three times as long to fill without a GPU and shows no
-more at endoscope resolution.
+"""Side of the shadow map. MuJoCo's own 8192 takes three times as long to fill without a GPU and shows no more
+at endoscope resolution.
 """
 _SPARE_GEOMS = 100
 """Room in the scene for what MuJoCo may add to a model's geoms."""

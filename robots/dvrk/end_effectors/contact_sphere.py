@@ -1,7 +1,4 @@
-"""The spheres with which an instrument touches tissue.
-
-They are fixed on its links; each is the motion side of a contact point.
-"""
+"""Contact spheres of an instrument, fixed on links; each is the motion side of a contact with tissue."""
 
 from __future__ import annotations
 
@@ -20,31 +17,31 @@ tool_gripper1_link.STL in WPI-AIM/dvrk_env.
 """
 
 _JAW_ROOT = 0.0030
-"""Distance from the wrist yaw axis (m) at which a finger is free of the other one's hub
+"""Distance from the wrist yaw axis (m) at which a finger is free of the hub of the opposite finger
 (`engines.mujoco.looks.fingers`).
 """
 
 
 @dataclass(frozen=True)
 class ContactSphere:
-    """One sphere."""
+    """A sphere."""
 
     name: str
-    """Unique in its instrument."""
+    """Name, unique in the instrument."""
     link: str
-    """The body that carries it."""
+    """Body under the sphere."""
     position: tuple[float, float, float]
-    """Position of its centre in the frame of that body, m."""
+    """Position of the centre in the frame of the body, m."""
     radius: float
     """m."""
 
 
 def on_jaw(length: float, ahead: Vector) -> tuple[ContactSphere, ...]:
-    """Return the spheres of two fingers: of the left one from the root to the end, then of the right one.
+    """Return the spheres of two fingers: the left finger from root to end, then the right finger.
 
-    They are as wide as the finger and touch the plane of its pad from behind, so that those of a jaw at 0
-    touch each other and the gap between them is that of the pads. The last one ends where the finger ends;
-    there are as many as it takes to leave no gap, two at least.
+    The spheres are as wide as the finger and touch the plane of the pad from behind: in a jaw at 0 opposite
+    spheres touch, and the gap between the spheres is the gap between the pads. The last sphere ends where the
+    finger ends; their number leaves no gap between neighbours, two at least.
 
     Args:
         length: from the wrist yaw axis to the end of the fingers, m.

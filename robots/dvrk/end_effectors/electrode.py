@@ -12,8 +12,8 @@ __all__ = ["Electrode"]
 
 
 class Electrode(EndEffector):
-    """A rigid tip in place of jaws. No public model states its mass: that of a probe's sphere stands in."""
+    """A rigid tip in place of jaws, as heavy as a probe's sphere: no public model states the mass."""
 
     def bodies(self, mount: Mount, /) -> Mapping[str, Inertia]:
-        """Return the electrode, in place of the link that carries it."""
+        """Return the electrode, in place of the wrist's last link."""
         return {mount.link: Inertia.of_steel_ball(mount.pose[:3, 3], PROBE_RADIUS)}

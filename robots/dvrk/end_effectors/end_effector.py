@@ -1,8 +1,8 @@
-"""The protocol of end effectors: the numbers of what stands at the end of an instrument.
+"""The protocol of end effectors: the numbers of the working end of an instrument.
 
-An end effector has *joints*, which are commanded; *motors*, which move *links*; and *bodies*, which weigh. An
-engine builds its model from these numbers alone, so a new end effector is a file beside this one, and a row
-in `robots.dvrk.instruments`. SI units, radians.
+An end effector has commanded *joints*, *motors*, moving *links* with masses, and contact spheres. An engine
+builds the model from these numbers alone, so a new end effector is a file in this package and a row in
+`robots.dvrk.instruments`. SI units, radians.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["EndEffector", "Motor", "Mount"]
 
 @dataclass(frozen=True)
 class Mount:
-    """The link that carries an end effector; poses in the arm's base frame with every joint at 0."""
+    """Link under an end effector; poses in the arm's base frame with every joint at 0."""
 
     link: str
     pose: Vector
@@ -66,30 +66,30 @@ class Motor:
 
     name: str
     joint: str
-    """Commanded joint that this motor serves."""
+    """Commanded joint served by this motor."""
     kind: Literal["disc", "gear", "tendon", "spring"]
     drive: Drive
     moves: Mapping[str, float]
     """Motor position per joint position, by link."""
     share: float = 1.0
-    """Setpoint of the motor over that of the joint."""
+    """Setpoint of the motor over setpoint of the joint."""
     tie: str = ""
 
     @property
     def ratio(self) -> float:
-        """Position of its links over that of the joint, where all move by equal amounts."""
+        """Position of the links over position of the joint, where all links move by equal amounts."""
         return self.share / plain_sum(self.moves.values())
 
 
 class EndEffector:
-    """An end effector without joints and without mass of its own: the common ground of all others."""
+    """An end effector without joints and without mass: the base of all end effectors."""
 
     name: ClassVar[str] = ""
-    """Second part of its ports' names, `<arm>/<name>/servo_jp`."""
+    """Second part of the names of ports, `<arm>/<name>/servo_jp`."""
     goal: ClassVar[str] = ""
     """Meaning of `servo_jp`, in words."""
     measured: ClassVar[str] = ""
-    """Meaning of `measured_js`, in words, where it is more than the positions of the joints."""
+    """Meaning of `measured_js`, in words, where more than the positions of the joints."""
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -98,7 +98,7 @@ class EndEffector:
 
     @property
     def motors(self) -> tuple[Motor, ...]:
-        """Servos that move the links, in the order of the model's actuators."""
+        """Servos of the links, in the order of the model's actuators."""
         return ()
 
     def links(self, _mount: Mount, /) -> tuple[Link, ...]:
@@ -114,9 +114,9 @@ class EndEffector:
         return {link: commands[motor.joint] * motor.ratio for motor in self.motors for link in motor.moves}
 
     def bodies(self, _mount: Mount, /) -> Mapping[str, Inertia]:
-        """Return the inertia by link in the base frame; an entry for the mount's link replaces its own."""
+        """Return the inertia by link in the base frame; an entry for the mount's link replaces the link."""
         return {}
 
     def spheres(self, _tip: Vector, /) -> tuple[ContactSphere, ...]:
-        """Return the spheres that touch tissue, given the pose of the tip in the mount's link, (4, 4)."""
+        """Return the contact spheres for tissue, given the pose of the tip in the mount's link, (4, 4)."""
         return ()

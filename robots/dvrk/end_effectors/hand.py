@@ -2,7 +2,7 @@
 
 Two motors drive the three joints of a finger. One sets the *spread* s (rad), where the spring in the first
 joint is at rest. The other winds a tendon up that runs over a pulley in every joint and closes the phalanges
-against springs: how far each goes is decided by springs and by what it meets, and a phalanx that is blocked
+against springs: how far each goes is decided by springs and by what it meets, and a phalanx blocked
 lets the others go on. At the tension T of the tendon, joint i with pulley r_i and spring k_i (at rest at
 q_i0, s for the first one) stands, unloaded, at q_i = q_i0 + r_i T / k_i, inside its stops.
 
@@ -38,12 +38,12 @@ from schemas.vectors import Vector
 __all__ = ["Hand", "HandLink", "Mode", "Phalanx"]
 
 _CARRIER = "roll"
-"""The link that carries the fingers."""
+"""The link under the fingers."""
 
 
 @dataclass(frozen=True)
 class Phalanx:
-    """One phalanx, its joint, and what closes and opens it; the same in all fingers.
+    """A phalanx with joint, pulley and spring; the same in all fingers.
 
     Positive angles close.
     """
@@ -55,11 +55,11 @@ class Phalanx:
     upper: float
     """Stops, rad."""
     pulley: float
-    """Radius over which the tendon runs, m."""
+    """Radius of the pulley under the tendon, m."""
     stiffness: float
     """Spring stiffness, N m/rad."""
     rest: float
-    """Where the spring would be at rest, rad; below `lower` it presses the joint to its stop.
+    """Rest position of the spring, rad; below `lower` the spring presses the joint to the stop.
 
     For the first phalanx: with the spread at 0.
     """
@@ -69,9 +69,9 @@ class Phalanx:
 
 @dataclass(frozen=True)
 class HandLink:
-    """A phalanx of one finger, as a body.
+    """A phalanx of a finger, as a body.
 
-    Its frame has z along the joint's axis, x along the phalanx, y to the side that closes.
+    Frame: z along the joint's axis, x along the phalanx, y to the closing side.
     """
 
     name: str
@@ -83,9 +83,9 @@ class HandLink:
 
 @dataclass(frozen=True)
 class Mode:
-    """An actuation pattern: the commands (rad) of the hand when it is open and when it is closed.
+    """An actuation pattern: commands (rad) of the open and of the closed hand.
 
-    A number from 0 (open) to 1 (closed) interpolates between them.
+    A number from 0 (open) to 1 (closed) interpolates.
     """
 
     open: tuple[float, ...]
@@ -109,7 +109,7 @@ class Hand(EndEffector):
     density: float
     """Density of the phalanges, round bars, kg/m^3."""
     effort: float
-    """Largest torque of a motor, of a tendon's at the first pulley, N m: that one pulls, and pushes nothing.
+    """Largest torque of a motor, N m; for a tendon at the first pulley: a tendon pulls, and pushes nothing.
     """
     velocity: float
     """Largest velocity of a closing or spread, rad/s."""
@@ -150,7 +150,7 @@ class Hand(EndEffector):
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """Closings and spreads as joints: their ranges and what they can do."""
+        """Closings and spreads as joints, with ranges and limits."""
         first, ratios = self.phalanges[0], self._pulleys / self._pulleys[0]
         limits = (self.velocity, self.effort, self.acceleration, self.jerk)
         most = float(ratios @ [phalanx.upper for phalanx in self.phalanges])
@@ -166,9 +166,8 @@ class Hand(EndEffector):
     def motors(self) -> tuple[Motor, ...]:
         """Finger by finger, the tendon that closes it, and the spread.
 
-        A closing is turned by a disc that winds a tendon up and lets it go; its friction stays with the
-        motor, as the springs that open a finger do not turn it. A spread moves the end of a spring, with the
-        friction of the first joints.
+        A closing is turned by a disc with a tendon; the friction stays with the motor, as opening springs do
+        not turn the disc. A spread moves the end of a spring, with the friction of the first joints.
         """
         spring, friction = self.phalanges[0].stiffness, float(self.damping[0])
         closing = Drive.of_disc(1.0, self.effort, self.velocity)
@@ -183,7 +182,7 @@ class Hand(EndEffector):
         return tuple(motors)
 
     def links(self, mount: Mount, /) -> tuple[Link, ...]:
-        """Return the phalanges; in the first joint of a finger its spread is the spring."""
+        """Return the phalanges; the spread is the spring in the first joint of a finger."""
         first, damping = self.phalanges[0], dict(zip(self.phalanges, self.damping.tolist(), strict=True))
         return tuple(
             Link(
@@ -202,7 +201,7 @@ class Hand(EndEffector):
         )
 
     def positions(self, command: Vector) -> Mapping[str, float]:
-        """Return where the phalanges are at rest when they touch nothing."""
+        """Return the positions of the phalanges at rest, free of contact."""
         return dict(
             zip((bone.name for bone in self.bones), self.unloaded(command).ravel().tolist(), strict=True)
         )
@@ -216,7 +215,7 @@ class Hand(EndEffector):
         return bodies
 
     def spheres(self, _tip: Vector, /) -> tuple[ContactSphere, ...]:
-        """Return one contact sphere on each phalanx, in the order of `bones`."""
+        """Return a contact sphere on each phalanx, in the order of `bones`."""
         return tuple(
             ContactSphere(
                 bone.name, bone.name, (bone.phalanx.contact * bone.phalanx.length, 0.0, 0.0), self.radius
@@ -240,8 +239,8 @@ class Hand(EndEffector):
     def damping(self) -> Vector:
         """Viscous friction of the joints of a finger, N m s/rad, shape (phalanges,).
 
-        That which damps a spring critically with all that is beyond its joint, straight: 2 sqrt(k I), I = sum
-        m (l^2 / 12 + d^2).
+        Critical damping of a spring with everything beyond the joint, straight: 2 sqrt(k I), I = sum m (l^2 /
+        12 + d^2).
         """
         lengths = np.array([phalanx.length for phalanx in self.phalanges])
         starts = np.cumsum(lengths) - lengths

@@ -43,7 +43,7 @@ class Jaw(EndEffector):
     effort: float
     """Largest torque, N m."""
     length: float
-    """From the wrist yaw axis to the end of the fingers, m."""
+    """Distance of the end of the fingers from the wrist yaw axis, m."""
     disc_share: float
     """Sum over the instrument's discs of the square of their turn (rad) for a radian of the jaw."""
     velocity: float = WRIST_VELOCITY

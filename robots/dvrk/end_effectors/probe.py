@@ -22,5 +22,5 @@ class Probe(EndEffector):
     """m."""
 
     def bodies(self, mount: Mount, /) -> Mapping[str, Inertia]:
-        """Return the sphere, in place of the link that carries it."""
+        """Return the sphere, in place of the wrist's last link."""
         return {mount.link: Inertia.of_steel_ball(mount.pose[:3, 3], self.radius)}

@@ -1,4 +1,4 @@
-"""The jaw of the rolling needle driver: its pads slide to roll the needle between them.
+"""The jaw of the rolling needle driver: sliding pads roll the needle.
 
 Published is a needle driver with one degree of freedom more, which turns the needle between its jaws
 (Fontanelli et al., "A New Laparoscopic Tool With In-Hand Rolling Capabilities for Needle Reorientation", IEEE
@@ -25,38 +25,38 @@ from robots.serial_chain import Joint, jerk_limit
 __all__ = ["PADS", "ROLLER", "RollingJaw"]
 
 PADS = ("pad_left", "pad_right")
-"""The links: each slides along its finger, the left one forwards while the right one goes back."""
+"""Links: each pad slides along a finger, the left pad forwards while the right pad goes back."""
 
 ROLLER = "roller"
-"""The joint: the angle by which a wire of `RollingJaw.wire_radius` rolls about its own tangent, from the
-middle position of the pads on.
+"""Joint: roll of a wire of `RollingJaw.wire_radius` about the wire's tangent, from the middle position of the
+pads.
 """
 
 _RANGE = radians(90.0)
-"""Either way from a needle whose arc goes out ahead of the jaw: to one across it, forehand or backhand."""
+"""Either way from a needle with the arc ahead of the jaw to a needle across the jaw, forehand or backhand."""
 _VELOCITY, _ACCELERATION = radians(180.0), radians(720.0)
-"""The range in a second; the acceleration is that of wrist and jaw (`robots.dvrk.end_effectors.jaw`)."""
+"""The range in a second; acceleration of wrist and jaw (`robots.dvrk.end_effectors.jaw`)."""
 
 
 @dataclass(frozen=True)
 class RollingJaw(Jaw):
-    """A jaw with two pads that roll a round wire in place: each moves by `wire_radius` times the angle."""
+    """A jaw with two pads to roll a round wire in place: each pad moves by `wire_radius` times the angle."""
 
     wire_radius: float = 0.4e-3
     """m, of the needle in unina-icaros/dvrk-vrep (dVRK-suturing.ttt); a thinner wire turns by more."""
     distance: float = 0.0077
-    """From the wrist yaw axis to the middle of the pads, m: as far out as pads of this length and their way
-    leave room for on a jaw of 10.2 mm.
+    """Distance of the middle of the pads from the wrist yaw axis, m: as far out as pads of this length and
+    way have room on a jaw of 10.2 mm.
     """
     size: tuple[float, float, float] = (0.0036, 0.0006, 0.0003)
-    """Size of a pad, m: along the finger, along the wire, and its thickness.
+    """Size of a pad, m: along the finger, along the wire, thickness.
 
-    Narrow as a rail, since a curved wire that is rolled out of the plane of wide pads wedges them apart, by
-    the height of its arc over their width, and slips. Thinner than the wire's radius, so that the fingers
-    behind hold a wire ahead of the pads.
+    Narrow as a rail, since a curved wire rolled out of the plane of wide pads wedges the pads apart, by the
+    height of the arc over the width of the pads, and slips. Thinner than the wire's radius, so that the
+    fingers behind hold a wire ahead of the pads.
     """
     pulley: float = 0.001
-    """Way of the pads per radian of the motor, m: one disc more than a PSM turns."""
+    """Way of the pads per radian of the motor, m: a disc more than a PSM turns."""
 
     goal: ClassVar[str] = (
         "goal of the jaw's servo, and by how much the pads are to roll a needle of 0.8 mm between them"
@@ -66,8 +66,8 @@ class RollingJaw(Jaw):
     def roller(self) -> Joint:
         """The roll as a joint.
 
-        Its effort is what makes the pads slip, at a friction coefficient of 1, on a needle that the jaw grips
-        with all its torque.
+        The largest effort makes the pads slip, at a friction coefficient of 1, on a needle gripped with the
+        jaw's full torque.
         """
         effort = 2.0 * self.wire_radius * self.effort / self.distance
         limits = (_VELOCITY, effort, _ACCELERATION, jerk_limit(_ACCELERATION))
@@ -80,16 +80,13 @@ class RollingJaw(Jaw):
 
     @property
     def motors(self) -> tuple[Motor, ...]:
-        """The servos of the fingers, and that of both pads.
-
-        Its position is the angle by which the wire rolls, so its force is a torque on the wire.
-        """
+        """The servos of the fingers, and of the pads: in rad of the wire, so the force is a torque on it."""
         drive = Drive.of_disc((self.wire_radius / self.pulley) ** 2, self.roller.effort, self.roller.velocity)
         moves: dict[str, float] = dict.fromkeys(PADS, 0.5 / self.wire_radius)
         return *super().motors, Motor(ROLLER, ROLLER, "gear", drive, moves, tie="pads")
 
     def links(self, mount: Mount, /) -> tuple[Link, ...]:
-        """Return the fingers, then the pads, each in its finger."""
+        """Return the fingers, then the pads in the fingers."""
         pads: list[Link] = []
         for pad, finger, way in zip(PADS, FINGERS, (mount.ahead, -mount.ahead), strict=True):
             pose = mount.pose.copy()
