@@ -8,10 +8,11 @@
 
 What is in `__all__` here, in `trocar.messages` (ROS 2 messages), in `trocar.quantities` (parameters with
 units), in `trocar.records` (state with named fields), in `trocar.tasks` (training tasks), in
-`trocar.testing` (a driver of one participant) and in `trocar.environments` (environments for Gymnasium; the
-former name `learning.environments` works in this release) is public. All other modules of the distribution
-(`schemas`, `robots`, `hub`, `engines`, `controllers`, `devices`, `tasks`, `learning`, `configs`) are private:
-they may change in any release. `python -m trocar` is the command line.
+`trocar.haptics` (haptic devices), in `trocar.testing` (a driver of one participant) and in
+`trocar.environments` (environments for Gymnasium; the former name `learning.environments` works in this
+release) is public. All other modules of the distribution (`schemas`, `robots`, `hub`, `engines`,
+`controllers`, `devices`, `tasks`, `learning`, `configs`) are private: they may change in any release.
+`python -m trocar` is the command line.
 
 Sessions          `run`, `verify`, `fork`, `load_scenario`, `run_in_process`, `SteppedSession`
 Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `recover` for a recording that was cut

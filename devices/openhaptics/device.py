@@ -2,211 +2,47 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
-from time import perf_counter
 from typing import Any, ClassVar
 
-import numpy as np
-
-from devices.diagnosis import Diagnosis
-from devices.haptics.contact import ZERO, planes_of
-from devices.haptics.limits import TOUCH, DeviceLimits
-from devices.haptics.ports import StylusSamples, stylus_ports
-from devices.openhaptics import diagnoses
-from devices.openhaptics.exchange import State, model_doubles
-from devices.openhaptics.hdapi import find
-from devices.openhaptics.params import StylusParams, TouchParams
-from devices.openhaptics.process import ServoProcess
-from devices.openhaptics.stylus import Phase
-from devices.openhaptics.supervisor import Lost, Supervisor
-from devices.samples import button_sample
-from hub.participant import Device, Params, Sample, Value
-from robots import rotation
-from schemas.errors import MessageError, ScenarioError
-from schemas.ports import Port
-from schemas.trocar_msgs import ContactModel
+from devices.haptics.servo.device import HapticDevice
+from devices.haptics.servo.diagnoses import Words
+from devices.openhaptics.hdapi import Code, Style, find
+from devices.openhaptics.params import TouchParams
+from hub.participant import Params
 
 __all__ = ["Touch"]
 
-_BUTTONS = 2
-"""A Touch has two; HDAPI has room for four."""
-_SETTLING = 1.0
-"""Time without valid frames after which it is reported, s: the first frames never are valid."""
+_CALIBRATE = {
+    Style.INKWELL: "put the stylus into the inkwell",
+    Style.ENCODER_RESET: "hold the stylus in its reset position and press its button",
+}
 
 
-class Touch(Device):
-    """The styluses of this machine.
+class _HdapiWords(Words):
+    def error(self, code: int) -> str:
+        return Code.text(code)
 
-    A stylus that is absent, busy, not calibrated or faulty gives no pose, twist or force; its diagnosis says
-    what to do, and it is used again as soon as it works.
-    """
+    def warning(self, code: int) -> str:
+        cool = "; let its motors cool" if code == Code.WARM_MOTORS else ""
+        return Code.text(code) + cool
+
+    def calibration(self, style: int) -> str:
+        return _CALIBRATE[Style(style)] if style in _CALIBRATE else super().calibration(style)
+
+
+class Touch(HapticDevice):
+    """The styluses of this machine; a Touch has two buttons, HDAPI room for four."""
 
     params_model: ClassVar[type[Params]] = TouchParams
     params: TouchParams
+    driver = "devices.openhaptics.driver:HdapiDriver"
+    words = _HdapiWords()
 
     def __init__(self, name: str, params: TouchParams) -> None:
-        super().__init__(name, params)
-        self._styluses = self._new()
-        self._supervisor: Supervisor | None = None
-        self._writing = threading.Lock()
-        self._offset_ns = 0
+        super().__init__(name, params, params.styluses, params.max_age)
 
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Of each stylus: `pose`, `twist`, `buttons`, `force` and `diagnostics` out, `contact` in."""
-        return tuple(port for stylus in self._styluses.values() for port in stylus.ports)
-
-    def open(self, directory: Path) -> None:
-        """Start the servo process.
-
-        Raises DeviceError if there is no library, or it cannot be loaded; a missing stylus is looked for
-        later.
-        """
-        library = find(None if self.params.library is None else directory / self.params.library)
-        self._styluses = self._new()
-        self._offset_ns = -(2**63)
-        self._supervisor = Supervisor(
-            library, {name: params.spec(name) for name, params in self.params.styluses.items()}, self._opened
-        )
-        self._supervisor.start(perf_counter())
-
-    def read(self, t: int) -> list[Sample]:
-        """Return every button event, the newest pose, twist and force, and changed diagnoses."""
-        supervisor = self._supervisor
-        if supervisor is None:
-            return []
-        now = perf_counter()
-        # Both clocks run at the same rate, and `t` was read first: the largest difference is the true one,
-        # and stamps never go back.
-        self._offset_ns = max(self._offset_ns, t - round(now * 1e9))
-        states = supervisor.poll(now)
-        return [
-            s
-            for name, stylus in self._styluses.items()
-            for s in stylus.read(states.get(name, []), supervisor.lost.get(name), self._offset_ns)
-        ]
-
-    def write(self, port: str, value: Value) -> None:
-        """Pass on a contact model, which is rendered from the next tick on.
-
-        Raises MessageError for another port or type.
-        """
-        name, _, what = port.partition("/")
-        if what != "contact" or name not in self._styluses or not isinstance(value, ContactModel):
-            takes = ", ".join(f"{stylus}/contact" for stylus in self._styluses)
-            raise MessageError(
-                f"'{self.name}' takes a ContactModel on {takes}, not {type(value).__name__} on '{port}'"
-            )
-        process = None if self._supervisor is None else self._supervisor.process
-        if process is not None and name in process.models:
-            with self._writing:
-                process.models[name].write(
-                    model_doubles(planes_of(value), value.header.stamp.ns, perf_counter())
-                )
-
-    def close(self) -> None:
-        """Give the hands a last frame without force, and release the devices."""
-        if self._supervisor is not None:
-            self._supervisor.close()
-        self._supervisor = None
-
-    def _new(self) -> dict[str, _Stylus]:
-        return {
-            stylus: _Stylus(self.name, stylus, params, self.params.max_age)
-            for stylus, params in self.params.styluses.items()
-        }
-
-    def _opened(self, process: ServoProcess, message: dict[str, Any]) -> None:
-        self._styluses[message["stylus"]].opened(process, message["hardware"], message["limits"])
-
-
-class _Stylus:
-    """The samples of one stylus."""
-
-    def __init__(self, participant: str, stylus: str, params: StylusParams, max_age_ns: int) -> None:
-        self._name, self._params = stylus, params
-        self._ports = stylus_ports(participant, stylus, simulated_time=False, max_age_ns=max_age_ns)
-        self._samples = StylusSamples(self._ports)
-        self._diagnosis = Diagnosis(f"{participant}/{stylus}", f"{stylus}/diagnostics")
-        self.ports = (*self._ports, self._diagnosis.port)
-        self._hardware = self._refusal = ""
-        self._pressed: tuple[bool, ...] | None = None
-        self._stamp_ns = 0
-        self._posed = False
-        self._settling: float | None = None
-
-    def opened(self, process: ServoProcess, hardware: str, stated: dict[str, float]) -> None:
-        """Allow `process` to give force within the scenario's limits, unless they exceed the device's.
-
-        A limit that the device does not state is that of a Touch.
-        """
-        self._hardware, self._refusal = hardware, ""
-        limits = DeviceLimits(
-            *(
-                stated[name] if stated[name] > 0.0 else getattr(TOUCH, name)
-                for name in ("force", "stiffness", "damping")
-            )
-        )
-        try:
-            process.allow(
-                self._name, self._params.safety.within(limits), passivity=self._params.safety.passivity
-            )
-        except ScenarioError as error:
-            self._refusal = str(error)
-
-    def read(self, states: list[State], lost: Lost | None, offset_ns: int) -> list[Sample]:
-        """Return the samples of these states, in the clock that is `offset_ns` ahead of time.perf_counter."""
-        if lost is not None:
-            diagnosis = (
-                diagnoses.FOUND
-                if lost.found
-                else diagnoses.lost(lost.phase, lost.code, lost.cause, self._params.device)
-            )
-            return [*self._last_force(), *self._diagnosis.report(*diagnosis, self._hardware)]
-        samples: list[Sample] = []
-        for state in states:
-            samples += self._buttons(state, offset_ns)
-        if states:
-            samples += self._newest(states[-1], offset_ns)
-        return samples
-
-    def _buttons(self, state: State, offset_ns: int) -> list[Sample]:
-        pressed = tuple(bool(state.buttons >> i & 1) for i in range(_BUTTONS))
-        if pressed == self._pressed or not Phase(state.phase).has_pose:
-            return []
-        self._pressed = pressed
-        return [button_sample(self._ports.buttons, self._time_ns(state, offset_ns), pressed)]
-
-    def _newest(self, state: State, offset_ns: int) -> list[Sample]:
-        phase = Phase(state.phase)
-        if phase is not Phase.SETTLING:
-            self._settling = None
-        elif self._settling is None:
-            self._settling = state.time
-        soon = self._settling is not None and state.time - self._settling < _SETTLING
-        diagnosis = (
-            [] if soon else self._diagnosis.report(*diagnoses.present(state, self._refusal), self._hardware)
-        )
-        if not phase.has_pose:
-            return [*self._last_force(), *diagnosis]
-        self._posed = True
-        time_ns = self._time_ns(state, offset_ns)
-        x, y, z, w = rotation.from_matrix(np.array(state.rotation).reshape(3, 3)).tolist()
-        return [
-            self._samples.pose(time_ns, state.position, (x, y, z, w)),
-            self._samples.twist(time_ns, state.linear, state.angular),
-            self._samples.force(time_ns, state.force),
-            *diagnosis,
-        ]
-
-    def _last_force(self) -> list[Sample]:
-        """Return a force of zero when the stylus has just been lost."""
-        if not self._posed:
-            return []
-        self._posed = False
-        return [self._samples.force(self._stamp_ns, ZERO)]
-
-    def _time_ns(self, state: State, offset_ns: int) -> int:
-        self._stamp_ns = max(self._stamp_ns, round(state.time * 1e9) + offset_ns)
-        return self._stamp_ns
+    def driver_options(self, directory: Path) -> dict[str, Any]:
+        """Return where the library is. Raises DeviceError if there is none."""
+        library = self.params.library
+        return {"library": str(find(None if library is None else directory / library))}

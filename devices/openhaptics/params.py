@@ -3,41 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from devices.haptics.params import SafetyParams
-from devices.openhaptics.stylus import Spec
+from devices.haptics.servo.params import ServoStylusParams
 from hub.participant import Params
 from schemas.quantity import Duration, Length
 
 __all__ = ["StylusParams", "TouchParams"]
 
-_DEAD_MAN = "what must be held for force: the index of a button, or the safety switch of the stylus"
 
-
-class StylusParams(Params):
+class StylusParams(ServoStylusParams):
     """One stylus."""
 
-    device: Annotated[
-        str | None,
-        Field(
-            min_length=1, description="its name in the vendor's setup program; default: the default device"
-        ),
-    ] = None
-    dead_man: Annotated[
-        Annotated[int, Field(ge=0, le=3)] | Literal["safety-switch"], Field(description=_DEAD_MAN)
-    ] = 0
     tip_offset: Annotated[
         Length, Field(ge=0.0, le=0.2, description="from the centre of the gimbal to the tip")
     ] = 0.039
     """The default is that of sawSensablePhantom (mtsSensableHD.cpp)."""
-    safety: SafetyParams = SafetyParams()
-
-    def spec(self, name: str) -> Spec:
-        """Return the stylus as the servo process gets it."""
-        return Spec(name, self.device, self.dead_man, self.tip_offset)
 
 
 class TouchParams(Params):

@@ -20,8 +20,8 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from devices.haptics.servo.exchange import create, memory_size
 from devices.openhaptics.device import Touch
-from devices.openhaptics.exchange import create, memory_size
 from devices.openhaptics.hdapi import Code
 from devices.openhaptics.params import TouchParams
 from hub.participant import Sample
@@ -280,7 +280,7 @@ def test_a_servo_process_whose_host_has_been_killed_while_it_starts(
     with (
         memory,
         subprocess.Popen(
-            [sys.executable, "-P", "-m", "devices.openhaptics.servo"],
+            [sys.executable, "-P", "-m", "devices.haptics.servo.program"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -290,7 +290,12 @@ def test_a_servo_process_whose_host_has_been_killed_while_it_starts(
         os.close(handle)
         process.stdout.close()
         if configured:
-            orders = {"library": str(library), "memory": handle, "styluses": []}
+            orders = {
+                "driver": Touch.driver,
+                "options": {"library": str(library)},
+                "memory": handle,
+                "styluses": [],
+            }
             process.stdin.write(json.dumps(orders).encode() + b"\n")
         process.stdin.close()
         assert (process.stderr.read(), process.wait(PATIENCE_S)) == (b"", 0)

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from devices.haptics.contact import Plane
-from devices.openhaptics import exchange
-from devices.openhaptics.exchange import (
+from devices.haptics.servo import exchange
+from devices.haptics.servo.exchange import (
     STYLUS_BYTES,
     RingReader,
     RingWriter,
@@ -27,7 +27,7 @@ planes = st.lists(st.builds(Plane, *[finite] * 8), max_size=4)
 
 HAMMER = """
 import sys
-from devices.openhaptics.exchange import RingWriter, attach, ring_size
+from devices.haptics.servo.exchange import RingWriter, attach, ring_size
 ring = RingWriter(memoryview(attach(int(sys.argv[1]), ring_size(2, 40))), 2, 40)
 print(flush=True)
 number = 0.0

@@ -23,9 +23,9 @@ from devices.diagnosis import Level
 from devices.haptics.contact import Plane
 from devices.haptics.limits import Limits
 from devices.haptics.safety import Condition
-from devices.openhaptics import diagnoses, hdapi
-from devices.openhaptics.callback import Servo
-from devices.openhaptics.exchange import (
+from devices.haptics.servo import diagnoses
+from devices.haptics.servo.driver import Opened, StylusSpec
+from devices.haptics.servo.exchange import (
     RingReader,
     RingWriter,
     State,
@@ -35,8 +35,13 @@ from devices.openhaptics.exchange import (
     model_doubles,
     servo_ends,
 )
-from devices.openhaptics.hdapi import CALLBACK_CONTINUE, CALLBACK_DONE, INVALID_HANDLE, Code
-from devices.openhaptics.stylus import Phase, Spec, Stylus
+from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.servo import Servo
+from devices.haptics.servo.stylus import Stylus
+from devices.openhaptics import hdapi
+from devices.openhaptics.device import Touch
+from devices.openhaptics.driver import HdapiDriver
+from devices.openhaptics.hdapi import CALLBACK_CONTINUE, CALLBACK_DONE, Code
 from schemas.errors import DeviceError
 from tests.devices.standins import build
 from tests.devices.standins.hd import (
@@ -65,7 +70,8 @@ class Rig:
     """Both styluses of a world behind a Servo, with the ends that a device has."""
 
     def __init__(self, library: Path, file: Path, **spec: Any) -> None:
-        self.hd = hdapi.load(library)
+        self.driver = HdapiDriver(str(library))
+        self.hd = self.driver.hd
         self.world = HdWorld(library, file)
         self.hd.standin_use.argtypes = [ctypes.c_void_p]
         self.hd.standin_tick.argtypes = [ctypes.c_double]
@@ -76,20 +82,15 @@ class Rig:
         self.models: list[RingWriter] = []
         self._states: list[RingReader] = []
         for index, device in enumerate((None, "left")):
-            handle = self.hd.hdInitDevice(device.encode() if device else None)
-            assert handle != INVALID_HANDLE
-            self.styluses.append(
-                Stylus(
-                    self.hd,
-                    handle,
-                    Spec("right", device, **{"dead_man": 0, "tip_offset": 0.0, **spec}),
-                    *servo_ends(memory, index),
-                )
-            )
+            stated = StylusSpec("right", device, **{"dead_man": 0, "tip_offset": 0.0, **spec})
+            opened = self.driver.open(stated)
+            assert isinstance(opened, Opened)
+            ends = servo_ends(memory, index)
+            self.styluses.append(Stylus(self.driver, opened.handle, stated, *ends))
             models, states = device_ends(memory, index)
             self.models.append(models)
             self._states.append(states)
-        self.servo = Servo(self.hd, self.styluses, self.beat)
+        self.servo = Servo(self.driver, self.styluses, self.beat)
         self._last: list[State] = [
             None,
             None,
@@ -117,7 +118,7 @@ class Rig:
                 for models in self.models:
                     models.write(model_doubles(planes, round(self.now * 1e9), self.now))
             if self.answer == CALLBACK_CONTINUE:
-                self.answer = self.servo.tick(self.now)
+                self.answer = CALLBACK_CONTINUE if self.servo.tick(self.now) else CALLBACK_DONE
             self.sent.append(math.hypot(*self.world.motors(0)))
         return self.state(0)
 
@@ -316,7 +317,7 @@ def test_a_complaint_of_a_stylus_that_is_not_calibrated_leaves_what_to_do_about_
     one = rig()
     device = one.world.devices[0]
     device.calibration, device.error, device.error_frames = NEEDS_MANUAL_INPUT, Code.WARM_MOTORS, 100
-    assert diagnoses.present(one.run(50), "") == (
+    assert diagnoses.present(one.run(50), Touch.words, "") == (
         Level.WARN,
         "it is not calibrated: put the stylus into the inkwell",
     )
@@ -381,7 +382,7 @@ def test_a_watcher_without_a_sign_of_life_takes_the_force_and_returns_it_slowly(
     state = one.run(1, touching=True)
     assert (Phase(state.phase), state.force) == (Phase.UNWATCHED, (0.0, 0.0, 0.0))
     assert Phase(state.phase).has_pose
-    assert diagnoses.present(state, "") == (
+    assert diagnoses.present(state, Touch.words, "") == (
         Level.WARN,
         "no force: the process that watches the servo process is late; is the machine busy?",
     )
@@ -484,8 +485,8 @@ def test_errors_come_with_their_handle_the_newest_first(rig: Callable[..., Rig])
 
 def test_the_servo_process_holds_nothing_that_could_delay_a_callback() -> None:
     code = (
-        "import sys, devices.openhaptics.servo; print(*{m.split('.')[0] for m in sys.modules} & {'numpy',"
-        " 'pydantic', 'zenoh', 'hub', 'logging'})"
+        "import sys, devices.haptics.servo.program, devices.openhaptics.driver; print(*{m.split('.')[0] for m"
+        " in sys.modules} & {'numpy', 'pydantic', 'zenoh', 'hub', 'logging'})"
     )
     assert (
         subprocess.run(

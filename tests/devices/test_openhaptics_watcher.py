@@ -22,9 +22,9 @@ import numpy as np
 import pytest
 
 from devices.haptics.safety import Condition
-from devices.openhaptics.exchange import RingWriter, beat, device_ends, memory_size, servo_ends
-from devices.openhaptics.stylus import Phase
-from devices.openhaptics.watcher import PERIOD, Watch
+from devices.haptics.servo.exchange import RingWriter, beat, device_ends, memory_size, servo_ends
+from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.watcher import PERIOD, Watch
 from tests.devices.standins import build, host
 from tests.devices.standins.hd import VARIABLE, HdWorld, Row
 

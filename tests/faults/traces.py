@@ -15,8 +15,8 @@ MARK = "TROCAR_FAULTS"
 
 _MODULES = {
     "hub.security.gate_process": "gate",
-    "devices.openhaptics.servo": "servo",
-    "devices.openhaptics.watcher": "watcher",
+    "devices.haptics.servo.program": "servo",
+    "devices.haptics.servo.watcher": "watcher",
 }
 
 

@@ -80,6 +80,7 @@ def test_the_public_names_are_these() -> None:
     assert {module.name for module in pkgutil.iter_modules(trocar.__path__)} == {
         "__main__",
         "environments",
+        "haptics",
         "messages",
         "quantities",
         "records",

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from devices.openhaptics.exchange import State
-from devices.openhaptics.hdapi import Code
-from devices.openhaptics.process import ServoProcess
-from devices.openhaptics.stylus import Phase
+from devices.haptics.servo.exchange import State
+from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.process import ServoProcess
 
 __all__ = ["Finding", "Probe", "absence"]
 
@@ -38,7 +37,7 @@ class Probe:
         process = self._process
         for message in process.said():
             if "absent" in message:
-                self._found[message["stylus"]] = absence(message["absent"])
+                self._found[message["stylus"]] = absence(message)
         for name, ring in process.states.items():
             for state in map(State.of, ring.read()):
                 if state.phase != Phase.SETTLING:
@@ -58,6 +57,6 @@ class Probe:
         self._process.close()
 
 
-def absence(code: int) -> Finding:
-    """Return the condition of a stylus that could not be opened, by the error's code."""
-    return Finding(Phase.BUSY if Code.is_busy(code) else Phase.ABSENT, code)
+def absence(message: dict[str, Any]) -> Finding:
+    """Return the condition of a stylus that could not be opened, by the message of the servo process."""
+    return Finding(Phase(message["phase"]), message["absent"])

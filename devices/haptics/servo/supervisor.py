@@ -1,8 +1,8 @@
 """Keeps a servo process running with every stylus that is available, and looks for those that are lost.
 
 All styluses of a host are in one process. When one of them is lost, the process is replaced by one with the
-others: HDAPI recovers in a new process only. A second process beside the first finds out whether a lost
-stylus is available again, so that no hand loses force meanwhile; the stylus is used again when no other
+others: a library may recover in a new process only. A second process beside the first finds out whether a
+lost stylus is available again, so that no hand loses force meanwhile; the stylus is used again when no other
 hand holds its dead-man.
 """
 
@@ -11,13 +11,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from devices.openhaptics.exchange import State
-from devices.openhaptics.probe import Finding, Probe, absence
-from devices.openhaptics.process import ServoProcess
-from devices.openhaptics.stylus import Phase, Spec
+from devices.haptics.servo.driver import StylusSpec
+from devices.haptics.servo.exchange import State
+from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.probe import Finding, Probe, absence
+from devices.haptics.servo.process import DriverChoice, ServoProcess
 from schemas.errors import DeviceError
 
 __all__ = ["Lost", "Supervisor"]
@@ -56,10 +56,13 @@ class Supervisor:
     """The servo processes of one device. All methods are for one thread."""
 
     def __init__(
-        self, library: Path, specs: Mapping[str, Spec], opened: Callable[[ServoProcess, dict[str, Any]], None]
+        self,
+        driver: DriverChoice,
+        specs: Mapping[str, StylusSpec],
+        opened: Callable[[ServoProcess, dict[str, Any]], None],
     ) -> None:
         """`opened` is called for every stylus that was opened, with its process and the message of that."""
-        self._library, self._specs, self._opened = library, dict(specs), opened
+        self._driver, self._specs, self._opened = driver, dict(specs), opened
         self.lost: dict[str, Lost] = {}
         self._process: ServoProcess | None = None
         self._probe: Probe | None = None
@@ -76,15 +79,16 @@ class Supervisor:
         return self._process
 
     def start(self, now: float) -> None:
-        """Start with all styluses. Raises DeviceError if the library cannot be loaded."""
+        """Start with all styluses. Raises DeviceError if the driver cannot be loaded."""
         self._start(list(self._specs), now)
         assert self._process
         said = self._process.said(_LOADING)
         if not said or "loaded" not in said[0]:
             self.close()
+            options = ", ".join(f"{name} '{value}'" for name, value in self._driver.options.items())
             silent = (
-                f"the servo process ends or hangs when it loads '{self._library}': is that the library of"
-                " OpenHaptics?"
+                f"the servo process ends or hangs when it loads the driver {self._driver.driver}"
+                f"{f' with {options}' if options else ''}: is that the right library?"
             )
             raise DeviceError(said[0].get("failed", silent) if said else silent)
         for message in said[1:]:
@@ -109,7 +113,7 @@ class Supervisor:
         self._process = self._probe = None
 
     def _start(self, names: list[str], now: float) -> None:
-        self._process = ServoProcess(self._library, [self._specs[name] for name in names])
+        self._process = ServoProcess(self._driver, [self._specs[name] for name in names])
         self._started = self._last_frame = now
         self._ending, self._has_ticked = None, False
         self._held = dict.fromkeys(self._specs, False)
@@ -135,7 +139,7 @@ class Supervisor:
 
     def _on_message(self, process: ServoProcess, message: dict[str, Any], now: float) -> None:
         if "absent" in message:
-            self._lose(message["stylus"], *absence(message["absent"]), "", now)
+            self._lose(message["stylus"], *absence(message), "", now)
             if self.lost.keys() >= set(process.names):
                 self._end(process, now)
         elif "stylus" in message:
@@ -196,7 +200,7 @@ class Supervisor:
                 if not any(self._held.values()):
                     self._end(self._process, now)
             elif self._probe is None:
-                self._probe = Probe(ServoProcess(self._library, [self._specs[name] for name in due]), now)
+                self._probe = Probe(ServoProcess(self._driver, [self._specs[name] for name in due]), now)
 
     def _use(self, found: Mapping[str, Finding | None], now: float) -> None:
         """Use what a probe has found of lost styluses."""

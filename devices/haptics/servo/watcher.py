@@ -1,13 +1,13 @@
 """The watcher process: it kills a servo process that stands still with force on a hand.
 
 A motor keeps its last force while the servo stands still: stopped by a signal, or in a call of the driver
-that does not return. HDAPI gives a device to one process only, so no other process can set its force to zero;
-the end of the servo process closes the device.
+that does not return. Libraries give a device to one process only, so no other process can set its force to
+zero; the end of the servo process closes the device.
 
-devices.openhaptics.process starts it beside every servo process, with the shared memory and a handle of that
-process. It ends with the servo process, and by nothing else: the device's process may have died before. It
-shares no interpreter with either, so neither delays it. Its sign of life is a counter in the shared memory;
-without it the servo gives no force (devices.openhaptics.callback).
+devices.haptics.servo.process starts it beside every servo process, with the shared memory and a handle of
+that process. It ends with the servo process, and by nothing else: the device's process may have died before.
+It shares no interpreter with either, so neither delays it. Its sign of life is a counter in the shared
+memory; without it the servo gives no force (devices.haptics.servo.servo).
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from time import perf_counter
 from typing import NoReturn
 
 from devices.haptics.safety import Condition
-from devices.openhaptics.exchange import RingReader, State, attach, beat, device_ends, memory_size
-from devices.openhaptics.priority import WATCHER, raise_priority
+from devices.haptics.servo.exchange import RingReader, State, attach, beat, device_ends, memory_size
+from devices.haptics.servo.priority import WATCHER, raise_priority
 
 __all__ = ["HAS_KILLED", "PERIOD", "Target", "Watch", "main"]
 

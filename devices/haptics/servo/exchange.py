@@ -71,9 +71,9 @@ class State(NamedTuple):
     time: float
     """When the tick began, s of time.perf_counter, which all processes of a machine share."""
     phase: int
-    """A `devices.openhaptics.stylus.Phase`."""
+    """A `devices.haptics.servo.phase.Phase`."""
     code: int
-    """Of HDAPI: the error of the phase, the calibration style of an uncalibrated stylus, or 0."""
+    """The driver's number: the error of the phase, the calibration style of an uncalibrated stylus, or 0."""
     buttons: int
     """Bit 0 is the first."""
     permitted: int

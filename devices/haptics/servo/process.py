@@ -12,31 +12,36 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
-from dataclasses import asdict
-from pathlib import Path
+from dataclasses import asdict, dataclass
 from queue import Empty, SimpleQueue
 from typing import Any
 
 from devices.haptics.limits import Limits
-from devices.openhaptics.exchange import RingReader, RingWriter, create, device_ends, memory_size
-from devices.openhaptics.stylus import Spec
-from devices.openhaptics.watcher import HAS_KILLED
+from devices.haptics.servo.driver import StylusSpec
+from devices.haptics.servo.exchange import RingReader, RingWriter, create, device_ends, memory_size
+from devices.haptics.servo.watcher import HAS_KILLED
 
-__all__ = ["ServoProcess"]
+__all__ = ["DriverChoice", "ServoProcess"]
 
-_ENVIRONMENT: dict[str, str] = {} if sys.platform == "win32" else {"GTDD_HOME": "/usr/share/3DSystems"}
-"""The Linux driver needs to know the directory of its devices' configuration and calibration (TouchDriver
-2019.2.15).
-"""
 _PATIENCE_S, _WATCHER_PATIENCE_S = 1.0, 0.2
 _NO_WINDOW: int = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
+
+
+@dataclass(frozen=True)
+class DriverChoice:
+    """The driver that a servo process makes."""
+
+    driver: str
+    """Its class, as `module:Class`."""
+    options: dict[str, Any]
+    """Keyword arguments of the class, which JSON can hold."""
 
 
 class ServoProcess:
     """A process with the devices of `specs`, from its start on."""
 
-    def __init__(self, library: Path, specs: Sequence[Spec]) -> None:
-        """Start it. Raises OSError if the system has no process left."""
+    def __init__(self, driver: DriverChoice, specs: Sequence[StylusSpec]) -> None:
+        """Start the process. Raises OSError if the system has no process left."""
         self.names = tuple(spec.name for spec in specs)
         size = memory_size(len(specs))
         shared, handle = create(size)
@@ -50,13 +55,12 @@ class ServoProcess:
         inherited = (handle,) if isinstance(handle, int) else ()
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "devices.openhaptics.servo"],
+                [sys.executable, "-P", "-m", "devices.haptics.servo.program"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 text=True,
                 pass_fds=inherited,
                 process_group=0,  # Ctrl-C is for this process, which then ends that one
-                env={**_ENVIRONMENT, **os.environ},
                 creationflags=_NO_WINDOW,
             )
             try:
@@ -71,7 +75,8 @@ class ServoProcess:
         self._said: SimpleQueue[dict[str, Any]] = SimpleQueue()
         self._listener = threading.Thread(target=self._listen, name="servo process", daemon=True)
         self._listener.start()
-        self._send({"library": str(library), "memory": handle, "styluses": [asdict(spec) for spec in specs]})
+        styluses = [asdict(spec) for spec in specs]
+        self._send(asdict(driver) | {"memory": handle, "styluses": styluses})
 
     @property
     def pid(self) -> int:
@@ -153,7 +158,7 @@ def _watcher(memory: int | str, styluses: int, pid: int) -> subprocess.Popen[byt
                 sys.executable,
                 "-P",
                 "-m",
-                "devices.openhaptics.watcher",
+                "devices.haptics.servo.watcher",
                 *map(str, (memory, styluses, process)),
             ],
             stdin=subprocess.DEVNULL,

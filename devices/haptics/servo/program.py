@@ -1,6 +1,6 @@
-"""The servo process: HDAPI and the servo callback, and nothing else.
+"""The servo process: a vendor's library and the servo loop, and nothing else.
 
-devices.openhaptics.process starts it. One line of JSON on its standard input lists what to open; a second
+devices.haptics.servo.process starts it. One line of JSON on its standard input lists what to open; a second
 one, per stylus, the limits of the force. The process ends with its input, which happens when the device
 closes it and when the device's process ends. Then the hand gets one last frame, without force.
 """
@@ -14,17 +14,16 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from ctypes import c_double
-from pathlib import Path
+from importlib import import_module
 from time import sleep
 from typing import Any, NoReturn
 
 from devices.haptics.limits import Limits
-from devices.openhaptics.callback import Servo
-from devices.openhaptics.exchange import attach, beat, memory_size, servo_ends
-from devices.openhaptics.hdapi import INVALID_HANDLE, Get, Hdapi, errors, load
-from devices.openhaptics.priority import SERVO, raise_priority
-from devices.openhaptics.stylus import Spec, Stylus
+from devices.haptics.servo.driver import Driver, StylusSpec, Unavailable
+from devices.haptics.servo.exchange import attach, beat, memory_size, servo_ends
+from devices.haptics.servo.priority import SERVO, raise_priority
+from devices.haptics.servo.servo import Servo, failure_text
+from devices.haptics.servo.stylus import Stylus
 from schemas.errors import DeviceError
 
 __all__ = ["main"]
@@ -35,36 +34,30 @@ _FIRST_BEAT = 5.0
 Say = Callable[[Mapping[str, Any]], None]
 
 
+def _load(choice: str, options: Mapping[str, Any]) -> Driver:
+    """Return the driver of a class `module:Class`. Raises DeviceError if it cannot be loaded."""
+    module, _, name = choice.partition(":")
+    try:
+        kind: Any = getattr(import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise DeviceError(f"the driver '{choice}' cannot be imported: {error}") from error
+    return kind(**options)
+
+
 def _opened(
-    hd: Hdapi, config: Mapping[str, Any], memory: memoryview, say: Say
+    driver: Driver, config: Mapping[str, Any], memory: memoryview, say: Say
 ) -> Iterator[tuple[str, Stylus]]:
     """Open the devices; report model and limits of each, or why it is not available."""
     for index, values in enumerate(config["styluses"]):
-        spec = Spec(**values)
+        spec = StylusSpec(**values)
         models, states = servo_ends(memory, index)
-        handle = hd.hdInitDevice(None if spec.device is None else spec.device.encode())
-        code = next((code for code, _ in errors(hd)), 0)
-        if handle == INVALID_HANDLE:
-            say({"stylus": spec.name, "absent": code})
+        opened = driver.open(spec)
+        if isinstance(opened, Unavailable):
+            say({"stylus": spec.name, "absent": opened.code, "phase": opened.phase})
             continue
-        stylus = Stylus(hd, handle, spec, models, states)
-        model, serial = (
-            (hd.hdGetString(what) or b"").decode(errors="replace") for what in (Get.MODEL, Get.SERIAL_NUMBER)
-        )
-        limits = {
-            "force": _number(hd, Get.MAX_FORCE),
-            "stiffness": 1e3 * _number(hd, Get.MAX_STIFFNESS),
-            "damping": 1e3 * _number(hd, Get.MAX_DAMPING),
-        }
-        errors(hd)
-        say({"stylus": spec.name, "hardware": f"{model} {serial}".strip(), "limits": limits})
-        yield spec.name, stylus
-
-
-def _number(hd: Hdapi, what: int) -> float:
-    value = c_double()
-    hd.hdGetDoublev(what, value)
-    return value.value
+        limits = {"force": opened.force, "stiffness": opened.stiffness, "damping": opened.damping}
+        say({"stylus": spec.name, "hardware": opened.hardware, "limits": limits})
+        yield spec.name, Stylus(driver, opened.handle, spec, models, states)
 
 
 def _await_watcher(sign: memoryview) -> None:
@@ -105,14 +98,14 @@ def main() -> NoReturn:
     config = json.loads(first)
     memory = memoryview(attach(config["memory"], memory_size(len(config["styluses"]))))
     try:
-        hd = load(Path(config["library"]))
-    except DeviceError as error:
-        say({"failed": str(error)})
+        driver = _load(config["driver"], config["options"])
+        say({"loaded": True})
+        styluses = dict(_opened(driver, config, memory, say))
+    except Exception as error:  # noqa: BLE001  # a driver may raise anything
+        say({"failed": failure_text(error)})
         sys.exit(1)
-    say({"loaded": True})
-    styluses = dict(_opened(hd, config, memory, say))
     sign = beat(memory)
-    servo = Servo(hd, list(styluses.values()), sign)
+    servo = Servo(driver, list(styluses.values()), sign)
     try:
         if styluses:
             _await_watcher(sign)
@@ -124,8 +117,8 @@ def main() -> NoReturn:
         for line in sys.stdin:
             order = json.loads(line)
             styluses[order["stylus"]].allow(Limits(**order["limits"]), passivity=order["passivity"])
-    except DeviceError as error:
-        say({"failed": str(error)})
+    except Exception as error:  # noqa: BLE001  # likewise: the device must hear of it
+        say({"failed": failure_text(error)})
     finally:
         servo.stop()
         if servo.failure:

@@ -1,0 +1,40 @@
+"""The condition of a stylus in the servo process."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["Phase"]
+
+
+class Phase(IntEnum):
+    """The condition of a stylus."""
+
+    ABSENT = 0
+    """It could not be opened."""
+    SETTLING = 1
+    """It has given no valid frames yet."""
+    UNCALIBRATED = 2
+    READY = 3
+    WARNED = 4
+    """It has a pose, and no force: the driver has reported an error within the last second."""
+    BUSY = 5
+    """Another program has it."""
+    FAULT = 6
+    """It, or the servo loop, has failed."""
+    UNWATCHED = 7
+    """It has a pose, and no force: the process that watches the servo process gives no sign of life."""
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether this process cannot use the stylus any more: only a new one can."""
+        return self in _LOST
+
+    @property
+    def has_pose(self) -> bool:
+        """Whether the pose in its states is valid."""
+        return self in _POSED
+
+
+_LOST = {Phase.ABSENT, Phase.BUSY, Phase.FAULT}
+_POSED = {Phase.READY, Phase.WARNED, Phase.UNWATCHED}
