@@ -1,4 +1,4 @@
-"""One arm under CRTK's commands: what it receives and publishes, step by step."""
+"""An arm under CRTK's commands: commands in and states out, step by step."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from schemas.vectors import Vector
 __all__ = ["Arm"]
 
 _ANY_TIME = crtk.SETTINGS.union(*EQUIPMENT_COMMANDS.values())
-"""Commands that are executed in every operating state."""
+"""Commands executed in every operating state."""
 _BARE = 2.0
-"""What `control_mode` adds to position and effort without gravity compensation."""
+"""Addition to `control_mode`, position or effort, without gravity compensation."""
 
 
 class ArmState(Record):
@@ -44,7 +44,7 @@ class ArmState(Record):
 
 
 class Arm:
-    """One arm. All that changes is in `state`."""
+    """An arm. All variables are in `state`."""
 
     def __init__(
         self,
@@ -54,14 +54,14 @@ class Arm:
         period: float,
         outputs: dict[str, Any],
     ) -> None:
-        """Build the arm as the scenario states it.
+        """Build the arm of the scenario.
 
         Args:
-            name: its name.
+            name: name of the arm.
             params: parameters of the controller.
-            camera: as of `BaseFrame`.
+            camera: as for `BaseFrame`.
             period: the controller's step, s.
-            outputs: those of the controller; the arm puts its own among them, whose arrays stay the same.
+            outputs: the controller's outputs; the arm adds its own, with arrays kept for the whole session.
         """
         arm = params.arms.driven[name]
         self._period = period
@@ -71,7 +71,7 @@ class Arm:
         self._base = BaseFrame(name, params, camera)
         self._drives = Drives(arm, self._messages, lambda: self._base.pose)
         self.weight = KnownWeight(name, arm.chain, base_in_world(name, params))
-        """That the real controller carries."""
+        """Weight carried by the real controller."""
         self._commands = Commands(self._drives, period)
         self._cartesian = CartesianCommands(
             name, self._drives, self._base, self._commands.settings.ratio, period
@@ -99,9 +99,10 @@ class Arm:
         }
         self._now, self._modes = ArmState(), np.array(self._drives.modes, np.float64)
         self._condition: tuple[State, bool, bool] | None = None
-        """That of `Lifecycle` after the last step; None before the first."""
+        """Condition of `Lifecycle` after the last step; None: before the first step."""
         self._rests = False
-        """Whether a step without commands changes nothing but the setpoint, while the joints keep to that."""
+        """Whether a step without commands changes nothing but the setpoint, with the joints at the setpoint.
+        """
         self.state = (
             self._now,
             self._commands.settings,
@@ -136,7 +137,7 @@ class Arm:
 
     @property
     def chain(self) -> SerialChain:
-        """Its kinematics."""
+        """Kinematics of the arm."""
         return self._drives.joints.chain
 
     @property
@@ -145,7 +146,7 @@ class Arm:
         return self._drives.joints.position
 
     def sense(self, inputs: Inputs) -> None:
-        """Read what is measured; the setpoint starts from there."""
+        """Read measurements, the start of the setpoint."""
         for port, axes in self._sensed:
             axes.measured[:] = inputs[port]
         if self._is_off:
@@ -155,10 +156,9 @@ class Arm:
                 axes.setpoint.reset(axes.position)
 
     def step(self, t: int, h: int, inputs: Inputs) -> list[Setpoint]:
-        """Execute the commands that have arrived, and advance from `t` to `t + h` (ns).
+        """Execute arrived commands, and advance from `t` to `t + h` (ns).
 
-        Except the setpoints that follow a stream: they are returned, and follow together with those of other
-        arms.
+        Returned are the setpoints following a stream, to follow together with the setpoints of all arms.
         """
         self._messages.begin(t + h)
         arrived = () if inputs.quiet else inputs.event_ports & self._commanded.keys()
@@ -181,12 +181,12 @@ class Arm:
         return following
 
     def drive(self) -> None:
-        """Command the setpoints that the step has ended with, by encoders that may be off."""
+        """Command the final setpoints of the step, through encoders with offsets."""
         if self._is_off:
             np.add(self._drives.joints.setpoint.position, self._offsets, out=self._driven)
 
     def publish(self, row: TelemetryRow) -> None:
-        """Write to `row` what the states are computed from that are not published at every step."""
+        """Write to `row` the input of the states not published at every step."""
         drives, settings = self._drives, self._commands.settings
         joints = drives.joints
         row.setpoint[0], row.setpoint[1] = joints.setpoint.position, joints.setpoint.velocity
@@ -198,7 +198,7 @@ class Arm:
             self._gripper_setpoint[:] = drives.gripper.commanded
 
     def restored(self) -> None:
-        """Compute what follows from `state` after it was restored."""
+        """Recompute all values derived from `state` after a restore."""
         for axes in self._drives.groups:
             axes.setpoint.restored()
         self._condition = self._lifecycle.condition if self._now.started else None
@@ -212,7 +212,7 @@ class Arm:
             self._modes[0] += _BARE
 
     def _execute(self, inputs: Inputs, ports: Collection[str]) -> bool:
-        """Execute what has arrived on `ports`; return whether clients now wait for the operating state."""
+        """Execute commands from `ports`; return whether clients now wait for the operating state."""
         awaited = False
         for port in sorted(ports, key=self._order):
             _, command, handler = self._commanded[port]
@@ -244,7 +244,7 @@ class Arm:
             self._drives.control.cartesian = True
 
     def _not_ready(self, command: str) -> str:
-        """Return why the arm refuses `command` now; empty if it does not."""
+        """Return why the arm refuses `command` now; empty: accepted."""
         if command in _ANY_TIME:
             return ""
         return self._lifecycle.not_ready() or (

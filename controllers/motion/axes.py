@@ -1,4 +1,4 @@
-"""Joints that are driven together, an arm's or its gripper's: measured state and commands to their drives."""
+"""Joints driven together, an arm's or a gripper's: measured state and commands to the drives."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Axes", "Mode"]
 
 
 class Mode(IntEnum):
-    """What the drives do; the numbers are those of `control_mode`."""
+    """Mode of the drives, with the numbers of `control_mode`."""
 
     OFF = 0
     POSITION = 1
@@ -23,15 +23,15 @@ class Mode(IntEnum):
 
 
 class AxesState(Record):
-    """All of n joints that changes, except their setpoint."""
+    """State of n joints beside the setpoint."""
 
     measured = array(3, "n")
     """Positions, velocities and efforts."""
     effort = array("n")
-    """As commanded."""
+    """Commanded effort."""
     mode = choice(Mode.OFF)
     moving = flag()
-    """Whether a move was commanded whose end `finished` has not reported yet."""
+    """Whether a commanded move is not reported as ended by `finished` yet."""
 
 
 class Axes:
@@ -41,25 +41,25 @@ class Axes:
     """
 
     def __init__(self, chain: SerialChain, start: Vector) -> None:
-        """Take the joints, and their positions at time 0, shape (n,)."""
+        """`start`: positions at time 0, shape (n,)."""
         n = len(chain.joints)
         self.chain, self.setpoint = chain, Setpoint(chain.joints)
         self._state = AxesState(n=n)
         self.measured, self.effort = self._state.measured.reshape(3 * n), self._state.effort
         self.position = self.measured[:n]
-        """As measured, shape (n,)."""
+        """Measured positions, shape (n,)."""
         self.position[:] = start
         self.setpoint.reset(start)
         self.state = (self._state, self.setpoint.state)
 
     @property
     def mode(self) -> Mode:
-        """What the drives do."""
+        """Present mode of the drives."""
         return self._state.mode
 
     @property
     def is_moving(self) -> bool:
-        """Whether a move was commanded whose end `finished` has not reported yet."""
+        """Whether a commanded move is not reported as ended by `finished` yet."""
         return self._state.moving
 
     @property
@@ -69,15 +69,12 @@ class Axes:
 
     @property
     def newest_goal(self) -> Vector:
-        """What relative commands start from, shape (n,): the goal if there is one, else the setpoint."""
+        """Start of relative commands, shape (n,): the goal if any, else the setpoint."""
         under_way = self.setpoint.activity is Activity.FOLLOW or self.setpoint.is_moving
         return self.setpoint.goal if under_way else self.setpoint.position
 
     def finished(self) -> bool:
-        """Return, once, that the move has arrived.
-
-        It does so a step later, so that even a move to where the joints are takes a step.
-        """
+        """Return once, a step after the arrival, that the move has arrived: every move takes a step."""
         arrived = self.is_moving and not self.setpoint.is_moving
         if arrived:
             self._state.moving = False
@@ -90,7 +87,7 @@ class Axes:
         self.setpoint.follow(goal, h, velocity)
 
     def drift(self, velocity: Vector) -> None:
-        """Move with `velocity`, shape (n,), for as long as it is sent again."""
+        """Move with `velocity`, shape (n,), as long as the velocity is sent again."""
         self._hold_position()
         self._state.moving = False
         self.setpoint.drift(velocity)
@@ -98,7 +95,7 @@ class Axes:
     def move(self, goal: Vector, ratio: Vector) -> None:
         """Move to `goal`, shape (n,), inside the ranges.
 
-        `ratio`, shape (2,), are the shares of velocity and acceleration that it uses.
+        `ratio`, shape (2,): fractions of velocity and acceleration for the move.
         """
         self._hold_position()
         self._state.moving = True
@@ -117,7 +114,7 @@ class Axes:
         self.setpoint.reset(self.position)
 
     def power(self, *, on: bool) -> None:
-        """Switch the drives off, or on to hold the joints where they are."""
+        """Switch the drives off, or on to hold the joints in place."""
         self._state.mode, self._state.moving = Mode.POSITION if on else Mode.OFF, False
         self.effort[:] = 0.0
         self.setpoint.reset(self.position)

@@ -1,6 +1,6 @@
-"""CRTK's commands to the tip of one arm: from messages to commands to its drives.
+"""CRTK's commands to the tip of an arm: from messages to commands to the drives.
 
-An invalid command raises MotionError before anything has changed.
+An invalid command raises MotionError before any change.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ _SINGULAR = 1e-6
 
 
 class CartesianCommands:
-    """Executes the Cartesian commands of one arm: `handlers`, by name."""
+    """Executes the Cartesian commands of an arm: `handlers`, by name."""
 
     def __init__(self, arm: CartArm, drives: Drives, base: BaseFrame, ratio: Vector, period: float) -> None:
         """Prepare the handlers.
 
         Args:
-            arm: its name.
-            drives: what they command.
+            arm: name of the arm.
+            drives: drives of the arm.
             base: the arm's base frame.
-            ratio: shares of velocity and acceleration that moves use, shape (2,); read at each move.
+            ratio: fractions of velocity and acceleration for moves, shape (2,); read at each move.
             period: the controller's step, s.
         """
         self._arm, self._drives, self._base, self._ratio, self._period = arm, drives, base, ratio, period
@@ -59,7 +59,7 @@ class CartesianCommands:
         }
 
     def not_ready(self) -> str:
-        """Return why the arm refuses Cartesian commands; empty if it does not."""
+        """Return why the arm refuses Cartesian commands; empty: accepted."""
         return "" if self._drives.control.cartesian else self._cannula.not_past(self._joints.position)
 
     def _set_cf_orientation_absolute(self, message: BoolMessage) -> None:
@@ -127,9 +127,9 @@ class CartesianCommands:
         return self._inverse(self._from(message.header.frame_id).dot(goals.frame(message.pose)))
 
     def _from(self, frame_id: str) -> Vector:
-        """Return the pose of the frame that a message names in the arm's base frame, shape (4, 4).
+        """Return the pose of a message's frame in the arm's base frame, shape (4, 4).
 
-        An empty name is the reference's.
+        An empty name stands for the reference.
         """
         named = goals.check_frame(frame_id, self._base.reference, self._base.local)
         return _IDENTITY if named == self._base.local else inverse_transform(self._base.pose)
@@ -137,7 +137,7 @@ class CartesianCommands:
     def _inverse(self, tip: Vector) -> Vector:
         """Return the joint positions, shape (n,), of a pose in the arm's base frame, shape (4, 4).
 
-        Of several solutions it is the nearest to the setpoint.
+        Among several solutions, the nearest to the setpoint.
         """
         goal = inverse_kinematics(self._chain, tip, self._joints.setpoint.position)
         self._cannula.check(goal, self._joints.position)
@@ -146,7 +146,7 @@ class CartesianCommands:
     def _joint_velocity(self, twist: Vector) -> Vector:
         """Return the joint velocities, shape (n,), of a twist of the tip in the base frame.
 
-        Where one would exceed its limit, all are slower.
+        All velocities are scaled down to respect every limit.
         """
         jacobian = self._chain.jacobian(self._chain.frames(self._joints.setpoint.position))
         velocity = np.linalg.pinv(jacobian, rcond=_SINGULAR) @ twist

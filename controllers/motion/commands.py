@@ -1,6 +1,6 @@
-"""CRTK's commands to one arm in joint space: from messages to commands to its drives.
+"""CRTK's commands to an arm in joint space: from messages to commands to the drives.
 
-An invalid command raises MotionError before anything has changed.
+An invalid command raises MotionError before any change.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ __all__ = ["Commands"]
 
 
 class CommandState(Record):
-    """Settings of one arm."""
+    """Settings of an arm."""
 
     ratio = array(2)
-    """Shares of velocity and of acceleration that moves use."""
+    """Fractions of velocity and of acceleration for moves."""
     gravity_compensation = flag(start=True)
-    """Whether the drives carry the weight that the controller knows."""
+    """Whether the drives carry the weight known to the controller."""
 
 
 class Commands:
-    """Executes the commands of one arm in joint space: `handlers`, by name.
+    """Executes the commands of an arm in joint space: `handlers`, by name.
 
-    Commands of its jaw or hand are `gripper/...`.
+    Commands of jaw or hand are `gripper/...`.
     """
 
     def __init__(self, drives: Drives, period: float) -> None:
-        """Take the arm's drives and the controller's step (s)."""
+        """`period`: the controller's step, s."""
         self._drives, self._period = drives, period
         self._joints, self._chain = drives.joints, drives.joints.chain
         self.settings = CommandState()

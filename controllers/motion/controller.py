@@ -27,7 +27,7 @@ __all__ = ["MotionController"]
 
 
 class MotionController(Controller):
-    """Executes CRTK's commands to each arm, and commands its drives.
+    """Executes CRTK's commands to each arm, and commands the drives.
 
     Connect `motion.drive/* -> robot.*` and `robot.* -> motion.sense/*`.
     """
@@ -48,10 +48,10 @@ class MotionController(Controller):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """CRTK's commands, states and events of each arm, and its drives and sensors on the robot.
+        """CRTK's commands, states and events of each arm, and drives and sensors on the robot.
 
-        These are `<arm>/...`, `drive/<arm>/...` and `sense/<arm>/...`; on the cart also `SUJ/<arm>/...`, the
-        setup joints that carry the arm.
+        `<arm>/...`, `drive/<arm>/...` and `sense/<arm>/...`; on the cart also `SUJ/<arm>/...`, the setup
+        joints under the arm.
         """
         params, period = self.params, self.params.publish_period
         ports = [
@@ -66,7 +66,7 @@ class MotionController(Controller):
         return tuple(ports)
 
     def configure(self, setup: Setup) -> Outputs:
-        """Put every arm where the parameters state it."""
+        """Put every arm at the position of the parameters."""
         if find_spec("ruckig") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind motion)", "motion", "ruckig")
         from controllers.motion.arm import Arm
@@ -85,7 +85,7 @@ class MotionController(Controller):
     def _camera(self) -> Vector | None:
         """Return the pose of the world in the frame of the ECM's tip, shape (4, 4), if there is an ECM.
 
-        It is the same array until the ECM moves.
+        The same array until the ECM moves.
         """
         if self._camera_stand is None:
             return None
@@ -115,7 +115,7 @@ class MotionController(Controller):
         return self._outputs
 
     def _publish(self, telemetry: Telemetry) -> None:
-        """Update the states that are not published at every step."""
+        """Update the states not published at every step."""
         for name, arm in self._arms.items():
             arm.publish(telemetry.rows[name])
         telemetry.update(wrenches=not telemetry.wrenches <= self.unread)

@@ -1,4 +1,4 @@
-"""Arm and gripper (jaw or hand) together: their commands, and reports of moves that end or are abandoned."""
+"""Arm and gripper (jaw or hand) together: commands, and reports of ended or abandoned moves."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ __all__ = ["Drives", "WrenchFrame"]
 
 
 class WrenchFrame(IntEnum):
-    """How a commanded wrench is meant.
+    """Frame of a commanded wrench.
 
-    At the tip along the tip's axes (or the reference's, see `DrivesState`), at the base frame's origin
-    along the base frame's, at the tip along the reference's, or as the impedance has it.
+    At the tip along the tip's axes (or the reference's, see `DrivesState`), at the base frame's origin along
+    the base frame's axes, at the tip along the reference's axes, or by the impedance.
     """
 
     NONE = 0
@@ -37,10 +37,10 @@ class WrenchFrame(IntEnum):
 
 
 class DrivesState(Record):
-    """Cartesian control of one arm."""
+    """State of the Cartesian control of an arm."""
 
     wrench = array(6)
-    """As commanded: force and torque."""
+    """Commanded force and torque."""
     frame = choice(WrenchFrame.NONE)
     absolute = flag()
     """Whether body wrenches are along the axes of the reference."""
@@ -49,14 +49,14 @@ class DrivesState(Record):
 
 
 class Drives:
-    """The joints of an arm, and its gripper if it has one."""
+    """The joints of an arm, and the gripper if any."""
 
     def __init__(self, arm: PsmParams | EcmParams, messages: Messages, base: Callable[[], Vector]) -> None:
         """Build arm and gripper.
 
         Args:
-            arm: its parameters.
-            messages: where the end of a move is reported.
+            arm: parameters of the arm.
+            messages: events of the arm, for the end of a move.
             base: returns the base frame in the reference, shape (4, 4).
         """
         self._messages, self._base = messages, base
@@ -66,7 +66,7 @@ class Drives:
             None if gripper is None else Axes(SerialChain(gripper.joints, np.eye(4)), np.array(gripper.start))
         )
         self.groups = (self.joints,) if self.gripper is None else (self.joints, self.gripper)
-        """All that is driven: the arm's joints, then the gripper."""
+        """Driven joints: the arm's joints, then the gripper."""
         self.control = DrivesState()
         self._impedance = Impedance()
         self.state = (
@@ -82,18 +82,18 @@ class Drives:
 
     @property
     def modes(self) -> tuple[Mode, Mode]:
-        """What arm and gripper do; a gripper that is not there is off."""
+        """Modes of arm and gripper; a missing gripper is off."""
         return self.joints.mode, Mode.OFF if self.gripper is None else self.gripper.mode
 
     def power(self, *, on: bool) -> None:
-        """Switch all drives off, or on to hold what they hold."""
+        """Switch all drives off, or on to hold the present positions."""
         self._abandon(*self.groups)
         self._leave()
         for axes in self.groups:
             axes.power(on=on)
 
     def rest(self) -> None:
-        """Brake and stay; a gripper that presses goes on pressing."""
+        """Brake and stay; a pressing gripper goes on pressing."""
         self._abandon(*self.groups)
         self._leave()
         for axes in self.groups:
@@ -103,21 +103,21 @@ class Drives:
     def follow(self, axes: Axes, goal: Vector, h: float, velocity: Vector | None = None) -> None:
         """Let `axes` follow a goal; arguments as of `Setpoint.follow`.
 
-        Raises MotionError if it is out of range.
+        Raises MotionError for a goal out of range.
         """
         goal = axes.chain.within(goal)
         self._take_over(axes)
         axes.follow(goal, h, velocity)
 
     def drift(self, velocity: Vector) -> None:
-        """Let the arm move with joint velocities, shape (n,), for as long as they are sent again."""
+        """Let the arm move with joint velocities, shape (n,), as long as velocities are sent again."""
         self._take_over(self.joints)
         self.joints.drift(velocity)
 
     def move(self, axes: Axes, goal: Vector, ratio: Vector) -> None:
         """Let `axes` move to a goal; arguments as of `Axes.move`.
 
-        Raises MotionError if it is out of range.
+        Raises MotionError for a goal out of range.
         """
         goal = axes.chain.within(goal)
         if axes is self.joints:
@@ -130,7 +130,7 @@ class Drives:
         axes.apply(effort)
 
     def press(self, wrench: Vector, frame: WrenchFrame) -> None:
-        """Apply `wrench`, shape (6,), with the arm from now on, wherever it goes."""
+        """Apply `wrench`, shape (6,), with the arm from now on, in any motion."""
         self._take_over(self.joints)
         self.control.wrench[:], self.control.frame = wrench, frame
         self._balance()
@@ -143,7 +143,7 @@ class Drives:
         self._balance()
 
     def step(self, h: float) -> list[Setpoint]:
-        """Advance by `h` seconds, except the setpoints that follow a stream: return those."""
+        """Advance by `h` seconds, except setpoints following a stream; return the latter."""
         if self.control.frame is not WrenchFrame.NONE:
             self._balance()
         following: list[Setpoint] = []
@@ -155,7 +155,7 @@ class Drives:
         return following
 
     def report_arrivals(self, *, silent: bool) -> None:
-        """Report moves that have arrived since the last step; `silent`: not the arm's, which homes."""
+        """Report moves arrived since the last step; `silent`: without the homing arm's."""
         for axes in self.groups:
             if axes.finished() and not (silent and axes is self.joints):
                 self._messages.goal_reached(reached=True)
@@ -174,7 +174,7 @@ class Drives:
             self._messages.goal_reached(reached=False)
 
     def _balance(self) -> None:
-        """Apply the joint efforts J^T w, limited to what the drives can do."""
+        """Apply the joint efforts J^T w, within the limits of the drives."""
         chain = self.joints.chain
         frames = chain.frames(self.joints.position)
         frame = self.control.frame

@@ -1,4 +1,4 @@
-"""What an arm holds, in the words of the dVRK (SAW = jhu-dvrk/sawIntuitiveResearchKit)."""
+"""Equipment of an arm, in the words of the dVRK (SAW = jhu-dvrk/sawIntuitiveResearchKit)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ __all__ = ["Equipment", "endoscope_type", "tool_type"]
 
 _GEARED = "_GEARED"
 _VERSIONS = {"420006": ("..11", "12.."), "420093": ("..13", "14..")}
-"""Of the instruments whose later versions are geared, both ranges (SAW share/tool/index.json)."""
+"""Both ranges of versions of instruments with geared later versions (SAW share/tool/index.json)."""
 
 
 def tool_type(instrument: Instrument) -> str:
     """Return `NAME:NUMBER[VERSIONS]`, such as `LARGE_NEEDLE_DRIVER:400006[..]` (SAW mtsToolList.cpp, Name).
 
-    An instrument without a number has its name alone.
+    An instrument without a number has the name alone.
     """
     if not instrument.number:
         return instrument.name
@@ -35,18 +35,18 @@ def tool_type(instrument: Instrument) -> str:
 
 
 def endoscope_type(endoscope: Endoscope) -> str:
-    """Return the name of an endoscope of the Classic with its SD camera, whose mass the model has.
+    """Return the name of an endoscope of the Classic with the SD camera, as in the model's mass.
 
-    Names are those of SAW mtsIntuitiveResearchKitEndoscopeTypes.cdg.
+    Names from SAW mtsIntuitiveResearchKitEndoscopeTypes.cdg.
     """
     return f"Classic_SD_{endoscope.upper()}"
 
 
 class Equipment:
-    """What one arm holds while the session lasts, and the `handlers` of commands about it, by name."""
+    """Equipment of an arm for the whole session, and the `handlers` of related commands, by name."""
 
     def __init__(self, event: Literal["tool_type", "endoscope_type"], name: str, messages: Messages) -> None:
-        """Take the event that publishes what the arm holds, the name to publish, and the arm's events."""
+        """`event`: event for the publication of `name`; `messages`: events of the arm."""
         self._event, self._name, self._messages = event, name, messages
         self.handlers: Mapping[str, Callable[[Any], None]] = {f"set_{event}": self._set}
         if event == "tool_type":
@@ -57,7 +57,7 @@ class Equipment:
             }
 
     def publish(self) -> None:
-        """Publish what the arm holds."""
+        """Publish the equipment."""
         self._messages.equipment(self._event, self._name)
 
     def _set(self, message: StringMessage) -> None:

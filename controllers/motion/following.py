@@ -1,6 +1,6 @@
-"""How setpoints follow a stream of goals: without jumps in velocity, and able to stop inside their ranges.
+"""Following of a stream of goals: without jumps in velocity, and with stops inside the ranges.
 
-All setpoints that follow in a step do so together, so that numpy is called as often for four arms as for one.
+All following setpoints of a step are computed together, at the number of numpy calls of a single arm.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ def clip(value: Vector, lower: Vector, upper: Vector) -> Vector:
 
 
 class Followers:
-    """Setpoints that follow together, of N joints in all, and what stays the same while they do."""
+    """Setpoints following together, of N joints in all, with their constants."""
 
     def __init__(self, setpoints: Sequence[Setpoint], h: float) -> None:
-        """Take the setpoints, and the step (s)."""
+        """`h`: the step, s."""
         self.setpoints, self._h = list(setpoints), h
         self._courses = [setpoint.course for setpoint in setpoints]
         sizes = [course.shape[1] for course in self._courses]
@@ -73,7 +73,7 @@ class Followers:
 
 
 def _bend(left: Vector, velocity: Vector, arrival: Vector, wait: Vector, h: float) -> Vector:
-    """Return the next step's velocity less that of arrival, shape (N,), on a cubic of `wait` seconds."""
+    """Return the next step's velocity less the velocity of arrival, shape (N,), on a cubic of `wait` s."""
     mean = left / wait
     now, then = velocity - mean, arrival - mean  # the cubic less the straight line
     share = h / wait
@@ -92,8 +92,8 @@ def steer(
 ) -> None:
     """Write position, velocity and acceleration after `h` seconds to `out`, shape (3, N).
 
-    The velocity is the allowed one that is nearest to `target`; allowed is what `limits` (`Setpoint.limits`)
-    and the way left to either side permit.
+    The velocity is the nearest to `target` within `limits` (`Setpoint.limits`) and the remaining distance to
+    either side.
     """
     lower, upper, fast, most = limits
     room = h * most
@@ -104,7 +104,7 @@ def steer(
 
 
 def fastest(distance: Vector, most: Vector, h: float) -> Vector:
-    """Return the largest velocity from which steps of `h` come to rest within `distance`, both (..., N).
+    """Return the largest velocity for a stop within `distance` in steps of `h`, both (..., N).
 
     With the velocity falling by A h a step from n A h, m = floor(n) + 1 steps go A h^2 (m n - m (m - 1) /
     2) far; solved for n. The acceleration A is `most`, shape (N,).

@@ -28,17 +28,17 @@ __all__ = [
 
 
 def turned(rotation_matrix: Vector, vector: Vector) -> Vector:
-    """Return a twist or wrench, shape (6,), both of whose parts are rotated by a matrix of shape (3, 3)."""
+    """Return a twist or wrench, shape (6,), with both parts rotated by a matrix of shape (3, 3)."""
     return np.concatenate([rotation_matrix @ vector[:3], rotation_matrix @ vector[3:]])
 
 
 def setup_positions(arm: CartArm, params: MotionParams) -> Vector:
-    """Return where the setup joints that carry `arm` are, shape (6,)."""
+    """Return the positions of the setup joints under `arm`, shape (6,)."""
     return np.array(getattr(params.setup_joints, arm) or setup_joints.SIMULATED[arm])
 
 
 def base_in_world(arm: CartArm, params: MotionParams) -> Vector:
-    """Return the pose of the arm's base frame in the world, shape (4, 4), as the scenario states it."""
+    """Return the pose of the arm's base frame in the world by the scenario, shape (4, 4)."""
     if params.mounting == "cart":
         return setup_joints.base_pose(arm, setup_positions(arm, params))
     stands = params.arms.driven[arm]
@@ -46,7 +46,7 @@ def base_in_world(arm: CartArm, params: MotionParams) -> Vector:
 
 
 def reference_frame(arm: CartArm, params: MotionParams) -> str:
-    """Return the `frame_id` of the arm's Cartesian ports that are not `local/`."""
+    """Return the `frame_id` of the arm's Cartesian ports other than `local/`."""
     return crtk.reference_frame(arm, params.arms.driven, params.mounting, params.reference)
 
 
@@ -54,19 +54,19 @@ _ORIGIN = np.eye(4)
 
 
 class BaseFrame:
-    """The base frame of one arm in the frame that its Cartesian ports refer to."""
+    """The base frame of an arm in the reference frame of the arm's Cartesian ports."""
 
     def __init__(self, arm: CartArm, params: MotionParams, camera: Callable[[], Vector | None]) -> None:
-        """Start where the scenario states it.
+        """Start at the scenario's pose.
 
         Args:
-            arm: its name.
+            arm: name of the arm.
             params: parameters of the controller.
             camera: returns the pose of the world in the frame of the ECM's tip, shape (4, 4), if there is an
-            ECM; the same array until that moves.
+                ECM; the same array until the ECM moves.
         """
         self.reference, self.local = reference_frame(arm, params), crtk.base_frame(arm)
-        """`frame_id` of ports that are not `local/`, and of those that are."""
+        """`frame_id` of ports other than `local/`, and of `local/` ports."""
         self._camera, self._carried = camera, params.mounting == "cart"
         self._world = base_in_world(arm, params)
         self._seen_by, self._in_camera = np.eye(4), np.eye(4)
@@ -74,7 +74,7 @@ class BaseFrame:
 
     @property
     def pose(self) -> Vector:
-        """The base frame in its reference, shape (4, 4)."""
+        """Pose of the base frame in the reference, shape (4, 4)."""
         if self.reference == self.local:
             return _ORIGIN
         camera = self._camera() if self.reference == crtk.CAMERA_FRAME else None

@@ -1,6 +1,6 @@
 """From CRTK's messages to goals of an arm.
 
-An invalid message raises MotionError, which states what is allowed.
+An invalid message raises MotionError with the allowed values.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ __all__ = [
 ]
 
 _QUATERNION_TOLERANCE = 1e-3
-"""Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
+"""Tolerance of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
 _MOST = 1e9
-"""SI units; what is computed from numbers up to this stays finite, and no force, gain or place is larger."""
+"""Largest accepted number, SI units: results stay finite, and no force, gain or place is larger."""
 
 
 def joint_values(
@@ -41,7 +41,7 @@ def joint_values(
 ) -> Vector:
     """Return positions, velocities or efforts, shape (n,), in the order of the chain.
 
-    A message that names its joints may have them in any order.
+    A message with joint names may have any order.
     """
     names = chain.names
     values: Vector = getattr(message, part)
@@ -63,9 +63,9 @@ def stated_velocity(chain: SerialChain, message: JointState) -> Vector | None:
 
 
 def efforts(chain: SerialChain, message: JointState) -> Vector:
-    """Return the efforts, shape (n,), clamped to what the drives can do.
+    """Return the efforts, shape (n,), clamped to the limits of the drives.
 
-    Raises MotionError if one is beyond that by more than `TOLERANCE`.
+    Raises MotionError for an effort beyond a limit by more than `TOLERANCE`.
     """
     values = joint_values(chain, message, "effort")
     wrong = [
@@ -85,7 +85,7 @@ def _excessive(joint: Joint, effort: float) -> str:
 
 
 def check_frame(frame_id: str, *allowed: str) -> str:
-    """Return `frame_id`, the first of `allowed` where the message leaves it open."""
+    """Return `frame_id`, or the first of `allowed` for an empty `frame_id`."""
     if frame_id and frame_id not in allowed:
         raise MotionError(f"frame '{frame_id}', allowed are {', '.join(dict.fromkeys(allowed))}")
     return frame_id or allowed[0]
@@ -126,7 +126,7 @@ def wrench(message: Wrench) -> Vector:
 
 
 def vector(message: Point | Vector3, part: str) -> Vector:
-    """Return the vector, shape (3,); `part` names it in the error if it is not finite or too large."""
+    """Return the vector, shape (3,); `part`: name for the error about a non-finite or too large vector."""
     return np.array(_numbers(message, part))
 
 

@@ -1,9 +1,9 @@
 """Cartesian impedance: springs and dampers between the tip and a goal, with gains for either side of it.
 
-The law is that of the real controller (jhu-saw/sawControllers, osaCartesianImpedanceController.cpp). With e
-the tip's displacement along the axes of an orientation, v its velocity along them, and the gains of the side
-where it is: f = p e' + d v + bias, e' being e less the deadband. For the torque e is the rotation vector from
-the goal's orientation, along whose axes it is.
+The law of the real controller (jhu-saw/sawControllers, osaCartesianImpedanceController.cpp): with e the tip's
+displacement and v the tip's velocity along the axes of an orientation, and the gains of the tip's side, f = p
+e' + d v + bias, e' being e less the deadband. For the torque, e is the rotation vector from the goal's
+orientation, along the axes of the goal.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ __all__ = ["Impedance"]
 
 
 class ImpedanceState(Record):
-    """The goal of one arm, and its gains."""
+    """The goal of an arm, with gains."""
 
     force_axes = array(3, 3)
     torque_axes = array(3, 3)
-    """Along which forces and torques act, and the goal's orientation."""
+    """Axes of forces and torques, and the goal's orientation."""
     position = array(3)
     gains = array(4, 2, 2, 3)
     """p, d, bias and deadband; on the positive and on the negative side; of force and torque; x, y, z."""
 
 
 class Impedance:
-    """The goal of one arm, and its gains."""
+    """The goal of an arm, with gains."""
 
     def __init__(self) -> None:
         """Start with zeros."""
@@ -40,9 +40,9 @@ class Impedance:
         self._position, self._gains = self.state.position, self.state.gains
 
     def set(self, message: CartesianImpedance) -> None:
-        """Take another goal.
+        """Set another goal.
 
-        Raises MotionError, and keeps the old one, if a number is not finite or a quaternion not of unit norm.
+        Raises MotionError, with the old goal kept, for a non-finite number or a quaternion not of unit norm.
         """
         axes = (
             goals.rotation_matrix(message.force_orientation),
@@ -64,8 +64,8 @@ class Impedance:
         """Return the wrench on the tip, shape (6,), in the frame of the goal.
 
         Args:
-            tip: its pose in that frame, shape (4, 4).
-            twist: its twist in that frame, shape (6,).
+            tip: pose of the tip in the frame of the goal, shape (4, 4).
+            twist: twist of the tip in the frame of the goal, shape (6,).
         """
         turn = rotation.log(rotation.from_matrix(self._torque_axes.T @ tip[:3, :3]))
         away = np.array([self._force_axes.T @ (tip[:3, 3] - self._position), turn])  # (2, 3)

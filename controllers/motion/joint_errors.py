@@ -1,7 +1,7 @@
-"""Joint errors: arms whose encoders are off, as those of real ones are and the suturing challenge has them.
+"""Joint errors: encoders with offsets, as on real arms and in the suturing challenge.
 
-An encoder that is off by e measures q - e where the joint is at q, and its servo, which follows the encoder,
-goes to q + e where q is commanded. So a controller sees nothing of it. SI units, radians.
+An encoder with offset e measures q - e at a joint position q, and the servo, following the encoder, goes to q
++ e for a command of q. So a controller sees nothing of the offset. SI units, radians.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from schemas.vectors import Vector
 __all__ = ["JointErrors"]
 
 _Offsets = tuple[Angle, Angle, Length]
-"""Of yaw, pitch and insertion."""
+"""Offsets of yaw, pitch and insertion."""
 
 
 def _positive(bounds: _Offsets | None) -> _Offsets | None:
@@ -29,9 +29,9 @@ def _positive(bounds: _Offsets | None) -> _Offsets | None:
 
 
 class JointErrors(Params):
-    """By how much the true yaw, pitch and insertion of an arm exceed what its encoders measure.
+    """True minus measured yaw, pitch and insertion of an arm.
 
-    The Surgical Robotics Challenge draws them within 5 degrees, 5 degrees and 5 mm.
+    The Surgical Robotics Challenge draws these offsets within 5 degrees, 5 degrees and 5 mm.
     """
 
     PSM1: _Offsets | None = Field(default=None, description="as stated, whatever is drawn")
@@ -43,7 +43,7 @@ class JointErrors(Params):
     seed: int = Field(default=0, ge=0, description="draws them, for every arm others")
 
     def of(self, arm: str, joints: int) -> Vector:
-        """Return what is added to the measured positions of an arm's `joints` joints, shape (joints,)."""
+        """Return the offsets of the measured positions of an arm's `joints` joints, shape (joints,)."""
         offsets = np.zeros(joints)
         stated: _Offsets | None = getattr(self, arm, None)
         if stated is not None:

@@ -1,4 +1,4 @@
-"""The operating state of one arm: powering, homing, pausing, faults.
+"""The operating state of an arm: powering, homing, pausing, faults.
 
 Source of the tolerances: SAW = jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68).
 """
@@ -22,7 +22,7 @@ from schemas.vectors import Vector
 __all__ = ["Lifecycle"]
 
 _TRACKING_TOLERANCE = (0.5, 0.5, 0.05, 0.6, 0.6, 0.6)
-"""Largest distance of a joint from its setpoint, rad and m, before the arm goes to FAULT.
+"""Largest distance of a joint from the setpoint, rad and m, before the arm goes to FAULT.
 
 From SAW share/pid/sawControllersPID-PSM.json; the first four are used for the ECM too.
 """
@@ -32,24 +32,24 @@ _GOAL_TOLERANCE = radians(3.0)
 From SAW mtsIntuitiveResearchKit{PSM,ECM}.cpp.
 """
 _HOMING_TIMEOUT = 2.0
-"""s after the end of the homing trajectory in which the arm must be at home.
+"""Time from the end of the homing trajectory for the arm to be at home, s.
 
 From SAW mtsIntuitiveResearchKitArm.cpp, RunHoming.
 """
 
 _DESIRED = {"enable": Desired.ENABLED, "disable": Desired.DISABLED, "home": Desired.HOMED}
-"""What commands request; after a pause the arm goes on with it."""
+"""States requested by commands; after a pause the arm goes on with the request."""
 _FULL = np.ones(2)
-"""Shares of velocity and acceleration with which an arm homes."""
+"""Fractions of velocity and acceleration for homing."""
 
 
 class LifecycleState(Record):
-    """The operating state of one arm, and its progress to the next."""
+    """The operating state of an arm, and the progress to the next state."""
 
     state = choice(State.DISABLED)
     homed = flag()
     powering = number()
-    """s until the arm is ENABLED; 0: it is not powering."""
+    """Time until the arm is ENABLED, s; 0: not powering."""
     homing = flag()
     late = number()
     """s since the end of the homing trajectory."""
@@ -57,7 +57,7 @@ class LifecycleState(Record):
 
 
 class Lifecycle:
-    """The operating state of one arm, and what its change does to the drives."""
+    """The operating state of an arm, and the effect of changes on the drives."""
 
     def __init__(
         self, drives: Drives, messages: Messages, home: Vector, power_time: float, *, homed: bool
@@ -65,10 +65,10 @@ class Lifecycle:
         """Start DISABLED, or ENABLED and homed.
 
         Args:
-            drives: what changes with the state.
-            messages: where changes are reported.
+            drives: drives of the arm.
+            messages: events of the arm.
             home: joint positions, shape (n,).
-            power_time: from `enable` to ENABLED, s.
+            power_time: time from `enable` to ENABLED, s.
             homed: whether to start ENABLED and homed.
         """
         self._drives, self._messages = drives, messages
@@ -97,19 +97,19 @@ class Lifecycle:
 
     @property
     def condition(self) -> tuple[State, bool, bool]:
-        """The operating state, whether the arm is homed, and whether it is busy: powers, homes or moves."""
+        """The operating state, whether the arm is homed, and whether powering, homing or moving."""
         now, state = self._now, self._now.state
         busy = now.powering > 0.0 or (now.homing and state is not State.PAUSED) or self._drives.is_moving
         return state, now.homed, busy
 
     @property
     def desired_state(self) -> str:
-        """The state that was commanded: CRTK's `desired_state`."""
+        """The commanded state: CRTK's `desired_state`."""
         return self.state.name if self.state in (State.PAUSED, State.FAULT) else self._now.desired.name
 
     @property
     def is_lost(self) -> bool:
-        """Whether the drives hold a position and a joint is too far from its own."""
+        """Whether the drives hold a position and a joint is too far from its setpoint."""
         joints = self._drives.joints
         if joints.mode is not Mode.POSITION:
             return False
@@ -120,7 +120,7 @@ class Lifecycle:
         return False
 
     def not_ready(self) -> str:
-        """Return why the arm refuses motion commands; empty if it does not."""
+        """Return why the arm refuses motion commands; empty: accepted."""
         if self.state is not State.ENABLED:
             return (
                 f"the arm is {self.state.name}{' and powering' if self._now.powering else ''}, allowed in"
@@ -131,7 +131,7 @@ class Lifecycle:
         return "" if self._now.homed else "the arm is not homed, send state_command home first"
 
     def command(self, message: StringStamped) -> bool:
-        """Execute a `state_command`; return whether it was accepted."""
+        """Execute a `state_command`; return whether the command was accepted."""
         if reason := refusal(self.state, message.string) or self._repeats.refusal(message):
             self._messages.warning(reason)
             return False
@@ -144,7 +144,7 @@ class Lifecycle:
         return True
 
     def watch(self, h: float) -> None:
-        """Check what has ended or gone wrong in the last step, of `h` seconds."""
+        """Check for ends and failures in the last step, of `h` seconds."""
         if self.is_lost:
             self._fault(self._loss())
         self._drives.report_arrivals(silent=self._now.homing)
@@ -166,7 +166,7 @@ class Lifecycle:
                 self._finish_powering()
 
     def _go_home(self) -> None:
-        """Home the arm unless it is homed or homing; power it first if it is DISABLED."""
+        """Home the arm unless homed or homing; power a DISABLED arm first."""
         if self._now.homed or self._now.homing:
             self._enable()
             return
@@ -211,7 +211,7 @@ class Lifecycle:
         self._messages.desired_state(self.desired_state)
 
     def _loss(self) -> str:
-        """Return which joints are too far from their setpoint."""
+        """Return the joints too far from their setpoint."""
         joints = self._drives.joints
         away = np.abs(joints.setpoint.position - joints.position)
         rows = zip(joints.chain.joints, away.tolist(), self._tolerance, strict=True)

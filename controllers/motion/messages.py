@@ -1,4 +1,4 @@
-"""The events of one arm: its operating state, whether goals were reached, errors, warnings, status."""
+"""The events of an arm: operating state, reached goals, errors, warnings, status."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from schemas.ros import BoolMessage, Header, StringMessage, Time
 __all__ = ["Messages"]
 
 _OTHER = "other"
-"""Stands for the name of an end effector other than a jaw."""
+"""Placeholder for the name of an end effector without a jaw."""
 _STREAMS = {
     command: row
     for row, command in enumerate(
@@ -31,20 +31,20 @@ _STREAMS = {
         )
     )
 }
-"""Commands that come as a stream, and the row of each in `Messages.state`."""
+"""Streamed commands, and the row of each in `Messages.state`."""
 
 
 def _row(command: str) -> int | None:
-    """Return the row of a command that comes as a stream."""
+    """Return the row of a streamed command."""
     word = command.rpartition("/")[2]
     return _STREAMS.get(command, _STREAMS.get(f"{_OTHER}/{word}"))
 
 
 class Messages:
-    """The event outputs of one arm in the present step."""
+    """The event outputs of an arm in the present step."""
 
     def __init__(self, arm: str, events: Iterable[str], outputs: dict[str, Any]) -> None:
-        """Take the arm's name, those of its event outputs, and the outputs in which they stand."""
+        """`events`: names of the arm's event outputs; `outputs`: the controller's outputs."""
         self._arm, self._outputs = arm, outputs
         self._ports = {name: f"{arm}/{name}" for name in events}
         self._silence = dict.fromkeys(self._ports.values(), ())
@@ -53,10 +53,10 @@ class Messages:
         """Whether the present step has no events."""
         self._now_ns = 0
         self.state = np.zeros((len(_STREAMS), 3))
-        """Per stream: checksum of the last refusal, when it was reported (s), how often it recurred since."""
+        """Last refusal of each stream: checksum, time of the report (s), number of recurrences."""
 
     def begin(self, now_ns: int) -> None:
-        """Clear the events of the last step; the new one ends at `now_ns`."""
+        """Clear the events of the last step; the new step ends at `now_ns`."""
         self._now_ns = now_ns
         if not self.quiet:
             self._outputs |= self._silence
@@ -71,11 +71,11 @@ class Messages:
         )
 
     def desired_state(self, state: str) -> None:
-        """Publish the state that was commanded."""
+        """Publish the commanded state."""
         self._put("desired_state", StringMessage(data=state))
 
     def equipment(self, event: str, name: str) -> None:
-        """Publish what the arm holds: `event` is `tool_type` or `endoscope_type`."""
+        """Publish the arm's equipment: `event` is `tool_type` or `endoscope_type`."""
         self._put(event, StringMessage(data=name))
 
     def goal_reached(self, *, reached: bool) -> None:
@@ -83,15 +83,15 @@ class Messages:
         self._put("goal_reached", BoolMessage(data=reached))
 
     def error(self, text: str) -> None:
-        """Publish what cannot be done."""
+        """Publish an error: an impossible command."""
         self._put("error", StringMessage(data=f"{self._arm}: {text}"))
 
     def warning(self, text: str) -> None:
-        """Publish what is refused at present."""
+        """Publish a warning: a command refused at present."""
         self._put("warning", StringMessage(data=f"{self._arm}: {text}"))
 
     def status(self, text: str) -> None:
-        """Publish what happens."""
+        """Publish a status text."""
         self._put("status", StringMessage(data=f"{self._arm}: {text}"))
 
     def refuse(self, command: str, reason: str, *, ready: bool) -> None:
@@ -107,7 +107,7 @@ class Messages:
             (self.error if ready else self.warning)(text)
 
     def executed(self, command: str) -> None:
-        """Note that a command was executed, so that its next refusal is reported at once."""
+        """Note an executed command: the next refusal is reported at once."""
         if (stream := _row(command)) is not None:
             self.state[stream] = 0.0
 

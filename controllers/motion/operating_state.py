@@ -1,8 +1,8 @@
-"""CRTK's operating states, and which commands each of them accepts.
+"""CRTK's operating states, and their accepted commands.
 
-As on the dVRK (jhu-cisst/cisst, prmOperatingState): what is not listed is refused with a warning. Of two
-accidents of that code one is not followed: there DISABLED accepts `pause`. The other is kept, as clients use
-it: DISABLED accepts `home`, which then powers the arm first.
+As on the dVRK (jhu-cisst/cisst, prmOperatingState): unlisted commands are refused with a warning. Of two
+accidents of the dVRK's code the first is not followed: DISABLED accepts `pause` there. The second is kept,
+because clients use it: DISABLED accepts `home`, and the arm is powered first.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ __all__ = ["Desired", "Repeats", "State", "refusal"]
 
 
 class State(IntEnum):
-    """What an arm may do: nothing (DISABLED, FAULT: the drives are off), everything, or stay (PAUSED)."""
+    """Permitted motion of an arm: none (DISABLED, FAULT: drives off), any, or standstill (PAUSED)."""
 
     DISABLED = 0
     ENABLED = 1
@@ -26,7 +26,7 @@ class State(IntEnum):
 
 
 class Desired(IntEnum):
-    """The state that was commanded; `desired_state` publishes it unless the arm is paused or in fault."""
+    """The commanded state, published as `desired_state` unless the arm is paused or in fault."""
 
     DISABLED = 0
     ENABLED = 1
@@ -42,7 +42,7 @@ _COMMANDS = {
 
 
 def refusal(state: State, command: str) -> str | None:
-    """Return why `state` refuses `command`; None if it accepts it."""
+    """Return why `state` refuses `command`; None: accepted."""
     known = {name for commands in _COMMANDS.values() for name in commands}
     if command not in known:
         return f"state_command '{command}' is unknown.{did_you_mean(command, known)}"
@@ -55,10 +55,10 @@ def refusal(state: State, command: str) -> str | None:
 
 
 class Repeats(RememberedCommands):
-    """Refuses state commands that were executed before."""
+    """Refuses state commands executed before."""
 
     def refusal(self, message: StringStamped) -> str | None:
-        """Return why a command is refused that was executed before; otherwise remember it and return None."""
+        """Return why a repeated command is refused; otherwise remember the command and return None."""
         stamp = message.header.stamp
         if not self.is_repeated(stamp.sec, stamp.nanosec, message.string):
             return None

@@ -22,38 +22,38 @@ __all__ = ["Arms", "EcmParams", "Gripper", "MotionParams", "PsmParams", "SetupJo
 
 
 class Gripper(NamedTuple):
-    """What an instrument grasps with."""
+    """The grasping part of an instrument."""
 
     name: str
-    """Second part of its ports' names, such as `jaw`."""
+    """Second part of the ports' names, such as `jaw`."""
     joints: tuple[Joint, ...]
-    """Commanded joints: a jaw's angle, with the roller's if it has one, or closings of fingers."""
+    """Commanded joints: a jaw's angle, with the roller's angle if any, or closings of fingers."""
     start: tuple[float, ...]
     """Positions at time 0, rad."""
 
 
 class PsmParams(MountedPsm):
-    """A patient-side manipulator: what it holds, and where it is until it is measured."""
+    """A patient-side manipulator: instrument, and position before the first measurement."""
 
     @property
     def gripper(self) -> Gripper | None:
-        """What the instrument grasps with; None: it does not grasp."""
+        """The instrument's grasping part; None: the instrument does not grasp."""
         effector = self.end_effector
         return Gripper(effector.name, effector.joints, self.end_effector_start) if effector.joints else None
 
     @property
     def home(self) -> tuple[float, ...]:
-        """Joint positions to which the arm homes."""
+        """Joint positions of the arm at home."""
         return psm.home(self.tool)
 
     @property
     def equipment(self) -> tuple[Literal["tool_type"], str]:
-        """What the arm holds: the event that publishes it, and its name there."""
+        """Equipment of the arm: event for the publication, and name."""
         return "tool_type", tool_type(self.tool)
 
 
 class EcmParams(MountedEcm):
-    """The endoscope camera manipulator: which endoscope it holds, and where it is until it is measured."""
+    """The endoscope camera manipulator: endoscope, and position before the first measurement."""
 
     @property
     def gripper(self) -> Gripper | None:
@@ -62,17 +62,17 @@ class EcmParams(MountedEcm):
 
     @property
     def home(self) -> tuple[float, ...]:
-        """Joint positions to which the arm homes."""
+        """Joint positions of the arm at home."""
         return ecm.HOME
 
     @property
     def equipment(self) -> tuple[Literal["endoscope_type"], str]:
-        """What the arm holds: the event that publishes it, and its name there."""
+        """Equipment of the arm: event for the publication, and name."""
         return "endoscope_type", endoscope_type(self.endoscope)
 
 
 class Arms(Params):
-    """The arms of a patient cart that are driven."""
+    """The driven arms of a patient cart."""
 
     PSM1: PsmParams | None = None
     PSM2: PsmParams | None = None
@@ -87,7 +87,7 @@ class Arms(Params):
 
     @property
     def driven(self) -> Mapping[CartArm, PsmParams | EcmParams]:
-        """Those that are there, by name."""
+        """Present arms by name."""
         named: dict[CartArm, PsmParams | EcmParams | None] = {
             "PSM1": self.PSM1,
             "PSM2": self.PSM2,
@@ -98,7 +98,7 @@ class Arms(Params):
 
 
 class SetupJoints(Params):
-    """Positions of the braked setup joints: the lift (m), then five angles; None: the simulated ones."""
+    """Positions of the braked setup joints: lift (m), then five angles; None: as simulated on the dVRK."""
 
     PSM1: Annotated[SetupPositions, settable("PSM1")] | None = None
     PSM2: Annotated[SetupPositions, settable("PSM2")] | None = None
@@ -107,7 +107,7 @@ class SetupJoints(Params):
 
 
 class MotionParams(Params):
-    """Which arms are driven, and to which frame their Cartesian ports refer."""
+    """The driven arms, and the reference frame of their Cartesian ports."""
 
     open_to_pages: ClassVar[bool] = True
 

@@ -1,7 +1,7 @@
-"""The ports of one arm: CRTK's towards clients, `drive/...` and `sense/...` towards the robot.
+"""The ports of an arm: CRTK's towards clients, `drive/...` and `sense/...` towards the robot.
 
-Names and types are those of `robots.dvrk.crtk`, so that a ROS gateway maps them one to one; here stands what
-each of them means to this controller.
+Names and types come from `robots.dvrk.crtk`, for a gateway to ROS to map one to one; here stands the meaning
+of each for this controller.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ EQUIPMENT_COMMANDS = {
     },
     "endoscope_type": {"set_endoscope_type": "refused unless it is what the arm holds"},
 }
-"""Commands about what an arm holds, by the event that publishes it: meaning."""
+"""Meanings of commands about an arm's equipment, by the event of publication."""
 _SETUP_JOINT_COMMANDS = {
     "state_command": _STATE_COMMAND,
     "servo_jp": "refused: the joints are braked",
@@ -112,13 +112,13 @@ def setup_joint_event_names() -> tuple[str, ...]:
 
 
 def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns: int) -> Iterator[Port]:
-    """Yield all ports of one arm.
+    """Yield all ports of an arm.
 
     Args:
-        arm: its name, such as `PSM1`.
-        params: what it holds.
-        reference: `frame_id` of Cartesian states that are not `local/`.
-        period_ns: of the states, ns.
+        arm: name of the arm, such as `PSM1`.
+        params: parameters of the arm.
+        reference: `frame_id` of Cartesian states other than `local/`.
+        period_ns: period of the states, ns.
     """
     joints = tuple(joint.name for joint in params.chain.joints)
     gripper, held = params.gripper, params.equipment[0]
@@ -146,7 +146,7 @@ def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns
 
 
 def setup_joint_ports(arm: CartArm, cart: str, period_ns: int) -> Iterator[Port]:
-    """Yield the ports of the setup joints that carry `arm` on the cart, whose frame is `cart`."""
+    """Yield the ports of the setup joints under `arm` on the cart with the frame `cart`."""
     prefix = f"SUJ/{arm}"
     yield from _events(event_in, prefix, _SETUP_JOINT_COMMANDS)
     yield from _events(event_out, prefix, _SETUP_JOINT_EVENTS)

@@ -1,10 +1,10 @@
-"""The setpoint of n joints: it goes where it is commanded, without jumps in position or velocity.
+"""The setpoint of n joints: follows commands without jumps in position or velocity.
 
 Two sets of limits. A *move* is a time-optimal trajectory within velocity, acceleration and jerk (Ruckig:
 Berscheid and Kroeger, "Jerk-limited Real-time Trajectory Generation with Arbitrary Target States", RSS 2021),
 all joints arriving together. *Following* a stream of goals, and *braking*, keep to the velocity and to
-`FOLLOWING_ACCELERATION` times the acceleration: trajectory limits are set for comfort, and a hand or a visual
-servo would be followed too late with them.
+`FOLLOWING_ACCELERATION` times the acceleration: trajectory limits are set for comfort, too slow for following
+a hand or a visual servo.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ from schemas.vectors import Vector
 __all__ = ["FOLLOWING_ACCELERATION", "STREAM_GAP", "Activity", "Setpoint"]
 
 FOLLOWING_ACCELERATION = 10.0
-"""How many times the acceleration of a trajectory `servo_*` may take, and `hold` to brake.
+"""Acceleration of `servo_*` and of braking by `hold`, relative to the acceleration of trajectories.
 
-It makes 15.7 rad/s^2 of the PSM's yaw, about what its drive can do: 3.316 N m against 0.2076 kg m^2 are 16.0
-rad/s^2 (docs/decisions/0011).
+15.7 rad/s^2 for the PSM's yaw, near the limit of the drive: 3.316 N m against 0.2076 kg m^2 are 16.0 rad/s^2
+(docs/decisions/0011).
 """
 STREAM_GAP = 0.1
 """s; `servo_*` commands further apart than this are no stream: ten periods of the dVRK's own 100 Hz."""
 _EARLY = 1.5
-"""Steps: a goal of a stream that arrives when the last one is due in more than these is early.
+"""A goal of a stream is early if the last goal is still due in more than this number of steps.
 
-One step is what rounding to steps makes of a regular stream.
+Rounding to steps makes a regular stream early by one step.
 """
 _LOOKS = 200
-"""Points at which a trajectory is compared with the ranges.
+"""Number of points of a trajectory compared with the ranges.
 
-With 2 s these are 10 ms apart, between which 1.57 rad/s^2 add 20 urad at most.
+In 2 s the points are 10 ms apart; in between 1.57 rad/s^2 add 20 urad at most.
 """
 _PASSING = 1e-9
-"""rad and m by which rounding may carry a trajectory past a joint's range.
+"""Tolerance for rounding of a trajectory past a joint's range, rad and m.
 
-What lies between two points of comparison is clipped in the step in which it is reached.
+Excess between two points of comparison is clipped in the step.
 """
 
 
 class Activity(IntEnum):
-    """What the setpoint does."""
+    """Activity of a setpoint."""
 
     HOLD = 0
     FOLLOW = 1
@@ -57,14 +57,14 @@ class Activity(IntEnum):
 
 
 class SetpointState(Record):
-    """All of the setpoint of n joints that changes."""
+    """State of the setpoint of n joints."""
 
     position = array("n")
     velocity = array("n")
     acceleration = array("n")
     goal = array("n")
     arrival = array("n")
-    """Velocity at the goal of a stream, or that of a drift."""
+    """Velocity at the goal of a stream, or velocity of a drift."""
     origin = array(3, "n")
     """Position, velocity and acceleration where the trajectory starts."""
     activity = choice(Activity.HOLD)
@@ -79,7 +79,7 @@ class SetpointState(Record):
     stated = flag()
     """Whether the sender states the velocity at the goal."""
     ratio = array(2)
-    """Shares of velocity, and of acceleration and jerk, that the trajectory may use."""
+    """Fractions of velocity, and of acceleration and jerk, for the trajectory."""
 
 
 class Setpoint:
@@ -94,7 +94,7 @@ class Setpoint:
         ).T.copy()
         self._most, self._backwards = FOLLOWING_ACCELERATION * self._acceleration, -self._velocity
         self.limits = np.array([self._lower, self._upper, self._velocity, self._most])
-        """Of position to either side, velocity, and acceleration while following, shape (4, n)."""
+        """Limits of position to either side, velocity, and acceleration while following, shape (4, n)."""
         self.state = SetpointState(n=n)
         self.course = self.state.values[: 5 * n].reshape(5, n)
         """The first five parts of `state`: position, velocity, acceleration, goal, velocity at the goal."""
@@ -104,7 +104,7 @@ class Setpoint:
 
     @property
     def activity(self) -> Activity:
-        """What the setpoint does now."""
+        """Present activity of the setpoint."""
         return self.state.activity
 
     @property
@@ -113,23 +113,23 @@ class Setpoint:
         return self.state.activity is Activity.MOVE or self.state.pending
 
     def reset(self, position: Vector) -> None:
-        """Stand at `position`, shape (n,), or as near to it as the ranges allow."""
+        """Stand at `position`, shape (n,), clipped to the ranges."""
         np.minimum(np.maximum(position, self._lower), self._upper, out=self.position)
         self.goal[:] = self.position
         self._rest()
 
     def follow(self, goal: Vector, h: float, velocity: Vector | None = None) -> None:
-        """Go to a goal inside the ranges, the newest of a stream or a single one.
+        """Go to a goal inside the ranges, the newest goal of a stream or a single goal.
 
-        Of a stream the setpoint reaches each goal when the next is due, in a straight line from the last one,
-        so it neither lags by more than that nor stops in between. Where the sender states the velocity at the
-        goal, it gets there in a cubic. A goal that arrives early, before the last one was due, takes the last
-        one's time and gives no higher velocity: a busy machine delivers held messages together.
+        In a stream the setpoint reaches each goal when the next is due, in a straight line from the last
+        goal, so the lag is one interval and there are no stops. For a goal with a stated velocity the path is
+        a cubic. An early goal, before the last goal was due, keeps the last goal's time and gives no higher
+        velocity: a busy machine delivers held messages together.
 
         Args:
             goal: positions, shape (n,).
             h: the step, s.
-            velocity: at the goal, shape (n,), if the sender states it.
+            velocity: velocity at the goal, shape (n,), if stated by the sender.
         """
         state, since = self.state, self.state.since
         streaming = state.activity is Activity.FOLLOW and since <= STREAM_GAP
@@ -151,7 +151,7 @@ class Setpoint:
         state.activity = Activity.FOLLOW
 
     def drift(self, velocity: Vector) -> None:
-        """Move with `velocity`, shape (n,), for as long as it is sent again within `STREAM_GAP`.
+        """Move with `velocity`, shape (n,), as long as a new velocity arrives within `STREAM_GAP`.
 
         Afterwards, and at a range's end, the setpoint comes to rest.
         """
@@ -162,8 +162,8 @@ class Setpoint:
     def move(self, goal: Vector, ratio: Vector) -> None:
         """Start a trajectory from the present state to rest at `goal`, shape (n,), inside the ranges.
 
-        `ratio`, shape (2,), scales the velocity, and the acceleration with the jerk. If the setpoint is too
-        fast to stay inside the ranges on the way, it brakes first.
+        `ratio`, shape (2,), scales the velocity, and the acceleration with the jerk. A setpoint too fast to
+        stay inside the ranges brakes first.
         """
         self.goal[:] = goal
         self.state.ratio[:] = ratio
@@ -207,7 +207,7 @@ class Setpoint:
         return self._slow_down(h)
 
     def restored(self) -> None:
-        """Compute what follows from `state` after it was restored."""
+        """Recompute all values derived from `state` after a restore."""
         if self.state.activity is Activity.MOVE:
             self._plan()
 
@@ -216,7 +216,7 @@ class Setpoint:
         self.state.activity, self.state.pending = Activity.HOLD, False
 
     def _plan(self) -> bool:
-        """Compute the trajectory from the origin to the goal; return whether one stays inside the ranges."""
+        """Compute the trajectory from the origin to the goal; return whether it stays inside the ranges."""
         request, (faster, harder) = InputParameter(self._n), self.state.ratio.tolist()
         request.current_position, request.current_velocity, request.current_acceleration = self._origin
         request.target_position = self.goal
@@ -234,9 +234,9 @@ class Setpoint:
         return result in (Result.Working, Result.Finished) and self._stays_inside()
 
     def _stays_inside(self) -> bool:
-        """Compare the trajectory with the ranges, unless it starts from rest.
+        """Compare the trajectory with the ranges, unless starting from rest.
 
-        Ruckig's `position_extrema` leaves out the braking at its start.
+        Ruckig's `position_extrema` leaves out the braking at the start.
         """
         if not self._origin[1:].any():
             return True

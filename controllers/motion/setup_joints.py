@@ -1,8 +1,8 @@
-"""The setup joints of the cart as clients see them: braked, with positions and an operating state.
+"""The setup joints of the cart for clients: braked, with positions and an operating state.
 
-On the real system (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitSUJ.cpp) one controller drives
-the brakes of all of them, so that they share their operating state, and its potentiometers know the positions
-from the start: they are homed. Only its simulation lets clients set positions.
+On the real system (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitSUJ.cpp) a single controller
+drives all brakes, so all setup joints have the same operating state, and potentiometers know the positions
+from the start: the joints are homed. Only the dVRK's simulation lets clients set positions.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ _BRAKED = "the setup joints are braked; `setup_joints` of the scenario sets thei
 
 
 class SetupJointState(Record):
-    """The operating state that all setup joints share."""
+    """The common operating state of all setup joints."""
 
     state = choice(State.DISABLED)
     homed = flag(start=True)
     powering = number()
-    """s until they are ENABLED; 0: they are not powering."""
+    """Time until the setup joints are ENABLED, s; 0: not powering."""
     published = flag()
     """Whether clients know the state."""
 
@@ -40,7 +40,7 @@ class SetupJoints:
     """The setup joints of all driven arms; without a cart there are none."""
 
     def __init__(self, params: MotionParams, outputs: dict[str, Any]) -> None:
-        """Take the controller's parameters, and the outputs among which those of the setup joints stand."""
+        """`outputs`: the controller's outputs, setup joints included."""
         arms = tuple(params.arms.driven) if params.mounting == "cart" else ()
         self._power_time = params.power_time * 1e-9
         self._messages = {arm: Messages(f"SUJ/{arm}", setup_joint_event_names(), outputs) for arm in arms}
@@ -66,7 +66,7 @@ class SetupJoints:
             }
 
     def step(self, t: int, h: int, inputs: Inputs) -> None:
-        """Execute the commands that have arrived, from `t` to `t + h` (ns)."""
+        """Execute arrived commands, from `t` to `t + h` (ns)."""
         if self._rests and inputs.event_ports.isdisjoint(self._commands):
             return
         news = not self._now.published
@@ -88,11 +88,11 @@ class SetupJoints:
         self._rests = not self._now.powering and all(messages.quiet for messages in self._messages.values())
 
     def restored(self) -> None:
-        """Note that the state was restored."""
+        """Note a restored state."""
         self._rests = False
 
     def _command(self, messages: Messages, message: StringStamped) -> bool:
-        """Execute a `state_command`; return whether it was accepted."""
+        """Execute a `state_command`; return whether the command was accepted."""
         state, command = self._now.state, message.string
         reason = refusal(state, command) or (
             "the setup joints do not pause" if command == "pause" else self._repeats.refusal(message)
@@ -110,7 +110,7 @@ class SetupJoints:
         return True
 
     def _power(self, h: float) -> bool:
-        """Continue powering, for `h` seconds; return whether it is done."""
+        """Continue powering, for `h` seconds; return whether powering is done."""
         if not self._now.powering:
             return False
         self._now.powering = max(self._now.powering - h, 0.0)

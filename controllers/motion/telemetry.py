@@ -1,6 +1,6 @@
-"""The states that arms publish: joint and Cartesian states, wrenches, Jacobians and known weight.
+"""Published states of arms: joint and Cartesian states, wrenches, Jacobians and known weight.
 
-Arms are computed together, and only when one of them has changed since they last published.
+Arms are computed together, and only after a change of any arm since the last publication.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ _RATIOS, _KINDS = ("ratio_v", "ratio_a", "ratio"), ("body", "spatial")
 def body_to_spatial(tip: Vector) -> Vector:
     """Return the adjoint, shape (..., 6, 6), of the tip's pose, shape (..., 4, 4).
 
-    It takes the tip's body twist (linear part first) to the spatial one: that of the point at the base
-    frame's origin, in the base frame (Murray, Li, Sastry, A Mathematical Introduction to Robotic
+    The adjoint takes the tip's body twist (linear part first) to the spatial twist: the twist of the point at
+    the base frame's origin, in the base frame (Murray, Li, Sastry, A Mathematical Introduction to Robotic
     Manipulation, section 2.4), as on the dVRK's `spatial/` ports.
     """
     rotation, x, y, z = tip[..., :3, :3], tip[..., 0, 3], tip[..., 1, 3], tip[..., 2, 3]
@@ -50,29 +50,29 @@ def body_to_spatial(tip: Vector) -> Vector:
 
 @dataclass
 class TelemetryRow:
-    """What the states of one arm are computed from; its controller writes here before each `update`."""
+    """Input of an arm's states; the controller writes here before each `update`."""
 
     setpoint: Vector
     """Positions, velocities and efforts as commanded, shape (3, n)."""
     measured: Vector
     """The same as measured, shape (3 n,)."""
     base: Vector
-    """Pose of the arm's base frame in its reference, shape (4, 4)."""
+    """Pose of the arm's base frame in the reference, shape (4, 4)."""
     ratio: Vector
-    """Shares of velocity and acceleration that moves use, shape (2,)."""
+    """Fractions of velocity and acceleration for moves, shape (2,)."""
     switches: Vector
     """Whether the body wrench is along the axes of the reference, and whether the drives carry the weight."""
 
 
 class Telemetry:
-    """The state outputs of all arms. The arrays stay the same ones.
+    """The state outputs of all arms. The arrays stay the same.
 
-    Poses are computed for all arms together; what depends on the number of joints, for those with joints of
-    the same kinds.
+    Poses are computed for all arms together; values with a dependence on the number of joints, for arms with
+    joints of the same kinds.
     """
 
     def __init__(self, arms: Sequence[tuple[str, SerialChain, KnownWeight]]) -> None:
-        """Take the arms' names, kinematics, and the weights that they carry."""
+        """`arms`: name, kinematics, and carried weight of each arm."""
         kinds: dict[tuple[str, ...], list[tuple[str, SerialChain, KnownWeight]]] = {}
         for arm in arms:
             kinds.setdefault(tuple(joint.kind for joint in arm[1].joints), []).append(arm)
@@ -86,11 +86,11 @@ class Telemetry:
         self._ratios = np.zeros((count, 3))
         self._groups: list[_Group] = []
         self._behind: list[_Group] = []
-        """Groups whose wrenches are those of an earlier state, as they were not used."""
+        """Groups with wrenches of an earlier state, unused since then."""
         self.wrenches: frozenset[str] = frozenset()
-        """Names of the outputs that `update` may leave as they are: Jacobians, wrenches, known weight."""
+        """Names of the outputs optional in `update`: Jacobians, wrenches, known weight."""
         self.rows: dict[str, TelemetryRow] = {}
-        """What to write to, by arm."""
+        """Input rows by arm."""
         self.outputs: dict[str, Vector] = {}
         first = 0
         for alike in kinds.values():
@@ -115,9 +115,9 @@ class Telemetry:
         }
 
     def update(self, *, wrenches: bool = True) -> None:
-        """Compute all states from `rows`, except those that follow from the bits of the last time.
+        """Compute all states from `rows`, except states with unchanged input bits.
 
-        `wrenches`: somebody uses one of those outputs.
+        `wrenches`: whether an output of `self.wrenches` is in use.
         """
         if changed := self._changed():
             for group in changed:
@@ -130,7 +130,7 @@ class Telemetry:
             self._behind = []
 
     def _changed(self) -> list[_Group]:
-        """Return the groups whose states follow from other bits than the last time."""
+        """Return the groups with changed input bits."""
         given = self._given.tobytes()
         changed = [group for group in self._groups if group.is_new()] if given == self._seen else self._groups
         if given != self._seen:
@@ -166,15 +166,12 @@ class Telemetry:
 
 
 class _Group:
-    """The states of k arms with n joints of the same kinds, as far as they depend on the joints."""
+    """The joint-dependent states of k arms with n joints of the same kinds."""
 
     def __init__(
         self, arms: Sequence[tuple[str, SerialChain, KnownWeight]], tips: Vector, twists: Vector
     ) -> None:
-        """Take the arms, and where to write poses, (k, 2, 4, 4), and twists, (k, 2, 6), of their tips.
-
-        The first of two is as commanded, the second as measured; in the base frames.
-        """
+        """`tips`, (k, 2, 4, 4), `twists`, (k, 2, 6): written; commanded and measured, in base frames."""
         k, n = len(arms), len(arms[0][1].joints)
         self._chain, self._chains = arms[0][1], SerialChains([chain for _, chain, _ in arms])
         self._weights = [weight for *_, weight in arms]
@@ -185,7 +182,7 @@ class _Group:
         self._carried = np.zeros((k, n))
 
     def outputs_of(self, i: int, arm: str) -> dict[str, Vector]:
-        """Return the outputs of arm number `i`, whose name is `arm`."""
+        """Return the outputs of arm number `i` with the name `arm`."""
         setpoint, measured = self.state[i].reshape(2, -1)
         return {
             f"{arm}/measured_js": measured,
@@ -193,7 +190,7 @@ class _Group:
         }
 
     def wrenches_of(self, i: int, arm: str) -> dict[str, Vector]:
-        """Return those of arm number `i` that `update_wrenches` writes."""
+        """Return the outputs of arm number `i` written by `update_wrenches`."""
         return {
             f"{arm}/gravity_compensation/setpoint_js": self._carried[i],
             **{f"{arm}/{kind}/jacobian": self._jacobians[i, j].reshape(-1) for j, kind in enumerate(_KINDS)},
@@ -201,7 +198,7 @@ class _Group:
         }
 
     def is_new(self) -> bool:
-        """Say whether the state has other bits than at the last `update_tips`."""
+        """Return whether bits of the state have changed since the last `update_tips`."""
         return self.state.tobytes() != self._seen
 
     def update_tips(self) -> None:
@@ -213,12 +210,12 @@ class _Group:
         self._twists[:] = (jacobian @ self.state[:, :, 1, :, None])[..., 0]
 
     def update_wrenches(self, spatial: Vector, base: Vector, switches: Vector) -> None:
-        """Write the Jacobians of the measured positions, the wrenches that balance their efforts, and weight.
+        """Write the Jacobians of the measured positions, the wrenches balancing the efforts, and weight.
 
         Args:
-            spatial: `body_to_spatial` of the tips as measured, shape (k, 6, 6).
+            spatial: `body_to_spatial` of the measured tips, shape (k, 6, 6).
             base: poses of the base frames, shape (k, 4, 4).
-            switches: those of `TelemetryRow`, shape (k, 2).
+            switches: switches of `TelemetryRow`, shape (k, 2).
         """
         k, _, n = self._jacobian.shape
         to_tip = self._tips[:, 1, None, :3, :3].swapaxes(-1, -2)
@@ -235,7 +232,7 @@ class _Group:
 
 
 def _pseudo_inverse(matrices: Vector) -> Vector:
-    """Return what `np.linalg.pinv` does with `_SINGULAR`, to the bit, at two thirds of the cost."""
+    """Return `np.linalg.pinv` with `_SINGULAR`, to the bit, at two thirds of the cost."""
     u, s, vt = np.linalg.svd(matrices, full_matrices=False)
     counts = s > _SINGULAR * s[..., :1]
     inverse = np.divide(1.0, s, out=np.zeros_like(s), where=counts)
@@ -243,13 +240,13 @@ def _pseudo_inverse(matrices: Vector) -> Vector:
 
 
 class KnownWeight:
-    """The weight that the real controller carries: the endoscope's.
+    """The weight carried by the real controller: the endoscope's.
 
-    All else of an arm is balanced by springs and weights (docs/decisions/0010).
+    The rest of an arm is balanced by springs and weights (docs/decisions/0010).
     """
 
     def __init__(self, arm: CartArm, chain: SerialChain, base: Vector) -> None:
-        """Take the arm, its kinematics, and the pose of its base frame in the world, shape (4, 4)."""
+        """`base`: pose of the arm's base frame in the world, shape (4, 4)."""
         self._gravity = base[:3, :3].T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
         self._nothing = np.zeros(len(chain.joints))
         self._dynamics = None
@@ -259,5 +256,5 @@ class KnownWeight:
             )
 
     def effort(self, q: Vector) -> Vector:
-        """Return the efforts (N m, N), shape (n,), that carry it at joint positions `q`, shape (n,)."""
+        """Return the carrying efforts (N m, N), shape (n,), at joint positions `q`, shape (n,)."""
         return self._nothing if self._dynamics is None else self._dynamics.gravity(q, self._gravity)
