@@ -203,8 +203,8 @@ class _Stylus:
         elif self._settling is None:
             self._settling = state.time
         soon = self._settling is not None and state.time - self._settling < _SETTLING
-        told = diagnoses.present(state, self._words, self._refusal)
-        diagnosis = [] if soon else self._diagnosis.report(*told, self._hardware)
+        reported = diagnoses.present(state, self._words, self._refusal)
+        diagnosis = [] if soon else self._diagnosis.report(*reported, self._hardware)
         if not phase.has_pose:
             return [*self._last_force(), *diagnosis]
         self._posed = True
