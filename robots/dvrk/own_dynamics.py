@@ -8,19 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from io import StringIO
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeVar, cast
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
-from ruamel.yaml import YAML, YAMLError
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from robots.dvrk.drive import SMOOTHING, Disc, Drive
 from robots.dvrk.end_effectors.jaw import FINGERS
 from robots.dvrk.inertia import Inertia
 from schemas.errors import MotionError
+from schemas.yaml_model import load_yaml_model, yaml_text
 
 __all__ = ["JAW", "BodyInertia", "DiscLosses", "JointLosses", "OwnDynamics"]
 
@@ -112,28 +111,11 @@ class OwnDynamics(_Part):
     @classmethod
     def load(cls, file: Path) -> Self:
         """Return the content of `file`. Raises MotionError if the file is unreadable or invalid."""
-        try:
-            if file.stat().st_size > _LARGEST:
-                raise MotionError(
-                    f"'{file}' is larger than {_LARGEST} bytes: not a file of `trocar identify`"
-                )
-            yaml: Any = YAML(typ="safe")
-            return cls.model_validate(yaml.load(file.read_text(encoding="utf-8")))
-        except OSError as error:
-            raise MotionError(f"cannot read '{file}': {error.strerror}") from error
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(map(str, first["loc"]))
-            raise MotionError(f"'{file}': {where}: {first['msg']}; `trocar identify` writes it") from error
-        except (YAMLError, UnicodeDecodeError) as error:
-            raise MotionError(f"'{file}' is not YAML: {error}") from error
+        return load_yaml_model(cls, file, largest=_LARGEST, writer="trocar identify", error=MotionError)
 
     def text(self) -> str:
         """Return the content as YAML."""
-        stream, yaml = StringIO(), cast("Any", YAML())
-        yaml.default_flow_style = None  # lists in one line
-        yaml.dump(self.model_dump(mode="json"), stream)
-        return stream.getvalue()
+        return yaml_text(self, compact=True)
 
     def bodies_of(self, published: Mapping[str, Inertia]) -> Mapping[str, Inertia]:
         """Return `published` with the bodies identified."""

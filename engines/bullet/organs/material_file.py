@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from io import StringIO
 from pathlib import Path
-from typing import Annotated, Any, Self, cast
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML, YAMLError
+from pydantic import BaseModel, ConfigDict, Field
 
 from engines.bullet.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio
+from schemas.yaml_model import load_yaml_model, yaml_text
 
 __all__ = ["MaterialFile"]
 
@@ -36,26 +35,10 @@ class MaterialFile(BaseModel):
     @classmethod
     def load(cls, file: Path) -> Self:
         """Return the content of `file`. Raises ValueError for an unreadable or invalid file."""
-        try:
-            if file.stat().st_size > _LARGEST:
-                raise ValueError(
-                    f"'{file}' is larger than {_LARGEST} bytes: not a file of `trocar calibrate`"
-                )
-            yaml: Any = YAML(typ="safe")
-            return cls.model_validate(yaml.load(file.read_text(encoding="utf-8")))
-        except OSError as error:
-            raise ValueError(f"cannot read '{file}': {error.strerror}") from error
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(map(str, first["loc"]))
-            raise ValueError(
-                f"'{file}': {where}: {first['msg']}; `trocar calibrate tissue` writes it"
-            ) from error
-        except (YAMLError, UnicodeDecodeError) as error:
-            raise ValueError(f"'{file}' is not YAML: {error}") from error
+        return load_yaml_model(
+            cls, file, largest=_LARGEST, writer="trocar calibrate tissue", error=ValueError
+        )
 
     def text(self) -> str:
         """Return the content as YAML."""
-        stream, yaml = StringIO(), cast("Any", YAML())
-        yaml.dump(self.model_dump(mode="json"), stream)
-        return stream.getvalue()
+        return yaml_text(self)
