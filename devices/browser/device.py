@@ -14,47 +14,27 @@ from pydantic import Field
 
 from devices.browser.page_hand import PageInput, hand_of
 from devices.diagnosis import Diagnosis, Level
-from devices.keyboard.hand_ports import StandsFor, hand_ports
-from devices.keyboard.virtual_stylus import VirtualStylus, Wish
-from devices.samples import SampleTimer, button_sample, pose_sample, twist_sample
-from hub.participant import Device, Params, Sample
-from schemas.ports import Port
-from schemas.quantity import Duration, Speed
-from schemas.ros import Float64Message
+from devices.keyboard.virtual_hand import VirtualHand, VirtualHandParams
+from devices.keyboard.virtual_stylus import Wish
+from hub.participant import Params, Sample
+from schemas.quantity import Duration
 
 __all__ = ["Browser", "BrowserParams"]
-
-_LONGEST_NS = 50_000_000
-"""After a longer pause between reads the stylus moves for this time only: it must not leap."""
 
 _WAY_NS = 2_000_000
 """From a read to the communication point at which it enters, on one machine (bench/webconsole_session.py)."""
 
 
-class BrowserParams(Params):
+class BrowserParams(VirtualHandParams):
     """What a page moves, how fast it moves, and when a silent page is no longer obeyed."""
 
-    open_to_pages: ClassVar[bool] = True
-
-    stands_for: Annotated[
-        StandsFor,
-        Field(
-            description="whose axes the moved frame has: a stylus', z out of its point, or a head's, x ahead"
-        ),
-    ] = "stylus"
-    speed: Annotated[Speed, Field(gt=0.0, le=1.0, description="of the stylus' tip, at most")] = 0.1
-    turn_speed: Annotated[float, Field(gt=0.0, le=10.0, description="of the stylus, at most, rad/s")] = 1.0
-    rate: Annotated[float, Field(gt=0.0, le=1000.0, description="samples per second at most")] = 250.0
     silence: Annotated[
         Duration,
         Field(gt=0, le=1_000_000_000, description="the arm holds once a page has sent nothing for so long"),
     ] = 100_000_000
-    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = (
-        100_000_000
-    )
 
 
-class Browser(Device):
+class Browser(VirtualHand):
     """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like one stylus, led from a page.
 
     While no page leads, or the one that leads is silent, only the last: the arm holds. The moved frame starts
@@ -64,28 +44,15 @@ class Browser(Device):
     params_model: ClassVar[type[Params]] = BrowserParams
     params: BrowserParams
 
-    def __init__(self, name: str, params: BrowserParams) -> None:
-        super().__init__(name, params)
-        self._diagnosis = Diagnosis(name)
-        self._pose, self._twist, self._buttons, self._gripper = hand_ports(
-            name, params.stands_for, params.max_age
-        )
-        self._reset()
+    longest_pause_ns = 50_000_000
 
     def _reset(self) -> None:
+        super()._reset()
         self._hand = hand_of(self.name)
-        self._stylus = VirtualStylus(self.params.speed, self.params.turn_speed, self.params.stands_for)
-        self._pressed = (False, False)
-        self._timer, self._last_ns = SampleTimer(self.params.rate), 0
         silence = self.params.silence  # the last read that is in time lets go
         self._longest_age_ns = silence - min(round(1e9 / self.params.rate) + _WAY_NS, silence // 4)
         self._lead, self._dragged = -1, np.zeros(3)
         self._spent = False
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """`pose`, `twist`, `buttons`, `gripper` and `diagnostics`."""
-        return self._pose, self._twist, self._buttons, self._gripper, self._diagnosis.port
 
     def open(self, directory: Path) -> None:  # noqa: ARG002
         """Wait for a page."""
@@ -96,7 +63,7 @@ class Browser(Device):
         """Return the present pose and twist, the buttons and the diagnosis if they have changed."""
         if not self._timer.due(t):
             return []
-        elapsed_ns, self._last_ns = min(t - self._last_ns, _LONGEST_NS), t
+        seconds = self._elapse(t)
         newest = self._hand.newest()
         if newest is None:
             self._spent |= self._pressed[0]
@@ -114,17 +81,12 @@ class Browser(Device):
             self._spent = False
         samples = self._press(t, asked.wish) + self._diagnosis.report(Level.OK, "a page leads")
         if asked.tracked is None:
-            self._stylus.advance(self._with_drag(asked, lead, elapsed_ns * 1e-9), elapsed_ns * 1e-9)
+            self._stylus.advance(self._with_drag(asked, lead, seconds), seconds)
         elif asked.wish.dead_man:
-            self._stylus.follow(*asked.tracked, asked.wish.gripper, elapsed_ns * 1e-9)
+            self._stylus.follow(*asked.tracked, asked.wish.gripper, seconds)
         else:  # the clutch is open: hand and stylus meet, and the arm holds
             self._stylus.place(*asked.tracked)
-        return [
-            *samples,
-            pose_sample(self._pose, t, *self._stylus.pose),
-            twist_sample(self._twist, t, *self._stylus.twist),
-            Sample(self._gripper.name, Float64Message(data=self._stylus.gripper)),
-        ]
+        return samples + self._motion(t)
 
     def _unled(self) -> str:
         if self._hand.served:
@@ -133,13 +95,6 @@ class Browser(Device):
             "no page can lead: the page's server hosts this device; set `host: remote` in the scenario, and"
             " run it with --open"
         )
-
-    def _press(self, t: int, wish: Wish) -> list[Sample]:
-        pressed = wish.dead_man, wish.jaw
-        if pressed == self._pressed:
-            return []
-        self._pressed = pressed
-        return [button_sample(self._buttons, t, pressed)]
 
     def _with_drag(self, asked: PageInput, lead: int, seconds: float) -> Wish:
         """Return the command with what is left of the pointer's way, as fast as the stylus may move."""
