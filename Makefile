@@ -29,6 +29,7 @@ check: $(VENV)/.dev
 	ruff format --check .
 	pyright
 	lint-imports
+	python docs/tools/wrap.py --check
 	python docs/tools/decisions.py
 	python docs/tools/addresses.py
 

@@ -19,10 +19,11 @@ import pytest
 from tests.devices.standins import build
 from tests.devices.standins.hd import VARIABLE, HdWorld, Row
 from tests.hub.authorities import free_endpoint
+from tests.waiting import LIMIT_S
 
 pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
 
-PATIENCE_S = 60.0
+PATIENCE_S = LIMIT_S
 HEIGHT = 0.0225
 """How far the table is below where the tip starts, m."""
 SCENARIO = {

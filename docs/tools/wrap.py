@@ -1,7 +1,7 @@
-"""Wrap the prose of the Markdown files at 100 characters: `python docs/tools/wrap.py [FILE ...]`.
+"""Wrap the prose of the Markdown files at 100 characters: `python docs/tools/wrap.py [--check] [FILE ...]`.
 
-Tables, headings, fenced code and HTML stay as they are. A code span is never broken. The test
-`tests/docs/test_prose.py` fails where this script would change a file.
+Tables, headings, fenced code and HTML stay as they are. A code span is never broken. `--check` changes
+nothing, and ends with exit code 1 where this script would change a file; `make check` runs it.
 """
 
 from __future__ import annotations
@@ -79,14 +79,19 @@ def _paragraph(lines: list[str]) -> Iterator[str]:
     yield filled.replace(_GLUE, " ")
 
 
-def main(names: list[str]) -> None:
-    """Wrap the named files, or all of them."""
-    for path in [Path(name) for name in names] or pages():
+def main(words: list[str]) -> int:
+    """Wrap the named files, or all of them; with `--check`, only name them. Return the exit code."""
+    check = "--check" in words
+    changed = 0
+    for path in [Path(name) for name in words if name != "--check"] or pages():
         text = path.read_text("utf-8")
         if wrapped(text) != text:
-            path.write_text(wrapped(text), "utf-8")
-            sys.stdout.write(f"wrapped {path}\n")
+            changed += 1
+            sys.stdout.write(f"{path}: run python docs/tools/wrap.py\n" if check else f"wrapped {path}\n")
+            if not check:
+                path.write_text(wrapped(text), "utf-8")
+    return 1 if check and changed else 0
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sys.exit(main(sys.argv[1:]))

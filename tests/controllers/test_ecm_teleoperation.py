@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
@@ -89,7 +89,6 @@ turns = st.tuples(*[st.floats(-1.5, 1.5)] * 3).map(np.array)
 scopes = st.sampled_from(["straight", "up", "down"])
 
 
-@settings(max_examples=150, deadline=None)
 @given(scopes, configurations, turns, vectors, vectors)
 def test_the_equations_of_the_paper(scope, q, turn, v, w):
     """w_C = w_R with the insertion at rest; dq_3 = v_R,z with the others at rest; each to 1e-9, whatever the
@@ -157,7 +156,6 @@ def test_a_scale_that_would_turn_the_camera_the_other_way_is_refused_once():
     assert session.warnings == ["scale -2 is refused, it must be above 0; it stays 0.5"]
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.lists(
         st.tuples(st.sampled_from(["orientation", "position", "stale"]), *[st.floats(-4, 4)] * 6),

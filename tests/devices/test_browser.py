@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from devices.browser.device import Browser, BrowserParams
@@ -118,7 +118,6 @@ def test_the_way_of_the_pointer_is_gone_at_the_speed_of_the_device(page):
     assert np.allclose(position(samples) - start, [0, 0.02, 0], atol=1e-6)
 
 
-@settings(max_examples=20)
 @given(st.lists(st.tuples(*(3 * [st.floats(-1, 1)]), st.integers(1, 10)), min_size=1, max_size=6))
 def test_it_is_never_faster_than_it_may_be(moves):
     page = Page()
@@ -141,7 +140,6 @@ def test_a_tracked_hand_is_met_by_the_stylus_while_the_clutch_is_open(page):
     jump=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
     turn=st.floats(-3.0, 3.0),
 )
-@settings(max_examples=25, deadline=None)
 def test_a_tracked_hand_that_leaps_does_not_move_the_stylus_faster_than_allowed(jump, turn):
     page = Page()
     page.hand.give(PageInput(Wish(), tracked=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))))

@@ -31,10 +31,11 @@ from schemas.ros import DiagnosticStatus, Joy, PoseStamped, WrenchStamped
 from schemas.trocar_msgs import ContactModel
 from tests.devices.standins import build, host
 from tests.devices.standins.hd import NEEDS_MANUAL_INPUT, VARIABLE, HdWorld, Row
+from tests.waiting import LIMIT_S
 
 pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
 
-PATIENCE_S = 30.0
+PATIENCE_S = LIMIT_S
 """Of a test whose machine has no time for it; what is waited for takes some tenths of a second."""
 LIVING = "import time; print(flush=True); time.sleep(60)"
 

@@ -4,7 +4,7 @@ from math import inf, nan
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -51,7 +51,6 @@ def test_pose_of_the_tip_in_the_axes_of_rep_103(
     assert np.allclose(tip.position, BASE @ position + OFFSET * expected[:, 2], atol=1e-12)
 
 
-@settings(max_examples=20)
 @given(rate=vectors.filter(lambda v: np.linalg.norm(v) > 0.1), start=vectors, velocity=vectors)
 def test_twist_of_a_stylus_that_turns_evenly(
     rate: NDArray[np.float64], start: NDArray[np.float64], velocity: NDArray[np.float64]

@@ -27,6 +27,7 @@ from devices.haptics.servo.phase import Phase
 from devices.haptics.servo.watcher import PERIOD, Watch
 from tests.devices.standins import build, host
 from tests.devices.standins.hd import VARIABLE, HdWorld, Row
+from tests.waiting import LIMIT_S
 
 pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
 
@@ -34,7 +35,7 @@ STOP_S = 0.1
 """A stop from which the servo comes back."""
 BOUND_S = 0.15
 """Within this the force is off, on an idle machine."""
-PATIENCE_S = 30.0
+PATIENCE_S = LIMIT_S
 ON, OFF = (tuple(Condition).index(condition) for condition in (Condition.ON, Condition.OFF))
 
 

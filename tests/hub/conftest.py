@@ -117,12 +117,14 @@ def _forget() -> None:
     registry.load.cache_clear()
 
 
-@pytest.fixture
-def toys(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module")
+def toys() -> Iterator[None]:
     """Let this process and its children find the participants of `toys.py`."""
     here = str(Path(__file__).parent)
-    monkeypatch.syspath_prepend(here)
-    monkeypatch.setenv("PYTHONPATH", here, prepend=os.pathsep)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(here)
+        patch.setenv("PYTHONPATH", here, prepend=os.pathsep)
+        yield
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robots.dvrk import arm_bodies, drives, dynamics, identified
@@ -97,7 +97,6 @@ def test_elasticity_is_that_of_the_identified_model():
     assert np.allclose(found, identified.elastic_torque(q), rtol=0.0, atol=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
 @given(POSITIONS, st.integers(0, 5), st.tuples(*[st.floats(-9.81, 9.81)] * 3).map(np.array))
 def test_gravity_is_the_slope_of_one_potential(q, i, pull):
     """The derivative of gravity by q is symmetric, as it has a potential, for a base of any orientation."""
@@ -110,7 +109,6 @@ def test_gravity_is_the_slope_of_one_potential(q, i, pull):
     assert np.allclose(slope[i], slope[:, i], atol=1e-7)
 
 
-@settings(max_examples=25, deadline=None)
 @given(POSITIONS)
 def test_the_inertia_matrix_is_positive_definite(q):
     assert np.linalg.eigvalsh(PSM.inertia_matrix(q))[0] > 0.0

@@ -2,7 +2,7 @@ from math import radians
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robots.dvrk import arms, ecm
@@ -42,13 +42,12 @@ def test_there_and_back_ten_thousand_times(arm, tool):
     assert np.allclose(chain.forward(found), chain.forward(q), rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", [name for name, one in instruments().items() if not one.has_snake_wrist])
-def test_every_instrument_with_a_wrist_of_three_joints_is_solved(name):
-    chain = arms.chain("PSM1", name)
-    q = random_configurations(chain, 200)
-    assert np.allclose(
-        chain.forward(inverse(chain, chain.forward(q), q)), chain.forward(q), rtol=0.0, atol=1e-12
-    )
+def test_every_instrument_with_a_wrist_of_three_joints_is_solved():
+    for name in (name for name, one in instruments().items() if not one.has_snake_wrist):
+        chain = arms.chain("PSM1", name)
+        q = random_configurations(chain, 50)
+        there = chain.forward(inverse(chain, chain.forward(q), q))
+        assert np.allclose(there, chain.forward(q), rtol=0.0, atol=1e-12), name
 
 
 @pytest.mark.parametrize(("arm", "tool"), CASES)
@@ -58,7 +57,6 @@ def test_the_solution_is_the_one_at_hand(arm, tool):
     assert np.allclose(inverse(chain, chain.forward(q), q), q, rtol=0.0, atol=1e-9)
 
 
-@settings(max_examples=200)
 @given(configurations(PSM), configurations(PSM))
 def test_the_psm_comes_back_from_everywhere(q, near):
     try:

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
@@ -31,7 +31,6 @@ def test_a_reachable_goal_is_reached(q):
     assert np.allclose(CHAIN.forward(found), CHAIN.forward(q), atol=1e-9)
 
 
-@settings(max_examples=50)
 @given(near, st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 def test_limits_hold_for_any_goal(q, x, y, z):
     step = 1e-3 * CHAIN.velocity

@@ -4,7 +4,7 @@ import contextlib
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -26,7 +26,7 @@ from schemas.visualization import ColorRGBA, MarkerArray
 from tests.strategies import any_message
 
 # parts of services are not recorded
-every_type = pytest.mark.parametrize("name", sorted(name for name in message_types() if "/srv/" not in name))
+TYPES = sorted(name for name in message_types() if "/srv/" not in name)
 STANDARD = sorted(name for name in message_types() if not name.startswith(("crtk_msgs/", "trocar_msgs/")))
 models = st.sampled_from(sorted(message_types())).map(message_type)
 
@@ -47,7 +47,6 @@ def _same(one: object, other: object) -> bool:
     return one == other
 
 
-@settings(max_examples=400)
 @given(any_message)
 def test_every_message_comes_back_from_cdr(message: Message) -> None:
     assert same(decode(type(message), encode(message)), message)
@@ -58,7 +57,6 @@ def test_every_message_comes_back_from_json(message: Message) -> None:
     assert same(type(message).model_validate_json(message.model_dump_json()), message)
 
 
-@settings(max_examples=600)
 @given(models, st.binary(max_size=200))
 def test_bytes_are_a_message_or_a_message_error(model: type[Message], payload: bytes) -> None:
     for start in (b"", b"\0\1\0\0", b"\0\0\0\0"):
@@ -66,7 +64,6 @@ def test_bytes_are_a_message_or_a_message_error(model: type[Message], payload: b
             assert isinstance(decode(model, start + payload), model)
 
 
-@settings(max_examples=300)
 @given(any_message, st.data())
 def test_a_changed_or_cut_message_is_a_message_or_a_message_error(
     message: Message, data: st.DataObject
@@ -121,20 +118,18 @@ def test_an_unknown_type_is_told_with_a_near_miss() -> None:
         message_type("sensor_msgs/msg/JointStates")
 
 
-@pytest.mark.parametrize("name", STANDARD)
-def test_standard_types_are_those_of_ros_2(name: str) -> None:
-    theirs = get_typestore(Stores.ROS2_JAZZY).fielddefs[name]
-    assert get_types_from_msg(msg_text(message_types()[name]), name)[name][1] == theirs[1]
+def test_standard_types_are_those_of_ros_2() -> None:
+    theirs = get_typestore(Stores.ROS2_JAZZY).fielddefs
+    ours = {name: get_types_from_msg(msg_text(message_types()[name]), name)[name][1] for name in STANDARD}
+    assert ours == {name: theirs[name][1] for name in STANDARD}
 
 
-@every_type
-def test_hashes_follow_from_the_derived_text_alone(name: str) -> None:
-    store = get_typestore(Stores.EMPTY)
-    for other in (known for known in message_types() if "/srv/" not in known):
-        store.register(get_types_from_msg(msg_text(message_types()[other]), other))
-    assert store.hash_rihs01(name) == rihs01(name)
-    if name in STANDARD:
-        assert rihs01(name) == get_typestore(Stores.ROS2_JAZZY).hash_rihs01(name)
+def test_hashes_follow_from_the_derived_text_alone() -> None:
+    store, ros_2 = get_typestore(Stores.EMPTY), get_typestore(Stores.ROS2_JAZZY)
+    for name in TYPES:
+        store.register(get_types_from_msg(msg_text(message_types()[name]), name))
+    assert {name: rihs01(name) for name in TYPES} == {name: store.hash_rihs01(name) for name in TYPES}
+    assert {name: rihs01(name) for name in STANDARD} == {name: ros_2.hash_rihs01(name) for name in STANDARD}
 
 
 def test_a_published_hash() -> None:
@@ -145,13 +140,11 @@ def test_a_published_hash() -> None:
     )
 
 
-@every_type
-def test_definitions_are_complete(name: str) -> None:
-    text = ros2msg_definition(name)
-    types = get_types_from_msg(text.split("=" * 80)[0], name)
-    assert name in types
-    for part in text.split("=" * 80)[1:]:
-        assert part.strip().startswith("MSG: ")
+def test_definitions_are_complete() -> None:
+    for name in TYPES:
+        own, *others = ros2msg_definition(name).split("=" * 80)
+        assert name in get_types_from_msg(own, name)
+        assert all(part.strip().startswith("MSG: ") for part in others), name
 
 
 def test_every_model_has_its_own_ros_type() -> None:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from schemas import codec
 from schemas.codec import encode, encode_as
@@ -30,7 +30,6 @@ def encoder(*fields, lists=False):
     return codec.compiled.Encoder(list(fields), lists=lists)
 
 
-@settings(max_examples=600)
 @given(any_message)
 def test_every_message_has_the_same_bytes(message: Message) -> None:
     assert codec._encoder(type(message), lists=False).encode(message) == codec._by_rosbags(message)

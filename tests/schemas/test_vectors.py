@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -31,14 +31,12 @@ def codecs_with_values(draw: st.DrawFn) -> tuple[VectorCodec, np.ndarray]:
     return codec, draw(values(codec.port, codec.size))
 
 
-@settings(max_examples=200)
 @given(codecs_with_values(), stamps)
 def test_encode_writes_the_bytes_of_the_message(drawn: tuple[VectorCodec, np.ndarray], time_ns: int) -> None:
     codec, value = drawn
     assert codec.encode(value, time_ns) == encode(codec.to_message(value, time_ns))
 
 
-@settings(max_examples=200)
 @given(codecs_with_values(), stamps)
 def test_decode_and_from_message_are_the_way_back(
     drawn: tuple[VectorCodec, np.ndarray], time_ns: int
@@ -55,7 +53,6 @@ def test_other_bytes_are_refused(port: Port, payload: bytes) -> None:
         VectorCodec(port).decode(payload)
 
 
-@settings(max_examples=300)
 @given(codecs_with_values(), st.data())
 def test_a_changed_byte_is_a_changed_number_or_refused(
     drawn: tuple[VectorCodec, np.ndarray], data: st.DataObject

@@ -5,7 +5,6 @@ import shutil
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from time import monotonic, sleep
 
 import pytest
 
@@ -32,16 +31,6 @@ def served(source, pilots=None, listening=None):
     finally:
         server.stop()
         thread.join()
-
-
-def until(true, seconds=20.0):
-    """Wait until something is true, and return it."""
-    deadline = monotonic() + seconds
-    while not (found := true()):
-        if monotonic() > deadline:
-            raise TimeoutError("it did not become true")
-        sleep(0.02)
-    return found
 
 
 def finish(coroutine):

@@ -15,7 +15,8 @@ import pytest
 from PIL import Image
 from websockets.asyncio.client import connect
 
-from tests.webconsole.conftest import CHROMIUM, finish, served, until
+from tests.waiting import until
+from tests.webconsole.conftest import CHROMIUM, finish, served
 from tests.webconsole.recorded_scene import EYES, write_scene
 from webconsole.listening import on_loopback
 from webconsole.live import Live
@@ -54,7 +55,7 @@ class Person:
 
     def sees(self, expression):
         """Wait until an expression of the page is true, and return it."""
-        return until(lambda: self.page.evaluate(expression), 60.0)
+        return until(lambda: self.page.evaluate(expression))
 
     def picture(self):
         """Return the pixels of the scene, once they have been drawn."""
@@ -388,7 +389,7 @@ def test_a_browser_that_stands_still_or_is_killed_lets_the_arm_hold(browser, ses
                 other.page.wait_for_timeout(500)
                 return other.page.evaluate(f"Math.hypot(...{TIP}.map((x, i) => x - {before}[i])) > 0.002")
 
-            until(moves, 60.0)
+            until(moves)
 
         press()
         send(signal.SIGSTOP)
@@ -457,7 +458,7 @@ def still(person):
         person.page.wait_for_timeout(150)
         return before is not None and max(abs(a - b) for a, b in zip(before, place[0], strict=True)) < 5e-5
 
-    until(stands, 60.0)
+    until(stands)
     return place[0]
 
 

@@ -23,7 +23,8 @@ from schemas.codec import decode
 from schemas.errors import ScenarioError
 from schemas.ros import JointState
 from schemas.trocar_msgs import SessionStatus
-from tests.webconsole.conftest import finish, until
+from tests.waiting import until
+from tests.webconsole.conftest import finish
 from webconsole.command_line import view
 from webconsole.console import Console
 from webconsole.foxglove.face import Face
@@ -63,7 +64,7 @@ def session(file):
         [sys.executable, "-P", "-m", "trocar", "run", str(file)], stdout=quiet, stderr=quiet
     ) as hub:
         try:
-            until(lambda: live.generation, 60.0)
+            until(lambda: live.generation)
             yield server, face
         finally:
             hub.kill()

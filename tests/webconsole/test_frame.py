@@ -5,7 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.codec import encode
@@ -30,7 +30,6 @@ PARTS = st.lists(
 )
 
 
-@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(-(2**63), 2**63 - 1), PARTS)
 def test_a_frame_comes_back(number, time_ns, parts):
     data = frame(number, time_ns, parts)
@@ -58,14 +57,12 @@ def test_poses_and_nodes_are_as_exact_as_they_say():
     assert not flat.any()
 
 
-@settings(max_examples=40)
 @given(st.binary(max_size=80))
 def test_what_is_not_a_frame_is_refused(data):
     with pytest.raises(MessageError):
         sections(data)
 
 
-@settings(max_examples=40)
 @given(PARTS.filter(bool), st.data())
 def test_a_frame_cut_short_is_refused(parts, data):
     whole = frame(1, 2, parts)
@@ -97,7 +94,6 @@ def test_markers_whose_parts_do_not_fit_are_rejected():
             marker_content(shown.model_copy(update={part: cut}))
 
 
-@settings(max_examples=40)
 @given(st.binary(max_size=60), st.text("abz", max_size=9), st.text("xy", max_size=5))
 def test_the_array_of_a_message_is_found_without_decoding_it(data, frame_id, word):
     picture = CompressedImage(header={"frame_id": frame_id}, format=word, data=np.frombuffer(data, np.uint8))

@@ -8,7 +8,7 @@ import pytest
 from hub.planning.scenario_file import load
 from hub.session.launch import plan_of
 from schemas.errors import MessageError
-from tests.webconsole.conftest import until
+from tests.waiting import until
 from tests.webconsole.test_browser import Person, running
 from webconsole.commands import Pick, Say
 from webconsole.guide import guided, guiding
@@ -54,11 +54,11 @@ def test_a_stitch_is_clicked_in_a_picture_and_consented_to(browser, tmp_path):
         words = person.page.locator("#notice")
         click(187, 104)  # the row of holes that is farthest from the camera
         click(145, 104)
-        until(lambda: "? PSM" in words.inner_text(), 60.0)
+        until(lambda: "? PSM" in words.inner_text())
         person.page.get_by_role("button", name="Consent").click()
-        until(lambda: words.inner_text() == "running", 60.0)
+        until(lambda: words.inner_text() == "running")
         person.page.get_by_role("button", name="Take over").click()
-        until(lambda: words.inner_text() == "taken over", 60.0)
+        until(lambda: words.inner_text() == "taken over")
         viewer = Person(browser, invite("viewer"))
         viewer.sees("trocar.session?.role === 'viewer'")
         assert not viewer.page.get_by_role("button", name=re.compile("Consent")).is_visible()

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.webconsole.conftest import served, until
+from tests.waiting import until
+from tests.webconsole.conftest import served
 from tests.webconsole.recorded_scene import write_scene
 from tests.webconsole.test_browser import GAMEPAD, Person
 from webconsole.pilot import Pilots

@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from hub.command_line.certs import app as certs
 from schemas.errors import ConnectError, ScenarioError
-from tests.webconsole.conftest import served, until
+from tests.waiting import until
+from tests.webconsole.conftest import served
 from tests.webconsole.recorded_scene import write_scene
 from tests.webconsole.test_browser import Person
 from tests.webconsole.test_gate import Visitor
@@ -86,7 +87,7 @@ def test_others_get_nothing(visitor, caplog):
 
 
 def test_without_tls_or_with_another_authority_there_is_no_answer(visitor, tmp_path):
-    plain = http.client.HTTPConnection("127.0.0.1", visitor.server.port, timeout=10)
+    plain = http.client.HTTPConnection("127.0.0.1", visitor.server.port, timeout=60)
     plain.request("GET", visitor.server.gate.invite("operator"))
     with pytest.raises((http.client.HTTPException, ConnectionError)):
         plain.getresponse()
@@ -98,7 +99,7 @@ def test_without_tls_or_with_another_authority_there_is_no_answer(visitor, tmp_p
 
 def connects(port):
     try:
-        socket.create_connection(("127.0.0.1", port), timeout=10).close()
+        socket.create_connection(("127.0.0.1", port), timeout=60).close()
     except ConnectionRefusedError:
         return False
     return True
@@ -109,7 +110,7 @@ def test_it_ends_while_a_page_is_closing(certificates, recording):
     listening = with_tls("tls/0.0.0.0:0", certificates)
     with served(Recorded(recording), listening=listening) as server:
         visitor = Visitor(server, ssl.create_default_context(cafile=certificates / "ca.pem")).admit()
-        plain = socket.create_connection(("127.0.0.1", server.port), timeout=10)
+        plain = socket.create_connection(("127.0.0.1", server.port), timeout=60)
         page = visitor.tls.wrap_socket(plain, server_hostname="127.0.0.1")
         head = {"Host": visitor.host, "Origin": f"https://{visitor.host}", "Cookie": visitor.cookie}
         head |= {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}

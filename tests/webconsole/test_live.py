@@ -22,7 +22,7 @@ from schemas.errors import ConnectError, MessageError
 from schemas.ports import Port
 from schemas.ros import Joy
 from schemas.trocar_msgs import SoftBodyState
-from tests.webconsole.conftest import until
+from tests.waiting import until
 from webconsole.commands import Network
 from webconsole.console import Console
 from webconsole.live import Live
@@ -139,7 +139,7 @@ def test_a_hub_that_is_killed_is_missed_and_the_next_one_is_shown(tmp_path):
             quiet = subprocess.DEVNULL
             with subprocess.Popen(command, stdout=quiet, stderr=quiet) as hub:
                 try:
-                    until(lambda: live.state["state"] == "running", 60.0)
+                    until(lambda: live.state["state"] == "running")
                     assert live.generation == generation
                 finally:
                     hub.kill()

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from hub.recording.recording import Recording
-from tests.webconsole.conftest import served, until
+from tests.waiting import until
+from tests.webconsole.conftest import served
 from tests.webconsole.test_page import answer, run
 from webconsole.live import Live
 from webconsole.past import Past

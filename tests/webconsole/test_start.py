@@ -5,7 +5,8 @@ import json
 import pytest
 
 from schemas.errors import MessageError, ScenarioError
-from tests.webconsole.conftest import served, until
+from tests.waiting import until
+from tests.webconsole.conftest import served
 from tests.webconsole.test_browser import Person
 from tests.webconsole.test_fork import until_states
 from tests.webconsole.test_gate import Visitor

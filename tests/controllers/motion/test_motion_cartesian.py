@@ -4,7 +4,7 @@ frames, the cannula.
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.motion.setpoint import STREAM_GAP
@@ -408,7 +408,6 @@ def test_a_checkpoint_in_the_middle_of_a_command_to_the_tip_goes_on_to_the_same_
     assert not rig.said("error")
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6))
 def test_a_twist_moves_the_tip_as_it_says(shares):
     rig, twist = at(HOME), np.array(shares) * [0.02, 0.02, 0.02, 0.3, 0.3, 0.3]

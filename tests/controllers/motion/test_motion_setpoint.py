@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.motion.following import Followers
@@ -165,7 +165,6 @@ orders = st.lists(
 )
 
 
-@settings(max_examples=80, deadline=None)
 @given(goals, orders)
 def test_nothing_ever_jumps(start, orders):
     """Whatever is asked for, at any moment: range, velocity and acceleration are kept, and position is the
@@ -190,7 +189,6 @@ def test_nothing_ever_jumps(start, orders):
         assert (np.abs(np.diff(q, axis=0)) <= (np.maximum(np.abs(v[1:]), np.abs(v[:-1])) + most) * H).all()
 
 
-@settings(max_examples=20, deadline=None)
 @given(goals, goals, st.integers(1, 400), st.sampled_from(["follow", "move", "brake"]))
 def test_a_saved_state_goes_on_with_the_same_bits(goal, other, steps, order):
     made, again = setpoint(), setpoint()
@@ -219,7 +217,6 @@ def test_a_goal_where_the_joints_are_moves_nothing(activity):
         st.tuples(st.integers(0, 2), st.floats(-0.4, 0.4), st.none() | st.floats(-2.0, 2.0)), max_size=12
     )
 )
-@settings(max_examples=40, deadline=None)
 def test_setpoints_that_follow_together_go_where_each_goes_alone(orders):
     jaw = CHAIN.joints[-1:]
     alone, together = [[setpoint(), setpoint(-START), Setpoint(jaw)] for _ in range(2)]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.controllers.motion.rig import CART, Rig
@@ -28,7 +28,6 @@ def put(rig, arm, seed):
 
 
 @given(st.integers(0, 2**32), st.sampled_from(sorted(CART)))
-@settings(max_examples=20, deadline=None)
 def test_an_arm_has_the_same_states_alone_and_among_others(seed, arm):
     among, alone = Rig(CART, publish_period="1 ms"), Rig({arm: CART[arm]}, publish_period="1 ms")
     for i, name in enumerate(CART):

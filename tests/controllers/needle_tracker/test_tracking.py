@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.vision_needle import ARC, AUTHORS, NEEDLE, OURS, Carried, Trouble, track
@@ -37,7 +37,6 @@ def test_differences_undo_motions(rng):
     assert np.allclose(turn[:3, :3] @ point + turn[:3, 3], point, atol=1e-10)
 
 
-@settings(max_examples=30, deadline=None)
 @given(seeds)
 def test_the_slopes_are_those_of_the_image(rng):
     at, h = pose(rng), 1e-6
@@ -49,7 +48,6 @@ def test_the_slopes_are_those_of_the_image(rng):
         assert np.allclose(slopes[:, :, axis], (ahead - behind) / (2.0 * h), rtol=1e-4, atol=1e-3)
 
 
-@settings(max_examples=30, deadline=None)
 @given(seeds)
 def test_a_mirrored_needle_is_seen_alike_and_mirroring_twice_is_nothing(rng):
     at = pose(rng)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.teleoperation.controller import Teleoperation
@@ -131,7 +131,6 @@ moves = st.lists(
 )
 
 
-@settings(max_examples=60, deadline=None)
 @given(moves, st.sampled_from(["hold", "follow"]))
 def test_the_command_never_jumps(moves, orientation):
     """Whatever the hand does while it is free, the first step after moves nothing; no step is ever faster
@@ -184,7 +183,6 @@ BAD_DAYS = (
 )
 
 
-@settings(max_examples=80, deadline=None)
 @given(
     st.sampled_from(["hold", "follow", "velocity", "held", "gate", "camera"]),
     st.lists(st.sampled_from(BAD_DAYS), min_size=5, max_size=40),

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from controllers.teleoperation.params import TeleoperationParams
@@ -29,7 +29,6 @@ def least_singular_value(q):
     ]
 
 
-@settings(max_examples=60, deadline=None)
 @given(configurations, vectors, vectors, vectors)
 def test_the_hands_twist_in_its_own_frame_is_the_tips_in_its_own(q, linear, angular, turned):
     """The paper's law, in any configuration that is not singular: what is commanded moves the tip as the hand
@@ -55,7 +54,6 @@ def test_the_hands_twist_in_its_own_frame_is_the_tips_in_its_own(q, linear, angu
     assert np.allclose(found, expected, atol=1e-5)
 
 
-@settings(max_examples=60, deadline=None)
 @given(configurations, vectors, vectors)
 def test_near_a_singularity_the_damped_joints_stay_slow_and_err_by_little(q, linear, angular):
     """With the largest damping l and the smallest singular value below it, a joint moves at most by |v| / (2

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.visual_servoing.blobs import find_blobs
@@ -28,7 +28,6 @@ def nearest(found, expected):
     return np.linalg.norm(found[None] - expected[:, None], axis=2).min(axis=1)
 
 
-@settings(max_examples=20, deadline=None)
 @given(
     st.floats(0.13, 0.25),
     st.tuples(*[st.floats(-0.3, 0.3)] * 2, st.floats(-1.4, 1.4)),

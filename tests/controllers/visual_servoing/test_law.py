@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares, minimize
 
@@ -17,7 +17,6 @@ CHAIN = left_camera("straight", BASELINE)
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
 
-@settings(max_examples=60, deadline=None)
 @given(seeds)
 def test_constrained_least_squares_is_the_least_there_is(rng):
     a, b = rng.normal(size=(6, 3)), rng.normal(size=6)
@@ -35,7 +34,6 @@ def test_constrained_least_squares_is_the_least_there_is(rng):
     assert ((a @ x - b) ** 2).sum() <= reference.fun + 1e-6
 
 
-@settings(max_examples=40, deadline=None)
 @given(seeds)
 def test_the_interaction_matrix_is_the_derivative_of_the_projection(rng):
     points = rng.uniform([-0.05, -0.05, 0.1], [0.05, 0.05, 0.3], (4, 3))
@@ -77,7 +75,6 @@ def test_out_of_reach_the_direct_law_rests_where_the_error_is_least_and_the_clas
     assert max(worse) > 1.01
 
 
-@settings(max_examples=60, deadline=None)
 @given(seeds)
 def test_no_limit_is_passed_wherever_it_is_sent(rng):
     _, q, target = random_goal(rng)

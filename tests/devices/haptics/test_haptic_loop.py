@@ -7,7 +7,7 @@ from functools import cache
 from math import exp, hypot, inf, isfinite, nan
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from devices.haptics.contact import ZERO, Plane
@@ -78,7 +78,6 @@ def _begun(passivity: bool, pressed: bool) -> HapticLoop:
 
 
 @given(ticks, st.booleans(), st.booleans())
-@settings(max_examples=250)
 def test_whatever_comes_every_limit_holds(ticks: list, passivity: bool, pressed: bool) -> None:
     loop = deepcopy(_begun(passivity, pressed))
     now, stamp, arrived, last, off_until, locked = (

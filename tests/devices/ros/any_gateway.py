@@ -73,7 +73,7 @@ class ZenohProgram(ZenohTable):
 
     def join(self, rows):
         wanted = {row.topic for row in rows}
-        there = until(lambda: wanted <= {entry[2] for entry in self.peer.graph() if len(entry) > 2}, 60.0)
+        there = until(lambda: wanted <= {entry[2] for entry in self.peer.graph() if len(entry) > 2})
         assert there, f"not all of {wanted} are there"
         super().join(rows)
 

@@ -126,14 +126,14 @@ class Peer(Protocol):
         ...
 
 
-def exercise(gateway: Gateway, peer: Peer, *, timeout_s: float = 20.0) -> None:
+def exercise(gateway: Gateway, peer: Peer, *, timeout_s: float = 60.0) -> None:
     """Exercise every row of an open gateway; `peer` has joined all of them."""
     check_published(gateway, peer, gateway.rows, timeout_s=timeout_s)
     check_subscribed(gateway, peer, gateway.rows, timeout_s=timeout_s)
     check_served(gateway, peer, gateway.rows)
 
 
-def check_published(gateway: Gateway, peer: Peer, rows: Sequence[Row], *, timeout_s: float = 20.0) -> None:
+def check_published(gateway: Gateway, peer: Peer, rows: Sequence[Row], *, timeout_s: float = 60.0) -> None:
     """What the simulation tells arrives as it was told, with wall-clock stamps."""
     told = {row.topic: _tell(gateway, row) for row in rows if row.way == "publish" and row.port is not None}
     begun_ns = time_ns()
@@ -200,7 +200,7 @@ def _refreshed(gateway: Gateway, row: Row, peer: Peer, timeout_s: float) -> Mess
     return peer.heard(row, timeout_s)
 
 
-def check_subscribed(gateway: Gateway, peer: Peer, rows: Sequence[Row], *, timeout_s: float = 20.0) -> None:
+def check_subscribed(gateway: Gateway, peer: Peer, rows: Sequence[Row], *, timeout_s: float = 60.0) -> None:
     """What a program says enters the simulation as it was said, and nothing is refused."""
     said = {
         row.port.name: (row, sample(row)) for row in rows if row.way == "subscribe" and row.port is not None
@@ -270,7 +270,7 @@ def _answer(gateway: Gateway, peer: Peer, row: Row, request: Message) -> Message
     return answer
 
 
-def check_late_joiner(gateway: Gateway, late: Peer, *, timeout_s: float = 20.0) -> None:
+def check_late_joiner(gateway: Gateway, late: Peer, *, timeout_s: float = 60.0) -> None:
     """A program that joins late gets the last message of every latched topic, and no older one."""
     latched = [row for row in gateway.rows if row.latched and row.port is not None]
     told = {row.topic: _tell(gateway, row) for row in latched}

@@ -3,7 +3,7 @@
 import time
 
 
-def until(condition, seconds=5.0):
+def until(condition, seconds=60.0):
     """Wait until `condition` holds; return its last value."""
     end = time.monotonic() + seconds
     while not (held := condition()) and time.monotonic() < end:

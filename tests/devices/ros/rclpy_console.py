@@ -62,13 +62,6 @@ class Console:
         """Publish bytes, given in hexadecimal, as they are."""
         self.publishers[topic].publish(bytes.fromhex(payload))
 
-    def count(self, topic, seconds):
-        """Return how many messages of a topic come in a time."""
-        end, found = time.monotonic() + seconds, 0
-        while (left := end - time.monotonic()) > 0:
-            found += self.heard(topic, left) is not None
-        return found
-
     def heard(self, topic, timeout):
         """Return the next message that was not returned before; None if none comes in time."""
         subscription, end = self.subscriptions[topic], time.monotonic() + timeout

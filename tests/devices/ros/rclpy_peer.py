@@ -53,7 +53,7 @@ class RclpyPeer:
     def __exit__(self, *_):
         self.process.send_signal(signal.SIGCONT)
         try:
-            self.process.communicate(timeout=5.0)  # the end of its input is the end of it
+            self.process.communicate(timeout=60.0)  # the end of its input is the end of it
         finally:
             self.process.kill()
 
@@ -62,7 +62,7 @@ class RclpyPeer:
         self.process.stdin.flush()
         return json.loads(self.process.stdout.readline() or '"the console has died"')
 
-    def join(self, rows, timeout_s=20.0):
+    def join(self, rows, timeout_s=60.0):
         assert (
             self.do(
                 "join", rows=[(row.topic, row.type, row.way, row.latched) for row in rows], timeout=timeout_s
@@ -79,7 +79,7 @@ class RclpyPeer:
             raise TimeoutError(row.topic)
         return message_type(row.type).model_validate(answer)
 
-    def call(self, row, request, timeout_s=5.0):
+    def call(self, row, request, timeout_s=60.0):
         answer = self.do("call", topic=row.topic, request=plain(request), timeout=timeout_s)
         if answer is None:
             raise TimeoutError(row.topic)

@@ -210,7 +210,7 @@ class Arm:
         self.joints = message
         self.states += 1
 
-    def connected(self, seconds=10.0):
+    def connected(self, seconds=60.0):
         """Wait for a peer of everything; say whether all have one."""
         end = time.time() + seconds
         ends = [*self.kept, self.state_command, *self.movers.values()]
@@ -238,13 +238,13 @@ class Arm:
         self.command(word)
         self._until(lambda: any(holds(state) for state in self.events[heard:]), seconds)
 
-    def enable(self, seconds=10.0):
+    def enable(self, seconds=60.0):
         self._commanded("enable", lambda state: state.state == "ENABLED" and not state.is_busy, seconds)
 
-    def disable(self, seconds=10.0):
+    def disable(self, seconds=60.0):
         self._commanded("disable", lambda state: state.state == "DISABLED" and not state.is_busy, seconds)
 
-    def home(self, seconds=20.0):
+    def home(self, seconds=60.0):
         self._commanded("home", lambda state: state.is_homed and not state.is_busy, seconds)
 
     def servo_jp(self, positions):
@@ -256,7 +256,7 @@ class Arm:
         message.header.stamp = rospy.Time.now()
         self.movers[kind].publish(message)
 
-    def move_jp(self, positions, seconds=10.0):
+    def move_jp(self, positions, seconds=60.0):
         """Move, and wait until it is done: `move_jp(...).wait()`."""
         with self.changed:
             heard = len(self.events)
@@ -289,9 +289,9 @@ class Console:
             elif way == "serve":
                 self.services[topic] = rospy.ServiceProxy(topic, service_class(type_), persistent=True)
         for topic in self.services:
-            rospy.wait_for_service(topic, 10.0)
+            rospy.wait_for_service(topic, 60.0)
         ends = heard + [self.publishers[topic] for topic, _, way in rows if way == "subscribe"]
-        end = time.time() + 20.0
+        end = time.time() + 60.0
         while (
             missing := [each.name for each in ends if not each.get_num_connections()]
         ) and time.time() < end:
@@ -343,7 +343,7 @@ class Console:
             return str(error)
         return ""
 
-    def wait_for_peers(self, topic, seconds=10.0):
+    def wait_for_peers(self, topic, seconds=60.0):
         end = time.time() + seconds
         while not self.publishers[topic].get_num_connections() and time.time() < end:
             time.sleep(0.01)

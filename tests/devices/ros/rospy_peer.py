@@ -90,7 +90,7 @@ class Ros1:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        assert until(self._answers, 20.0), "the master does not start"
+        assert until(self._answers), "the master does not start"
 
     def _answers(self):
         with socket.socket() as sock:

@@ -54,7 +54,7 @@ def play(
 
 
 def until(heard: Callable[[], list[Any]], holds: Callable[[Any], bool]) -> None:
-    end = monotonic() + 40.0
+    end = monotonic() + 120.0
     while not any(holds(message) for message in heard()):
         assert monotonic() < end, heard()[-3:]
         sleep(0.003)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from devices.ros.params import GatewayParams
@@ -146,7 +146,7 @@ def test_a_state_is_used_while_a_program_subscribes_and_counted_as_before(gatewa
     assert count() > before
     assert heard == []
     gateway.transport.let_go()
-    assert gateway.wait(5.0)
+    assert gateway.wait(60.0)
     gateway.read(0)
     assert set(gateway.unused()) == set()
     sleep(0.05)
@@ -335,7 +335,6 @@ def test_what_is_no_command_is_an_error_on_the_arms_topic(
     assert words(gateway, "/PSM1/warning") == []
 
 
-@settings(max_examples=60, deadline=None)
 @given(positions=st.lists(st.floats(), max_size=8), velocities=st.lists(st.floats(), max_size=8))
 def test_only_six_finite_positions_move_an_arm(positions: list[float], velocities: list[float]) -> None:
     gateway = _opened()
@@ -349,7 +348,6 @@ def test_only_six_finite_positions_move_an_arm(positions: list[float], velocitie
     assert len(commands(gateway)) == good
 
 
-@settings(max_examples=60, deadline=None)
 @given(q=st.tuples(*[st.floats(-2.0, 2.0)] * 4))
 def test_only_unit_quaternions_are_orientations(q: tuple[float, ...]) -> None:
     gateway = _opened()
@@ -361,7 +359,6 @@ def test_only_unit_quaternions_are_orientations(q: tuple[float, ...]) -> None:
     assert len(words(gateway, "/PSM1/error")) == 2 * (not good)
 
 
-@settings(max_examples=60, deadline=None)
 @given(payload=st.binary(max_size=200))
 def test_no_bytes_bring_it_down(payload: bytes) -> None:
     gateway = _opened()

@@ -100,7 +100,7 @@ def in_turn(console, tree):
     lost = sphere.model_copy(update={"header": Header(frame_id="PSM7"), "id": 1})
     console.say("/stereo/markers", MarkerArray(markers=[lost, sphere]))
     assert console.sees(2)
-    told = console.heard(console.rows["/stereo/error"], 20.0)
+    told = console.heard(console.rows["/stereo/error"], 60.0)
     assert isinstance(told, StringMessage)
     assert "1 rejected: marker 'mine' 1: frame_id 'PSM7' is no frame of this scene" in told.data
     red = sphere.model_copy(update={"color": ColorRGBA(r=1.0, a=1.0)})

@@ -5,7 +5,7 @@ from math import acos, cos, degrees, pi, radians, sin
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from engines.suture_pad.channel import Channel, Phase
@@ -106,7 +106,6 @@ def test_it_can_only_follow_its_channel(aside):
     st.lists(st.tuples(*[st.floats(-1e-3, 1e-3)] * 3, *[st.floats(-0.08, 0.08)] * 3), min_size=2, max_size=5),
     st.floats(0.3, 1.2),
 )
-@settings(max_examples=25, deadline=None)
 def test_whatever_way_it_is_moved_and_brought_back_the_tissue_gives_no_energy(ways, depth):
     channel, found = driven(ENTRY + depth, step=0.01)
     axes, origin = pose(found[-1][0])
@@ -147,7 +146,6 @@ def test_a_needle_on_the_skin_is_carried_and_beside_the_pad_nothing_is():
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
 def test_three_points_carry_every_wrench_and_frame(seed):
     drawn = np.random.default_rng(seed)
     axes = rotation.matrix(rotation.exp(drawn.uniform(-2, 2, 3)))

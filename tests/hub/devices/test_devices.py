@@ -3,7 +3,6 @@
 import subprocess
 import sys
 import threading
-from time import sleep
 
 import pytest
 
@@ -11,6 +10,7 @@ from hub.recording.recording import Recording
 from hub.remote.live_sessions import live_sessions
 from hub.verify import verify
 from schemas.errors import ParticipantError
+from tests import waiting
 
 SCENARIO = """\
 name: hand
@@ -82,11 +82,7 @@ def test_a_remote_device_may_leave_and_join_again(prepare):
         hosts.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
 
     def wait_until(true):
-        for _ in range(300):
-            if any(true(status) for status in live_sessions([session.endpoint])):
-                return
-            sleep(0.02)
-        raise TimeoutError
+        waiting.until(lambda: any(true(status) for status in live_sessions([session.endpoint])))
 
     def go_and_come_back():
         try:
@@ -111,7 +107,7 @@ def test_a_remote_device_may_leave_and_join_again(prepare):
     with pytest.raises(subprocess.TimeoutExpired):  # it waits for the next session of this name
         hosts[1].wait(0.5)
     hosts[1].terminate()
-    codes = [host.wait(10) for host in hosts]
+    codes = [host.wait(waiting.LIMIT_S) for host in hosts]
     assert outcome == []
     assert codes == [-9, 0]
     assert summary.state == "done"

@@ -1,5 +1,4 @@
 import logging
-from time import monotonic, sleep
 
 import pytest
 
@@ -14,6 +13,7 @@ from schemas.ports import Port
 from schemas.ros import DiagnosticStatus, StringMessage
 from schemas.scenario import Scenario
 from tests.hub.authorities import free_endpoint
+from tests.waiting import until
 
 TYPE = DiagnosticStatus.ros_type
 
@@ -56,13 +56,6 @@ def wire():
             refusals,
         )
         diagnostics.undeclare()
-
-
-def until(look):
-    deadline = monotonic() + 10.0
-    while not look():
-        assert monotonic() < deadline
-        sleep(0.01)
 
 
 def test_the_hub_logs_the_diagnoses_of_remote_devices_once(wire, caplog):

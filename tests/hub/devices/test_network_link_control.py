@@ -5,7 +5,7 @@ simulated time.
 import json
 import sys
 import threading
-from time import monotonic, sleep
+from time import sleep
 
 import pytest
 
@@ -14,6 +14,7 @@ from hub.devices.network_link_control import NetworkLinkReply, NetworkLinkReques
 from hub.remote.live_sessions import ask_about, live_sessions
 from schemas.errors import ConnectError, MessageError
 from schemas.network_link import NetworkLinkSpec
+from tests.waiting import until
 
 SCENARIO = """\
 name: hand
@@ -67,14 +68,6 @@ def relink(session, device="player", **change):
         NetworkLinkRequest.model_validate({"device": device, **change}),
         NetworkLinkReply,
     ).link
-
-
-def until(look, limit_s=10.0):
-    deadline = monotonic() + limit_s
-    while not look():
-        if monotonic() > deadline:
-            raise TimeoutError
-        sleep(0.05)
 
 
 @pytest.mark.parametrize("host", ["hub", "other"])

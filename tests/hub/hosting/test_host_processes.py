@@ -1,7 +1,6 @@
 import os
 import signal
 from queue import Queue
-from time import monotonic
 
 from hub.hosting import host_processes as fleet_module
 from hub.hosting import watchdog as watchdog_module
@@ -10,6 +9,7 @@ from hub.hosting.watchdog import Watchdog
 from tests.hub.authorities import free_endpoint
 from tests.hub.parts import Part, out, plan_of
 from tests.hub.processes import hosts
+from tests.waiting import until
 
 
 def test_hosts_may_be_started_while_the_watchdog_checks_processes(monkeypatch):
@@ -46,10 +46,8 @@ def test_the_end_of_a_process_is_noticed_without_waiting_for_the_next_look(monke
     watchdog = Watchdog(plan, processes, 10**12, lambda: None, lambda *failure: failures.put(failure))
     processes.start("one", endpoint, "session")
     try:
-        end = monotonic() + 20.0
-        while not (found := hosts(endpoint)):  # a process has its command line only a moment after its start
-            assert monotonic() < end
-        (number,) = found
+        # a process has its command line only a moment after its start
+        (number,) = until(lambda: hosts(endpoint))
         os.kill(number, signal.SIGKILL)
         assert failures.get(timeout=60.0) == ("source", "its process was killed by SIGKILL")
         assert "participant 'source': its process was killed by SIGKILL" in caplog.text

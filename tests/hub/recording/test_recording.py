@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
@@ -114,7 +114,6 @@ def test_messages_that_are_not_cdr(tmp_path: Path) -> None:
         Recording(tmp_path / "x.mcap")
 
 
-@settings(max_examples=200, deadline=None)
 @given(data=st.data())
 def test_a_damaged_file_is_refused_or_read_never_more(
     session: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
-from time import monotonic, sleep
+from time import sleep
 
 import pytest
 
@@ -18,12 +18,13 @@ from hub.remote.live_sessions import live_sessions
 from hub.session.launch import launch
 from hub.transport.endpoints import address
 from tests.hub.authorities import Authority, free_port
+from tests.waiting import until
 
 pytestmark = pytest.mark.xdist_group("network")  # its hosts have fixed addresses
 
 SCENARIO = """\
 name: hand
-step: 2 ms
+step: 10 ms
 pace: realtime
 duration: 60 s
 participants:
@@ -87,11 +88,13 @@ class Site:
     def await_gate(self):
         """Wait until the hub listens to the other machine: a device host that comes earlier gives up."""
         _, port = address(self.endpoint)
-        until = monotonic() + 60
-        while monotonic() < until:
+
+        def listens():
             with suppress(OSError), socket.create_connection((HUB_ADDRESS, port)):
-                return
-            sleep(0.1)
+                return True
+            return False
+
+        until(listens)
 
     def cut(self):
         """Take the network between both machines away."""
@@ -140,25 +143,18 @@ def test_a_stylus_of_another_machine_moves_the_simulation_is_told_of_it_and_outl
     def told():
         return len(site.told.read_text().splitlines()) if site.told.exists() else 0
 
-    def wait_for(true):
-        until = monotonic() + 30
-        while not true():
-            if monotonic() > until:
-                raise TimeoutError
-            sleep(0.05)
-
     def cut_and_mend():
         try:
             site.await_gate()
             hosts.extend([site.device("player"), site.device("pad")])
-            wait_for(lambda: gains() and told() > 20)
+            until(lambda: gains() and told() > 20)
             site.cut()
-            wait_for(lambda: not gains())
+            until(lambda: not gains())
             sleep(2.5)
             outcome.append(gains())
             before = told()
             site.mend()
-            wait_for(lambda: gains() and told() > before)
+            until(lambda: gains() and told() > before)
         except TimeoutError as error:
             outcome.append(error)
         finally:
@@ -227,11 +223,7 @@ def test_strangers_of_another_machine_get_nothing_in_or_out_and_the_log_tells(si
         try:
             site.await_gate()
             hosts = [site.device("player"), site.device("pad")]
-            until = monotonic() + 120
-            while monotonic() < until and not [
-                s for s in live_sessions([site.session.endpoint]) if s.step > 50
-            ]:
-                sleep(0.1)
+            until(lambda: any(s.step > 50 for s in live_sessions([site.session.endpoint])))
             for way, (endpoint, file, bare) in ways.items():
                 done = site.start(
                     "-c", STRANGER, json.dumps([endpoint, str(file), bare, keys, asked])

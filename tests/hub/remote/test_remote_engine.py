@@ -72,7 +72,7 @@ def test_its_hashes_are_the_same(loaded, tmp_path):
     ]
     starter = _Starter(session, command)
     summary = session.run()
-    assert starter.process.wait(10) == 0
+    assert starter.process.wait(120) == 0
     assert summary.state_hash == expected.state_hash
     assert summary.dropped_messages == 0
 

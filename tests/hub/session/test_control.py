@@ -2,7 +2,6 @@
 
 import threading
 from contextlib import contextmanager
-from time import sleep
 
 import pytest
 
@@ -15,6 +14,7 @@ from schemas.codec import decode, encode
 from schemas.errors import ConnectError, MessageError, SessionError
 from schemas.keys import Keys
 from schemas.ros import StringMessage
+from tests.waiting import until
 
 SCENARIO = """\
 name: steered
@@ -44,11 +44,7 @@ class Console:
 
     def until(self, true):
         """Wait for a status of which something is true."""
-        for _ in range(200):
-            if true(status := self.status):
-                return status
-            sleep(0.02)
-        raise TimeoutError(str(status))
+        return until(lambda: status if true(status := self.status) else None)
 
     def wait_for_the_end(self):
         self._thread.join()
@@ -65,11 +61,12 @@ def steer(prepare):
         thread = threading.Thread(target=lambda: outcome.append(session.run()))
         thread.start()
         try:
-            while not any(
-                status.state == "paused" if paused else status.step
-                for status in live_sessions([session.endpoint])
-            ):
-                sleep(0.05)
+            until(
+                lambda: any(
+                    status.state == "paused" if paused else status.step
+                    for status in live_sessions([session.endpoint])
+                )
+            )
             with reach(session.endpoint, "console") as client:
                 yield Console(session, client, thread), outcome
         finally:
@@ -116,39 +113,38 @@ def test_set_changes_an_input_without_a_connection(steer, prepare):
     assert hash_with(SetRequest(participant="there", port="b", value=[0.5, 0.25, 0.125])) != hash_with()
 
 
-@pytest.mark.parametrize(
-    ("participant", "port", "value", "message"),
-    [
-        ("there", "a", [0, 0, 0], "'there.a' cannot be set"),
-        ("there", "d", [0, 0, 0], "Did you mean 'there."),
-        ("there", "b", [0, 0], "expected float64 of shape"),
-        ("there", "b", "much", "could not convert"),
-        ("there", "b", [0, 0, 10**400], "too large"),
-        ("there", "b", [0, None, 0], "not all of"),
-    ],
-)
-def test_what_cannot_be_set_is_refused_with_the_reason(steer, participant, port, value, message):
-    with steer() as (console, outcome), pytest.raises(MessageError, match=message):
-        console.ask("set", SetRequest(participant=participant, port=port, value=value))
+def test_what_cannot_be_set_is_refused_with_the_reason(steer):
+    with steer() as (console, outcome):
+        for port, value, message in (
+            ("a", [0, 0, 0], "'there.a' cannot be set"),
+            ("d", [0, 0, 0], "Did you mean 'there."),
+            ("b", [0, 0], "expected float64 of shape"),
+            ("b", "much", "could not convert"),
+            ("b", [0, 0, 10**400], "too large"),
+            ("b", [0, None, 0], "not all of"),
+        ):
+            with pytest.raises(MessageError, match=message):
+                console.ask("set", SetRequest(participant="there", port=port, value=value))
     assert outcome[0].state == "done"
 
 
-@pytest.mark.parametrize(
-    "text", ['{"steps": "' + 30_000 * "x" + '"}', 30_000 * "x", 30_000 * "[", '{"' + 30_000 * "x" + '": 1}']
-)
-def test_a_request_of_any_length_is_quoted_in_part(steer, text):
+def test_a_request_of_any_length_is_quoted_in_part(steer):
+    long = 30_000 * "x"
     with steer(paused=True) as (console, _):
-        payload = encode(StringMessage(data=text))
-        (reply,) = console._client.get(KEYS.control("step"), payload=payload)
-        refusal = Refusal.model_validate_json(decode(StringMessage, reply.ok.payload.to_bytes()).data)
-    assert len(refusal.refused.split()) > 2
-    assert len(refusal.refused) <= 1_000
+        for text in ('{"steps": "' + long + '"}', long, 30_000 * "[", '{"' + long + '": 1}'):
+            payload = encode(StringMessage(data=text))
+            (reply,) = console._client.get(KEYS.control("step"), payload=payload)
+            refusal = Refusal.model_validate_json(decode(StringMessage, reply.ok.payload.to_bytes()).data)
+            assert len(refusal.refused.split()) > 2
+            assert len(refusal.refused) <= 1_000
 
 
-@pytest.mark.parametrize("host", ["", "/", "a//b", "/dev/zero", "a b#$*", "remote/"])
-def test_what_is_no_name_of_a_host_may_not_join(steer, host):
-    with steer(paused=True) as (console, _), pytest.raises(MessageError, match="host: String should match"):
-        ask(console._client, KEYS.join("other"), JoinRequest.model_construct(host=host, pid=1), JoinReply)
+def test_what_is_no_name_of_a_host_may_not_join(steer):
+    with steer(paused=True) as (console, _):
+        for host in ("", "/", "a//b", "/dev/zero", "a b#$*", "remote/"):
+            request = JoinRequest.model_construct(host=host, pid=1)
+            with pytest.raises(MessageError, match="host: String should match"):
+                ask(console._client, KEYS.join("other"), request, JoinReply)
 
 
 def test_unknown_hosts_may_not_join(steer):

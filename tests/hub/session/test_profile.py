@@ -2,7 +2,6 @@
 
 import json
 import threading
-import time
 from collections.abc import Iterable
 
 import pytest
@@ -12,6 +11,7 @@ from hub.recording.recording import Recording
 from hub.recording.report import report
 from hub.session.step_loop import StepLoop
 from schemas.errors import ParticipantError
+from tests.waiting import until
 
 WORK = """\
 name: work
@@ -122,19 +122,23 @@ def test_a_host_that_fails_leaves_a_profile_in_the_recording(prepare, tmp_path):
 
 @pytest.mark.parametrize("profiled", [True, False])
 def test_ls_shows_who_takes_most_of_a_running_session(prepare, capfd, profiled):
-    session = prepare(WORK, "duration=10 min", "participants.heavy.host=far", profile=profiled)
+    session = prepare(
+        WORK, "duration=10 min", "pace=realtime", "participants.heavy.host=far", profile=profiled
+    )
     shown = []
 
     def look():
-        deadline = time.monotonic() + 60.0
-        while not shown and time.monotonic() < deadline:
+        def row():
             ls(connect=[session.endpoint], as_json=True)
             (row,) = json.loads(capfd.readouterr().out) or [{}]
-            if row.get("state") == "running" and row["participants"][0]["step"] > 20:
-                ls(connect=[session.endpoint])
-                shown.extend((row["profile"], capfd.readouterr().out))
-            time.sleep(0.05)
-        session.state.shutdown()
+            return row if row.get("state") == "running" and row["participants"][0]["step"] > 20 else None
+
+        try:
+            shown.append(until(row)["profile"])
+            ls(connect=[session.endpoint])
+            shown.append(capfd.readouterr().out)
+        finally:
+            session.state.shutdown()
 
     thread = threading.Thread(target=look)
     thread.start()

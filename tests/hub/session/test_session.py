@@ -2,7 +2,9 @@
 
 import pytest
 
+from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
+from hub.session.launch import launch
 from hub.verify import verify
 
 NETWORK = """\
@@ -70,9 +72,11 @@ PLACEMENTS = {
 }
 
 
-@pytest.fixture
-def reference(prepare):
-    return prepare(NETWORK).run()
+@pytest.fixture(scope="module")
+def reference(toys, tmp_path_factory):
+    file = tmp_path_factory.mktemp("reference") / "session.yaml"
+    file.write_text(NETWORK)
+    return launch(load(str(file)), endpoint="tcp/127.0.0.1:0").run()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
-from time import monotonic, sleep
+from time import sleep
 
 import pytest
 
@@ -15,6 +15,7 @@ from hub.recording.recording import Recording
 from hub.recording.recover import recover
 from tests.hub.authorities import free_endpoint
 from tests.hub.processes import hosts, processes
+from tests.waiting import LIMIT_S, until
 
 ENDLESS = """\
 name: endless
@@ -32,15 +33,6 @@ step: 1 ms
 participants:
   here: {kind: "toys:Fault", host: other, how: raise}
 """
-
-
-def wait_until(true, seconds=60.0):
-    """Wait until a condition holds."""
-    begun = monotonic()
-    while not true():
-        if monotonic() - begun > seconds:
-            raise TimeoutError(f"not so after {seconds} s")
-        sleep(0.02)
 
 
 class Hub:
@@ -65,12 +57,12 @@ class Hub:
         return sum(file.stat().st_size for file in self.recording.glob("*.mcap"))
 
     def wait_until_it_records(self):
-        wait_until(lambda: self.recorded > 50_000)
+        until(lambda: self.recorded > 50_000)
 
     def end(self):
         """Wait for the end; return exit code and stderr."""
         try:
-            code = self.process.wait(60)
+            code = self.process.wait(LIMIT_S)
         finally:
             self.process.kill()
             self.process.wait()
@@ -130,7 +122,7 @@ def test_a_host_that_is_stopped_for_seconds_is_waited_for(hub):
     sleep(2.0)
     recorded = run.recorded
     os.kill(host, signal.SIGCONT)
-    wait_until(lambda: run.recorded > recorded + 50_000)
+    until(lambda: run.recorded > recorded + 50_000)
     os.kill(run.process.pid, signal.SIGINT)
     assert "interrupted at step" in run.end()[1]
 
@@ -141,7 +133,7 @@ def test_the_hosts_of_a_killed_hub_end_by_themselves_and_its_recording_is_recove
     assert len(processes(run.endpoint)) == 2
     run.process.kill()
     assert run.end()[0] == -signal.SIGKILL
-    wait_until(lambda: not processes(run.endpoint))
+    until(lambda: not processes(run.endpoint))
     recover(run.recording, tmp_path / "recovered")
     grants = [grant.step for grant in Recording(tmp_path / "recovered").grants()]
     assert grants == list(range(len(grants)))

@@ -1,6 +1,5 @@
 """Bundles: the signals of a participant for a device, in one message."""
 
-import time
 from contextlib import contextmanager
 from itertools import pairwise
 from types import SimpleNamespace
@@ -18,6 +17,7 @@ from hub.transport.zenoh_session import open_session
 from schemas.errors import MessageError
 from tests.hub.authorities import free_endpoint
 from tests.hub.parts import Part, Stylus, into, out, plan_of
+from tests.waiting import until
 
 
 @pytest.fixture(scope="module")
@@ -25,9 +25,7 @@ def bundle():
     with open_session("router", listen=[free_endpoint()]) as session:
         made = Bundle(session, "trocar/test/engine/arm/signals/console", lambda: None)
         made.received = session.declare_subscriber("trocar/test/engine/arm/signals/console", FifoChannel(100))
-        until = time.monotonic() + 5.0
-        while not made.takes(0, 1) and time.monotonic() < until:
-            time.sleep(0.005)
+        until(lambda: made.takes(0, 1))
         yield made
         made.close()
 
@@ -79,9 +77,7 @@ KEY = "trocar/test/engine/arm/signals/camera"
 def subscribed(session, bundle):
     """Return a subscriber of `bundle` that it knows of."""
     subscriber = session.declare_subscriber(KEY, FifoChannel(100))
-    until = time.monotonic() + 5.0
-    while not bundle.takes(0, 1) and time.monotonic() < until:
-        time.sleep(0.005)
+    until(lambda: bundle.takes(0, 1))
     return subscriber
 
 
@@ -102,9 +98,7 @@ def test_an_observer_gets_the_values_that_hold_at_its_period_and_the_first_again
         send(b"40")
         assert [camera.recv().attachment.to_bytes() for _ in "12"] == [b"surface", b"40"]
         camera.undeclare()
-        until = time.monotonic() + 5.0
-        while bundle.takes(0, 1) and time.monotonic() < until:
-            time.sleep(0.005)
+        until(lambda: not bundle.takes(0, 1))
         camera = subscribed(session, bundle)
         send(b"80")
         send(b"120")
@@ -157,8 +151,6 @@ def test_a_device_says_what_it_needs():
         before = len(changes)
         for run, told in ((7, use_mask(["a", "b", "c"], {"b"})), (7, b"\1"), (8, b"\0\0\0")):
             session.put(USES, told, attachment=Tag.pack(run, 0, -1, 0))
-        until = time.monotonic() + 5.0
-        while (refusals.total < 2 or len(changes) == before) and time.monotonic() < until:
-            time.sleep(0.005)
+        until(lambda: refusals.total >= 2 and len(changes) > before)
         assert [bundle.needs(index) for index in range(3)] == [True, False, True]
         assert (refusals.total, len(changes)) == (2, before + 1)

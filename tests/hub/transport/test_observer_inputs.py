@@ -1,7 +1,5 @@
 """What an observer sees: the newest state of which all inputs have arrived, and first that at time 0."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -14,6 +12,7 @@ from hub.transport.zenoh_session import open_session
 from schemas.keys import Keys
 from tests.hub.authorities import free_endpoint
 from tests.hub.parts import Part, into, out, plan_of
+from tests.waiting import until
 
 KEYS, RUN, MS = Keys("looks"), 7, 1_000_000
 
@@ -42,9 +41,7 @@ class Sources:
         self.bundles = {
             name: Bundle(session, KEYS.signals(name, "camera"), lambda: None) for name in ("robot", "tissue")
         }
-        until = time.monotonic() + 5.0
-        while not all(one.takes(0, 1) for one in self.bundles.values()) and time.monotonic() < until:
-            time.sleep(0.005)
+        until(lambda: all(one.takes(0, 1) for one in self.bundles.values()))
 
     def _count(self):
         self.arrived += 1
@@ -57,9 +54,7 @@ class Sources:
         bundle = self.bundles[name]
         bundle.add(0, codec.pack(np.array([float(ms if value is None else value)])))
         bundle.send(Tag.pack(run, 0, step, ms * MS))
-        until = time.monotonic() + 5.0
-        while self.arrived + self.refusals.total == before and time.monotonic() < until:
-            time.sleep(0.001)
+        until(lambda: self.arrived + self.refusals.total > before)
 
     def take(self):
         """Return time (ms), both values and the number of missed states; None if there is nothing new."""
@@ -133,7 +128,5 @@ def test_messages_of_another_run_and_invalid_ones_are_refused(sources):
     bundle = sources.bundles["robot"]
     bundle.add(3, b"123")
     bundle.send(Tag.pack(RUN, 0, 19, 40 * MS))
-    until = time.monotonic() + 5.0
-    while sources.refusals.total < 2 and time.monotonic() < until:
-        time.sleep(0.001)
+    until(lambda: sources.refusals.total >= 2)
     assert sources.refusals.total == 2

@@ -10,6 +10,7 @@ from pathlib import Path
 from time import sleep
 
 import numpy as np
+import pytest
 import zenoh
 from zenoh.handlers import Callback, RingChannel
 
@@ -161,6 +162,7 @@ class Stranger:
             self._watch.undeclare()
 
 
+@pytest.mark.search
 def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, monkeypatch, caplog, capfd):
     undisturbed = prepare(SCENARIO).run()
     assert undisturbed.dropped_messages == 0

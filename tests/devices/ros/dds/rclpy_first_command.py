@@ -18,7 +18,7 @@ def publish_first(topic, kind, number, length):
     rclpy.init(context=context)
     node = rclpy.create_node(f"program{number}", context=context)
     publisher = node.create_publisher(StringStamped, topic, QoSProfile(depth=10, durability=DURABILITY[kind]))
-    limit = time.monotonic() + 20.0
+    limit = time.monotonic() + 60.0
     while not publisher.get_subscription_count() and time.monotonic() < limit:
         time.sleep(0.0005)
     message = StringStamped(string="enable".ljust(length))

@@ -12,8 +12,9 @@ from devices.ros.dds.rtps import encode_data, encode_message, parse_message
 from devices.ros.dds.rtps_discovery import SPDP_READER, SPDP_WRITER, participant_data
 from devices.ros.dds.services import ServiceParticipant
 from schemas.errors import MessageError
+from tests.waiting import LIMIT_S
 
-PATIENCE_S = 30.0
+PATIENCE_S = LIMIT_S
 
 
 def announcement(peer: bytes, port: int) -> bytes:

@@ -5,7 +5,6 @@ message.
 import queue
 import socket
 import struct
-import time
 from contextlib import contextmanager
 
 import pytest
@@ -33,7 +32,7 @@ def connected(keep=3, greet=None):
         return heard.put if greet is None else greet(connection, fields)
 
     with socket.create_server(("127.0.0.1", 0)) as server:
-        other = socket.create_connection(server.getsockname(), timeout=5.0)
+        other = socket.create_connection(server.getsockname(), timeout=60.0)
         sock, _ = server.accept()
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     connection = Connection(loop, sock, on_header, ends.put, keep=keep)
@@ -68,8 +67,8 @@ def test_frames_come_whole_however_they_are_cut():
         for at in range(150):
             other.send(data[at : at + 1])
         other.sendall(data[150:])
-        assert heard.get(timeout=5.0) == {"callerid": "/it", "topic": "/a"}
-        assert [heard.get(timeout=5.0) for _ in range(3)] == [b"one", b"", b"x" * 70000]
+        assert heard.get(timeout=60.0) == {"callerid": "/it", "topic": "/a"}
+        assert [heard.get(timeout=60.0) for _ in range(3)] == [b"one", b"", b"x" * 70000]
         assert (connection.program, connection.is_established) == ("/it", True)
 
 
@@ -85,7 +84,7 @@ def test_frames_come_whole_however_they_are_cut():
 def test_what_is_no_header_is_hung_up_on(data, caplog):
     with connected() as (_, other, heard, ends):
         other.sendall(data)
-        assert ends.get(timeout=5.0)
+        assert ends.get(timeout=60.0)
         assert heard.empty()
         assert "is closed" in caplog.text
 
@@ -99,7 +98,7 @@ def test_a_field_of_any_length_is_quoted_in_part():
 def test_a_message_that_is_too_large_is_hung_up_on(caplog):
     with connected() as (_, other, _heard, ends):
         other.sendall(header_frame({"topic": "/a"}) + struct.pack("<I", 1 << 30))
-        assert ends.get(timeout=5.0)
+        assert ends.get(timeout=60.0)
         assert "exceed the limit" in caplog.text
 
 
@@ -109,20 +108,18 @@ def test_a_failure_nobody_thought_of_ends_no_other_connection(caplog):
 
     with connected(greet=greet) as (connection, other, _, ends):
         other.sendall(header_frame({"topic": "/a"}))
-        assert ends.get(timeout=5.0) is connection, "it is closed: the same bytes would make it fail again"
+        assert ends.get(timeout=60.0) is connection, "it is closed: the same bytes would make it fail again"
         called = queue.Queue()
         connection._loop.call(lambda: called.put(True))
-        assert called.get(timeout=5.0)
+        assert called.get(timeout=60.0)
         assert "unthought of" in caplog.text
 
 
 def test_who_does_not_keep_up_gets_the_newest_and_whole_messages():
     messages = [framed(bytes([number]) * 1_000_000) for number in range(40)]
     with connected(keep=3) as (connection, other, _, _):
-        began = time.monotonic()
-        for message in messages:
+        for message in messages:  # the reader is this thread: if sending waited for it, it would never end
             connection.send(message)
-        assert time.monotonic() - began < 2.0, "sending waits for the reader"
         numbers = []
         while not numbers or numbers[-1] != 39:
             (length,) = struct.unpack("<I", received(other, 4))
@@ -139,7 +136,7 @@ def test_who_does_not_keep_up_gets_the_newest_and_whole_messages():
 def test_who_goes_is_told_once_and_sending_goes_on():
     with connected() as (connection, other, _, ends):
         other.close()
-        assert ends.get(timeout=5.0) is connection
+        assert ends.get(timeout=60.0) is connection
         connection.send(framed(b"into the void"))
         assert ends.empty()
 

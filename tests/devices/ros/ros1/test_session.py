@@ -65,7 +65,7 @@ def test_a_client_enables_homes_and_moves_an_arm(tmp_path):
         assert console.arm("PSM1", "connected")
         console.listen("/PSM1/warning", "std_msgs/msg/String")
         console.arm("PSM1", "servo_jp", list(HOME + 0.1))  # to an arm that is disabled
-        assert "servo_jp refused" in console.heard("/PSM1/warning", 5.0)["data"]
+        assert "servo_jp refused" in console.heard("/PSM1/warning", 60.0)["data"]
         console.arm("PSM1", "enable")
         console.arm("PSM1", "home")
         edges = console.arm("PSM1", "edges")

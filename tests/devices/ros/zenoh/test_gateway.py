@@ -170,7 +170,7 @@ def test_a_state_is_wanted_while_a_program_subscribes(psm, hub):
     with Peer(hub) as console:
         heard = []
         console.listen(SETPOINT, JOINTS, lambda message, _: heard.append(message))
-        assert psm.wait(5.0)
+        assert psm.wait(60.0)
         assert until(lambda: wanted(psm, SETPOINT))
         psm.write(SETPOINT[1:], np.zeros(18))
         assert until(lambda: heard)
@@ -214,7 +214,7 @@ def test_the_gateway_is_there_again_when_the_hub_is(tmp_path):
         console = stack.enter_context(Peer(endpoint))
         heard = []
         console.listen(STATE, JOINTS, lambda message, _: heard.append(message))
-        assert until(lambda: psm.write(STATE[1:], np.zeros(18)) or heard, 15.0)
+        assert until(lambda: psm.write(STATE[1:], np.zeros(18)) or heard)
 
 
 def test_a_second_console_does_not_command_the_same_arm(psm, hub):
@@ -258,7 +258,7 @@ def test_a_request_that_is_none_gets_an_error(psm, peer):
     key = next(entry for entry in peer.graph() if entry[1:3] == ("SS", "/PSM1/local/forward_kinematics"))
     selector = f"0/PSM1/local/forward_kinematics/{key[3]}/{key[4]}"
     for payload, attachment in ((b"", struct.pack("<qqB", 1, 0, 16) + bytes(16)), (b"\x00\x01\x00\x00", b"")):
-        (reply,) = peer.session.get(selector, payload=payload, attachment=attachment, timeout=5.0)
+        (reply,) = peer.session.get(selector, payload=payload, attachment=attachment, timeout=60.0)
         assert "/PSM1/local/forward_kinematics" in reply.err.payload.to_string()
 
 
@@ -299,24 +299,19 @@ def test_a_console_that_stops_reading_holds_up_nobody(hub, tmp_path):
         "data": np.zeros(276480, np.uint8),
     }
     with showing(hub, tmp_path, arms={"PSM1": {}}) as psm, Peer(hub) as console, stalled(hub):
-        numbers, words, slowest = [], [], 0.0
+        numbers, words = [], []
         console.listen(STATE, JOINTS, lambda _, attached: numbers.append(attached[0]))
         console.listen(
             "/PSM1/status", "std_msgs/msg/String", lambda message, _: words.append(message.data), latched=True
         )
         image = message_type("sensor_msgs/msg/Image").model_validate(picture)
-        for word in range(120):  # 33 MB, more than the buffers on the way to the stalled one hold
-            before = time.monotonic()
+        assert until(lambda: psm.write("PSM1/status", StringMessage(data="begin")) or words)
+        for word in map(str, range(120)):  # 33 MB, more than the buffers on the way to the stalled one hold
             psm.write(STATE[1:], np.zeros(18))
             psm.write("endoscope/left/image_raw", image)
-            psm.write("PSM1/status", StringMessage(data=str(word)))
-            slowest = max(slowest, time.monotonic() - before)
-            time.sleep(0.01)
-        assert until(lambda: words and words[-1] == "119")
-        assert slowest < 0.5, "publishing waits for the stalled console"
-        first = int(words[0])  # what was published before the subscription was known here is not sent
-        assert first < 10
-        assert words == [str(word) for word in range(first, 120)]
+            psm.write("PSM1/status", StringMessage(data=word))
+            assert until(lambda word=word: words[-1] == word), "publishing waits for the stalled console"
+        assert [word for word in words if word != "begin"] == [str(word) for word in range(120)]
         assert np.diff(numbers).max() == 1, "another console's stop costs this one states"
 
 

@@ -116,7 +116,7 @@ class Peer:
         )
         self.kept.append(publisher)
         gid, sent = os.urandom(16), 0
-        end = time.monotonic() + 5.0
+        end = time.monotonic() + 60.0
         # as a program waits for its subscribers
         while not publisher.matching_status.matching and time.monotonic() < end:
             time.sleep(0.005)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from engines.bullet.elasticity.material import Material
@@ -19,7 +19,6 @@ def test_lame_parameters(material):
     assert lambda_ / (2 * (lambda_ + mu)) == pytest.approx(material.poisson_ratio)
 
 
-@settings(deadline=None)
 @given(MATERIALS, st.integers(0, 2**32 - 1))
 def test_small_strains_of_the_neo_hookean_model_obey_hookes_law(material, seed):
     strain = np.random.default_rng(seed).uniform(-1e-5, 1e-5, (3, 3))

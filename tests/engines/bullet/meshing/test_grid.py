@@ -2,7 +2,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from engines.bullet.meshing.grid import FEWEST_NODES, block, block_cells
@@ -15,7 +15,6 @@ SIZES = st.tuples(*3 * [st.floats(5e-3, 0.2)]).map(np.array)
 NODES = st.integers(FEWEST_NODES, 600)
 
 
-@settings(deadline=None, max_examples=40)
 @given(SIZES, NODES)
 def test_a_block_is_filled_exactly_by_positive_tetrahedra(size, nodes):
     mesh = block(size, nodes)
@@ -25,7 +24,6 @@ def test_a_block_is_filled_exactly_by_positive_tetrahedra(size, nodes):
     assert len(np.unique(mesh.tetrahedra)) == len(mesh.nodes)
 
 
-@settings(deadline=None, max_examples=40)
 @given(SIZES, NODES)
 def test_the_node_count_is_near_the_request(size, nodes):
     count = len(block(size, nodes).nodes)
@@ -33,7 +31,6 @@ def test_the_node_count_is_near_the_request(size, nodes):
     assert abs(count / nodes - 1) < 0.2
 
 
-@settings(deadline=None, max_examples=40)
 @given(SIZES, NODES)
 def test_the_surface_is_closed_and_faces_outwards(size, nodes):
     mesh = block(size, nodes)
@@ -50,7 +47,6 @@ def test_the_surface_is_closed_and_faces_outwards(size, nodes):
     )
 
 
-@settings(deadline=None, max_examples=40)
 @given(SIZES, NODES, st.sampled_from([0, 1]))
 def test_a_block_is_its_own_mirror_image(size, nodes, axis):
     mesh = block(size, nodes)

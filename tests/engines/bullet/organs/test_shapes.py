@@ -72,7 +72,6 @@ def test_the_same_mesh_comes_every_time_in_whole_micrometres(name):
     np.testing.assert_array_equal(mesh.nodes, np.round(mesh.nodes, 6))
 
 
-@settings(deadline=None, max_examples=10)
 @given(st.floats(6e-3, 18e-3))
 def test_a_ball_is_filled_to_its_surface_by_tetrahedra_without_slivers(spacing):
     corner = np.full(3, 0.03)
@@ -237,7 +236,7 @@ def test_binary_files_and_those_of_version_5_are_read(tmp_path, version):
     np.testing.assert_array_equal(tetrahedra, GOOD.tetrahedra)
 
 
-@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_a_damaged_file_is_refused_or_read_but_nothing_else(tmp_path, data):
     GOOD.write_vtk(tmp_path / "organ.vtk")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -12,7 +12,6 @@ from tests.engines.bullet.rig import SMALL_BLOCK, params
 TRIANGLES = arrays(float, (5, 3, 3), elements=st.floats(-1, 1))
 
 
-@settings(deadline=None)
 @given(arrays(float, 3, elements=st.floats(-2, 2)), TRIANGLES)
 def test_no_point_of_a_triangle_is_nearer_than_the_closest(point, corners):
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)

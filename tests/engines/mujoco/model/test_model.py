@@ -3,7 +3,7 @@ from itertools import combinations
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from engines.mujoco.model import build, first_sensor, probe_body
@@ -68,7 +68,6 @@ def gaps(model, data, arm, params):
     ]
 
 
-@settings(max_examples=30, deadline=None)
 @given(fractions)
 def test_kinematics_are_those_of_the_dh_table(fraction):
     data = mujoco.MjData(MODEL)
@@ -85,7 +84,6 @@ def test_kinematics_are_those_of_the_dh_table(fraction):
         assert np.allclose(found.xmat.reshape(3, 3), base @ tip[:3, :3], atol=1e-12)
 
 
-@settings(max_examples=30, deadline=None)
 @given(fractions)
 def test_the_pivots_of_the_linkages_meet_in_every_position(fraction):
     data = mujoco.MjData(MODEL)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -69,7 +69,6 @@ def test_a_box_keeps_its_sharp_edges_and_flat_sides() -> None:
         assert np.ptp(normals[(skin.faces == vertex).any(axis=1)], axis=0).max() < 1e-9
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 4e-3))
 def test_there_is_no_gap_however_it_is_bent(seed: int, most: float) -> None:
     mesh = block(SIZE, 60)
@@ -82,7 +81,6 @@ def test_there_is_no_gap_however_it_is_bent(seed: int, most: float) -> None:
     assert forth == back
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_it_moves_with_the_body(seed: int) -> None:
     from scipy.spatial.transform import Rotation
