@@ -20,7 +20,7 @@ from hub.transport.endpoints import address
 from tests.hub.authorities import Authority, free_port
 from tests.waiting import until
 
-pytestmark = pytest.mark.xdist_group("network")  # its hosts have fixed addresses
+pytestmark = pytest.mark.xdist_group("network")  # it has fixed addresses, and DDS sees its interface
 
 SCENARIO = """\
 name: hand
