@@ -16,7 +16,8 @@ from hub.recording.recording import Recording
 from hub.transport.session_secret import private_directory
 from tests.faults.traces import MARK, living
 from tests.hub.sample_session import write_session
-from tests.webconsole.conftest import finish, until
+from tests.waiting import until
+from tests.webconsole.conftest import finish
 from tests.webconsole.test_page import answer
 
 pytestmark = [

@@ -218,13 +218,13 @@ def acks(prepare, request):
         refusals = Refusals()
         links = {"other": HubLink(["there"])} if request.param == "link" else {}
         keys = dict.fromkeys(plan.hosts(), HOSTS)
-        receiver = AckReceiver(session, KEYS, plan, 5, refusals, keys, links, lambda host, vectors: None)
+        receiver = AckReceiver(session, KEYS, plan, 5, refusals, keys, links)
         host = HostLink(*map(os.dup, links["other"].inherited)) if links else None
 
         def publish(hash_, step=3):
             payload = pack_ack(Ack(5, 0, step, (hash_,), (0,), ()))
             if host is not None:
-                host.send_report([(0, payload)])
+                host.send_acks([(0, payload)])
             else:
                 session.put(KEYS.ack("there"), payload, attachment=signature(payload, HOSTS))
 
