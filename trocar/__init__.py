@@ -1,4 +1,4 @@
-"""The public names of Trocar: everything that a plug-in, a notebook or an example imports.
+"""The public names of Trocar, for plug-ins, notebooks and examples.
 
     import trocar
 
@@ -11,21 +11,21 @@ units), in `trocar.records` (state with named fields), in `trocar.tasks` (traini
 `trocar.haptics` (haptic devices), in `trocar.testing` (a driver of one participant) and in
 `trocar.environments` (environments for Gymnasium; the former name `learning.environments` works in this
 release) is public. All other modules of the distribution (`schemas`, `robots`, `hub`, `engines`,
-`controllers`, `devices`, `tasks`, `learning`, `configs`) are private: they may change in any release.
+`controllers`, `devices`, `tasks`, `learning`, `configs`) are private, and may change in any release.
 `python -m trocar` is the command line.
 
 Sessions          `run`, `verify`, `fork`, `load_scenario`, `run_in_process`, `SteppedSession`
-Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `recover` for a recording that was cut
-                  short; `write_bag` for samples to play
+Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `recover` for a recording cut short;
+                  `write_bag` for samples to play
 Participants      `Stepped`, `Controller`, `Device`, `Params`, `Setup`, `Port`, `Inputs`, `Outputs`,
                   `Sample`, `Value`, `state_hash`, `restore_arrays`
 Ports             `signal_in`, `signal_out`, `event_in`, `event_out`: each returns a `Port`
 Power bonds       `BondSide`, `BondPlan`, `ForceSide`, `MotionSide`
 Conformance       `check_engine`, `check_device`
 Kinematics        `chain`, `inverse`
-Errors            `TrocarError`, the root of all errors that are raised on purpose
+Errors            `TrocarError`, the root of all errors raised on purpose
 
-Names are imported when they are first used, so `import trocar` itself takes a few milliseconds.
+Names are imported at first use, so `import trocar` itself takes a few milliseconds.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ _ORIGINS = {name: module for module, names in _MODULES.items() for name in names
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used (PEP 562)."""
+    """Import a public name at first use (PEP 562)."""
     if name not in _ORIGINS:
         raise AttributeError(f"module 'trocar' has no public name '{name}'; it has {', '.join(__all__)}")
     value = globals()[name] = getattr(import_module(_ORIGINS[name]), name)

@@ -1,4 +1,4 @@
-"""Whole sessions from Python: what `trocar run` and `trocar verify` do, for notebooks and scripts."""
+"""Whole sessions from Python, as with `trocar run` and `trocar verify`, for notebooks and scripts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hub.hosting.numerics import pin_numerics
 _environment = dict(os.environ)
 pin_numerics(os.environ)  # before anything below imports numpy
 _LATE = {name: value for name, value in os.environ.items() if _environment.get(name) != value}
-"""Settings that numpy did not see, as it had been imported before this module."""
+"""Settings too late for numpy, imported before this module."""
 if "numpy" not in sys.modules:
     _LATE.clear()
 
@@ -39,17 +39,17 @@ def load_scenario(
     *,
     set: Mapping[str, Any] | None = None,  # noqa: A002  (the word of the command line)
 ) -> ScenarioFile:
-    """Return a validated scenario: `scenario`, `params` by participant, and `source`, its file.
+    """Return a validated scenario: `scenario`, `params` by participant, and `source`, the file.
 
         trocar.load_scenario("palpation").scenario.step     # 1000000 ns
 
     Args:
-        scenario: The name of an installed scenario, or a path with its `.yaml`.
-        set: Values that replace those of the file, by their path: `{"participants.teleop.scale": 0.3}`. A
-            text is read as `--set` of the command line reads it (`"80 mm"`).
+        scenario: The name of an installed scenario, or a path ending in `.yaml`.
+        set: New values by path: `{"participants.teleop.scale": 0.3}`. A text is read like `--set` of the
+            command line (`"80 mm"`).
 
     Raises:
-        ScenarioError: The scenario is not valid; one line for each problem, with file, line and column.
+        ScenarioError: The scenario is not valid; a line for each problem, with file, line and column.
     """
     return load(str(scenario), _overrides(set))
 
@@ -71,22 +71,22 @@ def run(
     profile: bool = False,
     progress: Callable[[Progress], None] | None = None,
 ) -> Summary:
-    """Run a scenario to its end and return its summary. Call it in the main thread.
+    """Run a scenario to the end and return the summary. Call from the main thread.
 
         summary = trocar.run("table", set={"duration": "2 s"}, record="recordings/table")
         summary.measures["peak_hand_force_n"]     # N
 
     Args:
-        scenario: The name of an installed scenario, or a path with its `.yaml`.
-        record: A new directory for the recording, a rosbag2 bag; `Recording(record)` reads it.
-        set: Values that replace those of the file, as in `load_scenario`.
+        scenario: The name of an installed scenario, or a path ending in `.yaml`.
+        record: A new directory for the recording, a rosbag2 bag, to be read by `Recording(record)`.
+        set: New values, as in `load_scenario`.
         pace: `fast` or `realtime`, instead of the scenario's own.
         one_host: Run every participant in this process.
         profile: Measure where the time goes: `Summary.profile`, and in the recording.
         progress: Is called several times a second of wall time.
 
     Raises:
-        ScenarioError: The scenario is not valid, or a package that it needs is not installed.
+        ScenarioError: The scenario is not valid, or needs a missing package.
         SessionError: The session failed; the recording is closed and can be read.
         RecordingError: `record` is not empty, or cannot be written.
     """
@@ -113,14 +113,14 @@ def verify(
 
     Args:
         recording: A recording, or the path of its directory or MCAP file.
-        trust: Allow it to run classes, FMUs and native libraries that it names, and to read files other than
-            those it was recorded with.
-        directory: Where relative paths of its scenario start, by default where they did.
+        trust: Allow the recording to run its classes, FMUs and native libraries, and to read files other than
+            the recorded files.
+        directory: Base of relative paths in the scenario, by default as recorded.
         progress: Is called several times a second of wall time.
 
     Raises:
-        RecordingError: Not a recording of a session, or a damaged one.
-        TrustError: It asks for what `trust` allows; the message lists it.
+        RecordingError: Not a recording of a session, or a damaged recording.
+        TrustError: The recording needs `trust`; the message lists the reasons.
         SessionError: The session failed.
     """
     _warn_of_other_bits()
@@ -140,7 +140,7 @@ def fork(
     one_host: bool = False,
     progress: Callable[[Progress], None] | None = None,
 ) -> Summary:
-    """Go on from an instant of a recording and return the summary of the whole. Call it in the main thread.
+    """Go on from an instant of a recording; return the summary of the whole. Call from the main thread.
 
         trocar.fork("recordings/table", 4.0, set={"teleop.scale": 0.1}, record="recordings/slower")
 
@@ -149,20 +149,20 @@ def fork(
 
     Args:
         recording: A recording, or the path of its directory or MCAP file.
-        at: Simulated time, s; it is rounded down to a communication point.
+        at: Simulated time, s, rounded down to a communication point.
         record: A new directory for the fork's recording.
-        set: What changes there, as in `load_scenario`: devices, pace, duration, measures, and parameters of
-            engines and controllers that can save their state.
+        set: Changes, as in `load_scenario`: devices, pace, duration, measures, and parameters of engines and
+            controllers with saved states.
         trust: As in `verify`.
         directory: As in `verify`.
         one_host: Run every participant in this process.
         progress: Is called several times a second of wall time.
 
     Raises:
-        ScenarioError: A change that is not valid, or not possible in a session that runs.
-        RecordingError: Not a recording of a session, or one without this instant.
-        TrustError: It asks for what `trust` allows; the message lists it.
-        SessionError: The session failed, or its past has other state hashes than the recording.
+        ScenarioError: A change is not valid, or not possible in a running session.
+        RecordingError: Not a recording of a session, or a recording without this instant.
+        TrustError: The recording needs `trust`; the message lists the reasons.
+        SessionError: The session failed, or its past has state hashes different from the recording.
     """
     _warn_of_other_bits()
     opened = recording if isinstance(recording, Recording) else Recording(Path(recording), unfinished=True)
@@ -179,7 +179,7 @@ def fork(
 
 
 def _warn_of_other_bits() -> None:
-    """Warn where numpy computes with other kernels in this process than in the hosts."""
+    """Warn if numpy computes with different kernels in this process and in the hosts."""
     if _LATE:
         log.warning(
             "numpy was imported before trocar.run: state hashes may differ from those of the command line. To"

@@ -1,7 +1,7 @@
-"""Training tasks of your own: a class that says what its goals are gets events, metrics and scores.
+"""Training tasks of your own: a class with goals gets events, metrics and scores.
 
-`Task` is the base of all, `TaskParams` that of their parameters; `Goals` are the places where objects belong,
-and an `Event` is what happens to them. `docs/tutorials/own-task.md` makes one.
+`Task` is the base of all tasks, `TaskParams` the base of their parameters; `Goals` are the targets of
+objects, and an `Event` happens to an object. `docs/tutorials/own-task.md` makes a task.
 """
 
 from tasks.events import Event

@@ -1,4 +1,4 @@
-"""Teleoperation: a hand leads an instrument on a patient-side manipulator, and feels what it touches."""
+"""Teleoperation: a hand leads an instrument on a patient-side manipulator, and feels contact."""
 
 from controllers.teleoperation.controller import Teleoperation
 from controllers.teleoperation.params import TeleoperationParams

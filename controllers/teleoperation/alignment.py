@@ -1,9 +1,9 @@
-"""The alignment gate: the arm follows once the master is turned as the tip is, and a hand holds it.
+"""The alignment gate: the arm follows once a held master has the orientation of the tip.
 
-For masters that motors cannot turn; after what mtsTeleOperationPSM.cpp of jhu-dvrk/sawIntuitiveResearchKit
-requires of one with motors (RunAligningMTM, defaults in mtsIntuitiveResearchKit.h). A master counts as held
-when its gripper or its roll has moved enough since alignment began. After a clutch that need not be shown
-again, but the orientations must match more closely.
+For masters without motors; after the rules of mtsTeleOperationPSM.cpp of jhu-dvrk/sawIntuitiveResearchKit for
+masters with motors (RunAligningMTM, defaults in mtsIntuitiveResearchKit.h). A master counts as held when
+gripper or roll have moved enough since alignment began. After a clutch the motion need not be shown again,
+but the orientations must match more closely.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ __all__ = ["AlignmentGate"]
 _TOLERANCE, _TOLERANCE_AFTER_CLUTCH = radians(5.0), radians(2.0)
 """StartOrientationTolerance, OrientationToleranceAfterClutch."""
 _GRIPPER, _ROLL, _TOGETHER = radians(40.0), radians(4.0), 0.8
-"""StartGripperThreshold, StartRollThreshold, and the share of both that both together must have moved."""
+"""StartGripperThreshold, StartRollThreshold, and the fraction of both required of both together."""
 _GRIPPER_OPEN = radians(60.0)
 """GripperMax: how far a master's gripper is open at 1."""
 _PATIENCE = 2.0
-"""s, from one warning to the next."""
+"""Time between two warnings, s."""
 
 
 class AlignmentState(Record):
-    """All of the gate that lasts from step to step; angles in rad."""
+    """State of the gate; angles in rad."""
 
     held = flag()
     """Whether a hand holds the master."""
     passed = flag()
     """Whether the gate was open before."""
     watching = flag()
-    """Whether the extremes below are those of the present alignment."""
+    """Whether the extremes below belong to the present alignment."""
     waited = number()
     """s since alignment began, or since the last warning."""
     first = array(4)
@@ -47,7 +47,7 @@ class AlignmentState(Record):
     gripper_least = number()
     gripper_most = number()
     angle = number()
-    """Between master and tip."""
+    """Angle between master and tip."""
 
 
 class AlignmentGate:
@@ -58,7 +58,7 @@ class AlignmentGate:
         self.state = AlignmentState()
 
     def reset(self) -> None:
-        """Close the gate; it must be shown again that a hand holds the master."""
+        """Close the gate; a hand on the master must be shown again."""
         self.state.values[:] = 0.0
 
     def clutch(self) -> None:
@@ -71,7 +71,7 @@ class AlignmentGate:
         Args:
             hand: orientation of the master in the arm's base frame, quaternion (x, y, z, w).
             tip: orientation of the tip, likewise.
-            gripper: of the master, 0 closed .. 1 open; negative without one.
+            gripper: gripper of the master, 0 closed .. 1 open; negative: no gripper.
             h: time since the last check, s.
         """
         self._watch(hand, _GRIPPER_OPEN * max(gripper, 0.0))
@@ -85,7 +85,7 @@ class AlignmentGate:
         return False
 
     def warning(self) -> str:
-        """Return what the user must do, every two seconds that the gate stays closed; else an empty text."""
+        """Return an instruction for the user, every two seconds of a closed gate; else an empty text."""
         state = self.state
         if state.waited < _PATIENCE:
             return ""

@@ -1,10 +1,10 @@
 """A surface, estimated from the force at a tip and the tip's motion.
 
-The surface lies where the force began: the depth is 0 there and grows with the motion against the force. Its
-stiffness is the secant push / depth, so that the estimate gives back the measured force without moving the
-surface. What lies across the normal is friction, as long as it fits into a friction cone.
+The surface is at the beginning of the force: the depth is 0 there and grows with the motion against the
+force. The stiffness is the secant push / depth, so the estimate reproduces the measured force without moving
+the surface. The component across the normal is friction, within a friction cone.
 
-Why a loop through it is stable, whatever the delay, stands in docs/decisions/0025-force-to-the-hand.md.
+Stability of a loop through the estimate for any delay: docs/decisions/0025-force-to-the-hand.md.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from schemas.vectors import Vector
 __all__ = ["ContactEstimate"]
 
 _TOUCH = 0.05
-"""N; less is no contact.
+"""Least force of a contact, N.
 
-It is below what a hand feels (0.06 N at a finger), and above what an instrument's coupling to tissue needs to
-accelerate it in free air.
+Below the threshold of a hand (0.06 N at a finger), and above the force of an instrument's coupling to tissue
+for acceleration in free air.
 """
 _CONE = 0.5
-"""Slope of the friction cone: a force in it may be a push along the normal with friction across.
+"""Slope of the friction cone of a push along the normal with friction across.
 
-A lubricated instrument rubs with less.
+The friction of a lubricated instrument is less.
 """
 _STIFFEST = 5e3
-"""N/m; no secant is taken for stiffer, so that the first force, at no depth, has a finite one."""
+"""Largest stiffness of a secant, N/m: the first force, at no depth, has a finite stiffness."""
 _MEAN = 0.02
-"""s; time constant of the means of force and tip. As both lag alike, they belong to each other."""
+"""Time constant of the means of force and tip, s. Both have the same lag."""
 _RISE, _FALL = 0.1, 0.02
-"""s; time constants of stiffness and friction: slow where the force grows, quick where it decreases."""
+"""Time constants of stiffness and friction, s: slow for a growing force, quick for a decreasing force."""
 _REACH = 0.05
-"""m of the hand; a surface is forgotten this far from where it was last touched."""
+"""Distance of the hand from the last touch until a surface is forgotten, m."""
 
 
 class ContactEstimate(Record):
-    """One surface near the tip, in the arm's base frame."""
+    """A surface near the tip, in the arm's base frame."""
 
     normal = array(3)
     """Out of the surface."""
@@ -49,7 +49,7 @@ class ContactEstimate(Record):
     touched = array(3)
     """Where the surface was touched last, m."""
     tip_depth = number()
-    """Of the mean tip below the surface, m."""
+    """Depth of the mean tip below the surface, m."""
     stiffness = number()
     """N/m."""
     friction = number()
@@ -63,11 +63,11 @@ class ContactEstimate(Record):
         return float(self.tip_depth + self.normal.dot(self.tip - tip))
 
     def update(self, tip: Vector, force: Vector, scale: float, elapsed: float) -> None:
-        """Update the surface by one sample.
+        """Update the surface by a sample.
 
         Args:
             tip: position of the tip, m, shape (3,).
-            force: on the tip, N, shape (3,).
+            force: force on the tip, N, shape (3,).
             scale: metres of the tip per metre of the hand.
             elapsed: time since the last call, s.
         """
@@ -98,7 +98,7 @@ class ContactEstimate(Record):
     def _follow(self, move: Vector) -> None:
         """Add the tip's motion `move` (3,) to the depth.
 
-        Less what sliding may seem to add where friction has tilted the normal.
+        Corrected for the apparent motion of sliding along a normal tilted by friction.
         """
         along = float(self.normal.dot(move))
         across = _length(move - along * self.normal)

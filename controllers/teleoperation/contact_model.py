@@ -1,10 +1,10 @@
-"""From contact at an instrument's tip to the planes that a haptic device renders.
+"""From contact at an instrument's tip to the planes of a haptic device.
 
 With the hand at x_h while the tip is commanded to x_t, a hand at x means the tip p(x) = x_t + s R (x - x_h).
 So the plane n . p = d of the arm's base frame is, for the hand, the plane R'n . x = R'n . x_h + (d - n . x_t)
 / s: depths are divided by the scale s. A force F at the tip is c F at the hand, and so a stiffness K is s c K
-there, and a damping B is s c B. Both ends of the pair (x_h, x_t) belong to the same sample of the hand, so
-nothing that delays the sample or the planes displaces a surface that stands still.
+there, and a damping B is s c B. Both ends of the pair (x_h, x_t) belong to the same sample of the hand, so no
+delay of the sample or the planes displaces a surface at rest.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ def _direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 class PlaneParams(Params):
-    """A surface that only the hand feels, in the arm's base frame.
+    """A surface felt by the hand alone, in the arm's base frame.
 
-    It pushes the tip to where normal . tip is `distance`.
+    The tip is pushed to normal . tip = `distance`.
     """
 
     normal: Annotated[tuple[float, float, float], AfterValidator(_direction)] = Field(
@@ -56,11 +56,11 @@ PlanesParams = Annotated[
     tuple[PlaneParams, ...],
     Field(max_length=2, description="surfaces that only the hand feels, in the arm's base frame"),
 ]
-"""As many as a contact model holds beside a tissue's and a rigid thing's."""
+"""Planes: as many as fit a contact model beside the planes of tissue and rigid objects."""
 
 
 class ForceParams(Params):
-    """Which share of the force at the tip the hand feels."""
+    """Fraction of the force at the tip for the hand."""
 
     scale: float = Field(
         default=1.0,
@@ -79,9 +79,9 @@ class ForceParams(Params):
 
 
 class ContactModelBuilder:
-    """Makes the contact model of one hand and one arm.
+    """Makes the contact model of a hand and an arm.
 
-    It has a plane for each surface of the scenario, one for tissue and one for rigid things.
+    The model has a plane for each surface of the scenario, for tissue and for rigid objects.
     """
 
     def __init__(self, force: ForceParams, planes: Sequence[PlaneParams]) -> None:
@@ -104,19 +104,18 @@ class ContactModelBuilder:
     ) -> list[ContactPlane]:
         """Return at most four planes in the device's base frame, in metres of the hand.
 
-        There are none while the arm does not follow.
+        Empty while the arm does not follow.
 
         Args:
-            hand: position (3,) of the hand in the device's base frame, m: the sample that the command was
-                made from.
+            hand: position (3,) of the hand in the device's base frame, m: the sample of the command.
             tip: position (3,) of the tip at the command in the arm's base frame, m.
             to_base: rotation (3, 3) from the device's base frame to the arm's.
             scale: metres of the tip per metre of the hand.
             following: whether the tip follows the hand.
             tip_wrench: force and moment (6,) of tissue on the instrument in the arm's base frame, N and N m.
-            rigid_wrench: the same of rigid things.
-            elapsed: simulated time since the last call, s. Call also while the arm does not follow: what was
-                touched is remembered.
+            rigid_wrench: force and moment (6,) of rigid objects, likewise.
+            elapsed: simulated time since the last call, s. Call also while the arm does not follow: touched
+                surfaces are remembered.
         """
         self._tissue.update(tip, tip_wrench[:3], scale, elapsed)
         self._rigid.update(tip, rigid_wrench[:3], scale, elapsed)
@@ -151,7 +150,7 @@ class ContactModelBuilder:
     def _plane(
         self, hand: Vector, normal: Vector, depth: float, stiffness: float, damping: float, friction: float
     ) -> ContactPlane:
-        """Return the plane with this `normal` (3,) and the hand `depth` below it, in the hand's frame."""
+        """Return the plane with this `normal` (3,) and the hand `depth` below, in the hand's frame."""
         x, y, z = normal.tolist()
         return ContactPlane(
             normal=Vector3(x=x, y=y, z=z),

@@ -1,4 +1,4 @@
-"""Teleoperation as a participant: one hand, one arm. A console for two hands has two of them."""
+"""Teleoperation as a participant: a hand and an arm. A console for two hands has two teleoperations."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from schemas.vectors import Vector
 __all__ = ["Teleoperation"]
 
 _POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
-"""Of a pose."""
+"""Parts of a pose."""
 _FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
 _NONE = np.zeros(0)
 
@@ -38,11 +38,11 @@ class TeleoperationState(Record):
     command = array("n")
     """To the arm's joints."""
     goal = array(7)
-    """Of the tip, in the arm's base frame."""
+    """Goal of the tip, in the arm's base frame."""
     tip = array(7)
-    """Of the command, in the arm's base frame."""
+    """Tip at the command, in the arm's base frame."""
     hand = array(7)
-    """As the law has it: what is locked does not change."""
+    """Pose of the hand for the law: locked parts do not change."""
     rotation_locked = flag()
     translation_locked = flag()
     scale = number()
@@ -52,7 +52,7 @@ class TeleoperationState(Record):
     published_phase = integer(-1)
     """-1: none was published."""
     shared = flag()
-    """Whether the arm publishes its operating state, so that others may command it."""
+    """Whether the arm publishes an operating state and may have other clients."""
     relocked = flag()
     """Whether a lock was changed since the last reference."""
     jaw = array("jaw")
@@ -60,7 +60,7 @@ class TeleoperationState(Record):
 
 
 class Teleoperation(Controller):
-    """The hand `master` leads the tip by the pose law or the velocity law while it is engaged.
+    """The engaged hand `master` leads the tip by the pose law or the velocity law.
 
     Otherwise the arm holds.
     """
@@ -91,7 +91,7 @@ class Teleoperation(Controller):
             *(() if self._ghost is None else (self._ghost.state,)),
         )
         self._found = b""
-        """The command of which `tip` is the pose."""
+        """Bits of the command of `tip`."""
         self._outputs: dict[str, Any] = {"servo_jp": self._command, "goal_cp": self._goal}
         self._streams = {f"{params.arm}/servo_jp": self._command}
         if self._ghost is not None:
@@ -99,11 +99,11 @@ class Teleoperation(Controller):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The hand, its buttons, the arm and the `scale` in; commands, `contact` and events out."""
+        """Hand, buttons, arm and `scale` in; commands, `contact` and events out."""
         return teleoperation_ports(self.params)
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
-        """Start with the arm held where the parameters state it."""
+        """Start with the arm held at the position of the parameters."""
         self._stand_at(np.array(self.params.start), np.array([self.params.jaw, 0.0]))
         self._now.scale = self._now.requested_scale = self.params.scale
         self._outputs |= {
@@ -116,7 +116,7 @@ class Teleoperation(Controller):
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
-        """Let the command follow the hand while it leads; otherwise hold it."""
+        """Let the command follow the leading hand; otherwise hold the command."""
         self._receive(inputs)
         if not self._holds_command:
             self._stand_at(
@@ -146,15 +146,15 @@ class Teleoperation(Controller):
         return self._outputs
 
     def restore(self, state: bytes) -> None:
-        """Return to a saved state, whose pose of the tip is that of its command."""
+        """Return to a saved state, with the tip's pose at the saved command."""
         super().restore(state)
         self._found = self._command.tobytes()
 
     @property
     def _holds_command(self) -> bool:
-        """Whether the command stays what it was; otherwise it is set to where the arm is.
+        """Whether the command is held; otherwise set to the arm's measured positions.
 
-        An arm with a controller of its own may be moved by others meanwhile.
+        An arm with a controller of its own may be moved by another client meanwhile.
         """
         engagement, now = self._engagement, self._now
         return (
@@ -178,7 +178,7 @@ class Teleoperation(Controller):
                 self._ghost.press(pressed=joy.buttons[self.params.buttons.jaw] != 0)
 
     def _stand_at(self, positions: Vector, jaw: Vector) -> None:
-        """Set the command to where arm and jaw are, or as near to it as their ranges allow.
+        """Set the command to the measured positions of arm and jaw, clipped to their ranges.
 
         Both arrays begin with the positions.
         """
@@ -191,7 +191,7 @@ class Teleoperation(Controller):
             self._jaw[:1] = self._ghost.angle
 
     def _find_tip(self) -> None:
-        """Compute the pose of the tip from the command, unless that has the bits of the last time."""
+        """Compute the pose of the tip from the command, unless the command's bits are unchanged."""
         if (command := self._command.tobytes()) == self._found:
             return
         self._found = command
@@ -199,7 +199,7 @@ class Teleoperation(Controller):
         self._tip[:3], self._tip[3:] = tip[:3, 3], rotation.from_matrix(tip)
 
     def _set_scale(self, scale: float) -> list[str]:
-        """Set the scale; return why it is refused, once."""
+        """Set the scale; return the reason of a refusal, once."""
         is_new = scale != self._now.requested_scale
         if not is_new and scale == self._now.scale:
             return []
@@ -236,7 +236,7 @@ class Teleoperation(Controller):
         self._find_tip()
 
     def _lead_jaw(self, gripper: float, seconds: float, *, follows: bool) -> None:
-        """Let the jaw follow with the arm, and hold with it."""
+        """Let the jaw follow while the arm follows, and hold while the arm holds."""
         if self._ghost is None:
             return
         if follows:
@@ -246,7 +246,7 @@ class Teleoperation(Controller):
         self._jaw[:1] = self._ghost.angle
 
     def _publish(self, phase: Phase, warnings: list[str]) -> None:
-        """Publish what the arm does."""
+        """Publish the phase, the commands and warnings."""
         follows = phase is Phase.ENABLED
         self._goal[:] = self._law.goal if follows and self._law is not None else self._tip
         self._outputs["following"] = _FOLLOWS if follows else _HOLDS
@@ -259,12 +259,12 @@ class Teleoperation(Controller):
             self._now.published_phase = phase
 
     def _stream(self, header: Header, *, follows: bool) -> None:
-        """Send the commands to the arm's controller while it follows, otherwise nothing."""
+        """Send the commands to the arm's controller while the arm follows."""
         for port, positions in self._streams.items():
             self._outputs[port] = (_positions(positions, header),) if follows else ()
 
     def _feel(self, inputs: Inputs, to_base: Vector, header: Header, elapsed: float) -> ContactModel:
-        """Return what the hand feels, `elapsed` seconds after the last time."""
+        """Return the contact model for the hand, `elapsed` seconds after the last model."""
         hand, tip = inputs["master"], self._tip
         if self._law is None:  # as the hand's own frame is the tip's own
             to_base = rotation.product(tip[3:], rotation.conjugate(hand[3:] / np.linalg.norm(hand[3:])))
@@ -282,7 +282,7 @@ class Teleoperation(Controller):
 
 
 def _positions(values: Vector, header: Header) -> JointState:
-    """Return joint positions as a message, without validation: they are within the joints' ranges."""
+    """Return joint positions as a message, without validation: positions are within the joints' ranges."""
     return JointState.model_construct(
         header=header, name=[], position=values.copy(), velocity=_NONE, effort=_NONE
     )

@@ -1,8 +1,8 @@
-"""Whether the arm follows the hand: by buttons, the arm's operating state and the age of the hand's pose.
+"""Engagement of arm and hand: by buttons, the arm's operating state and the age of the hand's pose.
 
 After the states of mtsTeleOperationPSM.cpp (jhu-dvrk/sawIntuitiveResearchKit): the arm must be ENABLED and
-homed and the hand's pose be fresh; then the hand is aligned, then the arm follows. A clutch frees the hand,
-which is aligned again when it takes over. If any of these conditions ends, the arm holds.
+homed and the hand's pose be fresh; then the hand is aligned, then the arm follows. A clutch frees the hand;
+the hand is aligned again before taking over. If any of these conditions ends, the arm holds.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ __all__ = ["Engagement", "Phase"]
 
 
 class Phase(IntEnum):
-    """What the arm does."""
+    """Phase of the engagement."""
 
     DISABLED = 0
-    """It holds: it is not ready, or the hand's pose is not fresh."""
+    """The arm holds: not ready, or the hand's pose is not fresh."""
     CLUTCHED = 1
-    """It holds: the hand is free."""
+    """The arm holds: the hand is free."""
     ALIGNING = 2
-    """It holds until the hand is turned as it is."""
+    """The arm holds until the hand has the tip's orientation."""
     ENABLED = 3
-    """It follows."""
+    """The arm follows."""
 
 
 class EngagementState(Record):
-    """All that decides whether the arm follows, except the alignment gate."""
+    """State of the engagement, without the alignment gate."""
 
     phase = choice(Phase.DISABLED)
     pressed = flag()
@@ -43,7 +43,7 @@ class EngagementState(Record):
     interrupted = flag()
     """Whether the hand was free in this step."""
     not_ready = flag()
-    """Whether the arm has published that it is not ENABLED and homed."""
+    """Whether the arm has published a state other than ENABLED and homed."""
     lost = flag()
     """Whether the hand's pose was not fresh in the last step."""
 
@@ -58,18 +58,18 @@ class Engagement:
         self._now = EngagementState()
         self.state = (self._now,) if self._gate is None else (self._now, self._gate.state)
         self.takes_over = False
-        """Whether the arm begins to follow in this step, so that a reference must be taken."""
+        """Whether the arm begins to follow in this step and needs a reference."""
         self.warnings: list[str] = []
-        """Of the last step."""
+        """Warnings of the last step."""
 
     @property
     def phase(self) -> Phase:
-        """What the arm does in this step."""
+        """Phase in this step."""
         return self._now.phase
 
     @property
     def arm_is_ready(self) -> bool:
-        """Whether the arm is ENABLED and homed, as far as it has published it."""
+        """Whether the arm is ENABLED and homed, by the last published state."""
         return not self._now.not_ready
 
     def receive_state(self, message: OperatingState) -> None:
@@ -79,7 +79,7 @@ class Engagement:
     def receive_buttons(self, joy: Joy) -> None:
         """Read the clutch.
 
-        Pressed and released inside one step it still frees the hand; a Joy without its button changes
+        A press and release inside a step still frees the hand; a Joy without the clutch's button changes
         nothing.
         """
         if joy.buttons.size > self._clutch:
@@ -100,9 +100,9 @@ class Engagement:
             to_base: orientation of the master's base frame in the arm's, quaternion (x, y, z, w).
             hand: orientation of the master in its base frame, likewise.
             tip: orientation of the tip in the arm's base frame, likewise.
-            gripper: of the master, 0 closed .. 1 open; negative without one.
+            gripper: gripper of the master, 0 closed .. 1 open; negative: no gripper.
             h: the step, s.
-            fresh: whether the hand's pose is.
+            fresh: whether the hand's pose is fresh.
         """
         self.warnings = []
         now, before = self._now, self._now.phase

@@ -1,8 +1,8 @@
-"""The jaw, led by a gripper or a button through a ghost: an angle that limits how fast it opens and closes.
+"""The jaw, led by a gripper or a button through a ghost: an angle with limited speed of opening and closing.
 
-After jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp: the ghost starts where the jaw is and follows
-the gripper, slowly until it has caught up once, then quickly. So a hand that takes over with its gripper
-closed does not snap an open jaw shut, and one with its gripper open does not drop what the jaw holds.
+After jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp: the ghost starts at the jaw's angle and
+follows the gripper, slowly until having caught up once, then quickly. So taking over with a closed gripper
+does not snap an open jaw shut, and taking over with an open gripper does not drop a held object.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ __all__ = ["JawGhost"]
 _RATE, _RATE_UNTIL_CAUGHT_UP = radians(720.0), radians(36.0)
 """rad/s (mtsIntuitiveResearchKit.h: JawRate, 4 pi; JawRateAfterClutch, 0.2 pi)."""
 _CAUGHT_UP = radians(2.0)
-"""Distance at which the ghost has caught up (same file: JawDifferenceForCaughtUp)."""
+"""Largest distance of a ghost caught up with the gripper (same file: JawDifferenceForCaughtUp)."""
 _OPEN = radians(45.0)
 """Opening while the button is up (mtsTeleOperationPSM.cpp: of the jaw where the master has no gripper)."""
 
 
 class Button(IntEnum):
-    """What is known of the button."""
+    """Knowledge of the button."""
 
     UNTOUCHED = -1
     RELEASED = 0
@@ -32,7 +32,7 @@ class Button(IntEnum):
 
 
 class JawState(Record):
-    """All of the ghost that changes."""
+    """State of the ghost."""
 
     angle = number()
     """rad."""
@@ -41,7 +41,7 @@ class JawState(Record):
 
 
 class JawGhost:
-    """The angle that is commanded to the jaw."""
+    """The commanded angle of the jaw."""
 
     def __init__(self, jaw: Jaw) -> None:
         self._lower, self._upper = jaw.lower, jaw.upper
@@ -53,12 +53,12 @@ class JawGhost:
         return self.state.angle
 
     def stand_at(self, angle: float) -> None:
-        """Start from `angle` (rad), or as near to it as the jaw's range allows."""
+        """Start from `angle` (rad), clipped to the jaw's range."""
         self.state.angle = min(max(angle, self._lower), self._upper)
         self.state.caught_up = False
 
     def press(self, *, pressed: bool) -> None:
-        """Note whether the button is down; until it was pressed once, it does not command the jaw."""
+        """Note whether the button is down; the button commands the jaw from the first press on."""
         if pressed or self.state.button is not Button.UNTOUCHED:
             self.state.button = Button(pressed)
 
@@ -67,10 +67,10 @@ class JawGhost:
         self.state.caught_up = False
 
     def follow(self, gripper: float, h: float) -> None:
-        """Follow the gripper, 0 closed .. 1 open, for `h` seconds, or the button if that is negative.
+        """Follow the gripper, 0 closed .. 1 open, for `h` seconds, or the button for a negative gripper.
 
-        Closed is the lower end of the jaw's range, where the fingers press on what is between them. Until the
-        button is pressed the jaw stays.
+        Closed is the lower end of the jaw's range, with fingers pressing on each other or on an object. Until
+        the first press of the button the jaw stays.
         """
         if gripper >= 0.0:
             goal = self._lower + min(gripper, 1.0) * (self._upper - self._lower)

@@ -22,14 +22,14 @@ def _orientation(data: dict[str, Any]) -> str:
 
 
 def _held(data: dict[str, Any]) -> str:
-    """Return what the led arm holds by `arms`, where they name it."""
+    """Return the led arm's instrument by `arms`, if named there."""
     arms: Arms | None = data["arms"]
     led = None if arms is None else arms.driven.get(data["arm"])
     return led.instrument if isinstance(led, PsmTool) else DEFAULT_INSTRUMENT
 
 
 class Buttons(Params):
-    """Which button of the hand does what, counted from 0."""
+    """Functions of the hand's buttons, counted from 0."""
 
     clutch: int = Field(
         default=0,
@@ -45,7 +45,7 @@ class Buttons(Params):
 
 
 class _LedArm(Params):
-    """Which arm is led; a base, so that the arms are validated before what is taken from them."""
+    """The led arm; a base class, so the arms are validated before values are taken from the arms."""
 
     arms: Arms | None = Field(
         default=None, description="as in the motion controller; they say what the led arm holds"
@@ -54,7 +54,7 @@ class _LedArm(Params):
 
 
 class TeleoperationParams(PsmTool, _LedArm):
-    """How a hand leads an arm; the fingers of a hand that it may hold stay folded."""
+    """Leading of an arm by a hand; the fingers of a MUSHA hand on the arm stay folded."""
 
     open_to_pages: ClassVar[bool] = True
 

@@ -1,4 +1,4 @@
-"""The ports of a teleoperation: a hand and its buttons, the arm, and what the hand is to feel."""
+"""The ports of a teleoperation: hand and buttons, arm, and contact for the hand."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from schemas.trocar_msgs import ContactModel
 __all__ = ["NO_GRIPPER", "teleoperation_ports"]
 
 NO_GRIPPER = -1.0
-"""Of `gripper`, while nothing is connected: the button leads the jaw."""
+"""Value of an unconnected `gripper`: the button leads the jaw."""
 
 
 def teleoperation_ports(params: TeleoperationParams) -> tuple[Port, ...]:
-    """Return the ports of a hand that leads an arm."""
+    """Return the ports of a hand leading an arm."""
     return (*_hand(params), *_arm(params), *_jaw(params), *_streams(params), *_published(params))
 
 

@@ -1,15 +1,15 @@
-"""The pose law: the tip moves as the hand does, scaled, and turns with it, relative to a reference.
+"""The pose law: the tip follows translation (scaled) and rotation of the hand, relative to a reference.
 
 As on the real dVRK (jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp, RunEnabled), with x and H
-position and orientation of the hand in its base frame, p and P those of the tip in the arm's, R the
-orientation of the one frame in the other, s the scale, and 0 for the reference:
+position and orientation of the hand in the hand's base frame, p and P of the tip in the arm's base frame, R
+the orientation of the hand's base in the arm's, s the scale, and 0 for the reference:
 
     p = p0 + s R (x - x0),    P = R H A0  with  A0 = (R H0)' P0.
 
-A reference is taken from where hand and command are whenever the hand takes over, and from the *last* hand
-and goal when scale or view change while it leads: so no change moves the tip, and no motion of the hand is
-lost. It is also taken again while the tip, at a limit of its joints, is turned too far away from the goal:
-past half a turn the nearest way there is the other way round.
+A reference is taken from hand and command whenever the hand takes over, and from the *last* hand and goal
+when scale or view change during leading: so no change moves the tip, and no motion of the hand is lost. A
+reference is also taken while the tip, at a limit of its joints, is turned too far away from the goal: past
+half a turn the nearest rotation is the opposite.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ from schemas.vectors import Vector
 __all__ = ["PoseLaw"]
 
 _MOST_LAG = radians(90.0)
-"""Of the tip's orientation behind its goal: half of where it would turn round; ours."""
+"""Largest lag of the tip's orientation behind the goal: half of the angle of reversal; ours."""
 _LITTLE_LAG = 0.75
-"""Cosine of half an angle well below that."""
+"""Cosine of half an angle well below the largest lag."""
 
 
 class PoseLawState(Record):
     """The goal and the reference; poses are (x, y, z, qx, qy, qz, qw)."""
 
     goal = array(7)
-    """Of the tip, in the arm's base frame."""
+    """Goal of the tip, in the arm's base frame."""
     hand_reference = array(7)
     tip_reference = array(7)
     hand = array(7)
-    """Newest pose of the hand, in its base frame."""
+    """Newest pose of the hand, in the hand's base frame."""
     to_base = array(4)
     """Orientation of the hand's base frame in the arm's."""
     scale = number()
@@ -52,9 +52,9 @@ class PoseLaw:
     """From poses of the hand to joint positions."""
 
     def __init__(self, chain: SerialChain, *, turns: bool, frames: LastFrames | None = None) -> None:
-        """Take the arm's kinematics, and whether the tip turns with the hand or keeps its orientation.
+        """`turns`: the tip turns with the hand, otherwise keeps its orientation.
 
-        `frames` are those of the command, where somebody else reads them too.
+        `frames`: frames of the command, if shared with other readers.
         """
         self._chain, self._turns, self._frames = chain, turns, frames or LastFrames(chain)
         self.state = PoseLawState()
@@ -62,16 +62,16 @@ class PoseLaw:
         self._hand0, self._tip0 = self.state.hand_reference, self.state.tip_reference
         self.goal[6] = self._to_base[3] = 1.0
         self._found: tuple[bytes, ...] = ()
-        """The reference that the next two follow from."""
+        """Bits of the reference of the next two values."""
         self._turn_to_base, self._offset = np.eye(3), np.zeros(4)
 
     def engage(self, hand: Vector, tip: Vector, to_base: Vector, scale: float) -> None:
         """Take the reference: the hand at `hand` is the tip at `tip`, both (x, y, z, qx, qy, qz, qw).
 
         Args:
-            hand: in the hand's base frame.
-            tip: at the command, in the arm's base frame.
-            to_base: orientation of the one frame in the other, quaternion.
+            hand: pose in the hand's base frame.
+            tip: pose at the command, in the arm's base frame.
+            to_base: orientation of the hand's base frame in the arm's, quaternion.
             scale: metres of the tip per metre of the hand.
         """
         self._hand0[:] = self._hand[:] = hand
@@ -81,9 +81,9 @@ class PoseLaw:
     def step(
         self, command: Vector, hand: Vector, tip: Vector, to_base: Vector, scale: float, largest_move: Vector
     ) -> Vector:
-        """Return the joint positions, shape (n,), that follow `command` with the hand at `hand`.
+        """Return the joint positions, shape (n,), after `command` with the hand at `hand`.
 
-        Arguments are those of `engage` and `robots.inverse_kinematics.pursue`.
+        Arguments as of `engage` and `robots.inverse_kinematics.pursue`.
         """
         seen = to_base.tobytes()
         if scale != self.state.scale or (
@@ -103,9 +103,9 @@ class PoseLaw:
         return pursue(self._chain, command, goal[:3], goal[3:], largest_move, self._frames)
 
     def _find_offset(self, to_base: Vector, seen: bytes) -> None:
-        """Compute what follows from the reference, unless that has the bits of the last time.
+        """Compute the values derived from the reference, unless the reference's bits are unchanged.
 
-        `seen` are the bits of `to_base`, which may differ from those in the state by a sign of zero.
+        `seen`: bits of `to_base`, different from the bits in the state by a sign of zero at most.
         """
         reference = seen, self._to_base.tobytes(), self._hand0.tobytes(), self._tip0.tobytes()
         if reference == self._found:
@@ -115,7 +115,7 @@ class PoseLaw:
         self._offset = rotation.product(rotation.conjugate(hand0), self._tip0[3:])
 
     def _limit_lag(self, hand: Vector, tip: Vector, to_base: Vector, scale: float) -> None:
-        """Bring the goal's orientation back to where it is not too far from the tip's, as a new reference."""
+        """Bring the goal's orientation back near to the tip's, as a new reference."""
         lag = rotation.log(rotation.product(self.goal[3:], rotation.conjugate(tip[3:])))
         if (angle := sqrt(lag.dot(lag))) > _MOST_LAG:
             self.goal[3:] = rotation.product(rotation.exp(lag * (_MOST_LAG / angle)), tip[3:])

@@ -1,4 +1,4 @@
-"""The velocity law: the twist of the hand, in its own frame, is that of the instrument's tip in its own.
+"""The velocity law: the twist of the tip in the tip's frame equals the twist of the hand in the hand's frame.
 
 After Ferro et al., "A Portable da Vinci Simulator in Virtual Reality", IEEE International Conference on
 Robotic Computing, 2019: with v_G the twist of the gripper in its own frame and J_G the Jacobian there, dq/dt
@@ -24,18 +24,19 @@ _LENGTH = 0.1
 """Weighs orientation against position: 1 rad counts as much as 0.1 m, as in `robots.inverse_kinematics`."""
 _WEIGHTS = np.array([1.0, 1.0, 1.0, _LENGTH, _LENGTH, _LENGTH])
 _EPSILON = _LARGEST_DAMPING = 0.004
-"""m, of the weighted Jacobian; ours: a tip that creeps at 6 mm/s in the worst direction takes pitch and yaw
-to their 90 degrees a second. In 9 % of configurations drawn from a PSM's ranges sigma is smaller, near the
-remote centre and at wrists bent by nearly right angles; at home it is 0.061.
+"""Threshold epsilon and largest damping of the weighted Jacobian, m; ours: a tip creeping at 6 mm/s in the
+worst direction takes pitch and yaw to their 90 degrees a second. In 9 % of configurations drawn from a PSM's
+ranges sigma is smaller, near the remote centre and at wrists bent by nearly right angles; at home sigma is
+0.061.
 """
 
 
 def twist_in_tip(hand: Vector, twist: Vector, scale: float) -> Vector:
-    """Return the twist (6,) of the tip in its own frame, m/s and rad/s.
+    """Return the twist (6,) of the tip in the tip's frame, m/s and rad/s.
 
     Args:
-        hand: orientation of the hand in its base frame, quaternion (x, y, z, w).
-        twist: of the hand (6,) in its base frame: velocity of its origin, then angular velocity.
+        hand: orientation of the hand in the hand's base frame, quaternion (x, y, z, w).
+        twist: twist of the hand (6,) in the hand's base frame: velocity of the origin, then angular velocity.
         scale: metres of the tip per metre of the hand.
     """
     to_hand = rotation.matrix(hand / np.linalg.norm(hand)).T
@@ -43,17 +44,17 @@ def twist_in_tip(hand: Vector, twist: Vector, scale: float) -> Vector:
 
 
 def joint_velocities(jacobian: Vector, twist: Vector) -> Vector:
-    """Return dq/dt, shape (n,), for the twist (6,) of the tip, from the Jacobian (6, n), in its own frame."""
+    """Return dq/dt, shape (n,), for the twist (6,) of the tip and the Jacobian (6, n), in the tip's frame."""
     u, sigma, vt = np.linalg.svd(_WEIGHTS[:, None] * jacobian, full_matrices=False)
     damping = max(0.0, 1.0 - (float(sigma[-1]) / _EPSILON) ** 2) * _LARGEST_DAMPING**2
     return vt.T @ (sigma / (sigma**2 + damping) * (u.T @ (_WEIGHTS * twist)))
 
 
 def advance(chain: SerialChain, q: Vector, twist: Vector, h: float) -> Vector:
-    """Return the joint positions, shape (n,), after `h` seconds with the twist (6,) of the tip in its frame.
+    """Return the joint positions, shape (n,), after `h` seconds with the twist (6,) in the tip's frame.
 
-    Joints that would leave their range go to its end, and the others do what they can without them; all slow
-    down together so that none is faster than it may be. What is cut is not made up for later.
+    Joints about to leave their range stop at its end, and the remaining joints correct as far as possible;
+    all slow down together to respect every velocity limit. Lost motion is not made up for later.
     """
     jacobian = chain.jacobian(chain.frames(q), frame="tip")
     least, most = (chain.lower - q) / h, (chain.upper - q) / h

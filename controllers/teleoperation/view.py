@@ -1,15 +1,15 @@
-"""The hand's frame in the arm's: what right, up and away on the desk are for the instrument.
+"""The hand's frame in the arm's: right, up and away on the desk as directions of the instrument.
 
-Three frames: the *desk*, in which a device measures the hand (REP 103 as the user sits before it: x away, y
-left, z up); the *camera*, the ECM's tip frame, in which `base_in_view` is; and the *view*, the
-frame of the picture as the surgeon sees it: x left, y up, z ahead (docs/decisions/0013). With `view: camera`
+Three frames: the *desk*, frame of a device's measurements (REP 103 for a user sitting at the desk: x away, y
+left, z up); the *camera*, the ECM's tip frame, reference of `base_in_view`; and the *view*, the frame of the
+surgeon's picture: x left, y up, z ahead (docs/decisions/0013). With `view: camera`
 
     R_base<-hand = R_camera<-base^T  R_camera<-view  R_view<-desk  R_desk<-hand,
 
-so that a motion to the right on the desk is one to the right in the picture; on the real system both
+so a motion to the right on the desk is a motion to the right in the picture; on the real system both
 consoles' and arms' base frames are set to the same effect (jhu-dvrk/sawIntuitiveResearchKit,
-mtsIntuitiveResearchKitSUJ.cpp: PSM base frames are in the camera's frame). Its masters publish their poses in
-the display's frame, whose axes correspond to those of the camera's: with `view: display`
+mtsIntuitiveResearchKitSUJ.cpp: PSM base frames are in the camera's frame). The real masters publish their
+poses in the display's frame, with the axes of the camera's frame: with `view: display`
 
     R_base<-hand = R_camera<-base^T  R_display<-hand.
 """
