@@ -41,6 +41,8 @@ class Console:
         compute: to compile a model stops all threads for up to 0.1 s."""
         if isinstance(source, Live):
             source.left_out = self.started.pids
+        self.reading = asyncio.Lock()
+        """Held while a page reads an instant of the past."""
         self._stage: Stage | None = None
         self._generation = -1
         self._making = asyncio.Lock()

@@ -279,8 +279,13 @@ class Page:
                 self._changed.clear()
             if self._stage is None or self._number - self._acknowledged >= _MOST_WAITING:
                 continue
-            sections = self._new.make(self._stage, self._show, self._at_ns)
-            if sections:
+            at_ns, new = self._at_ns, self._new
+            if live and at_ns is None:
+                sections = new.make(self._stage, self._show, None)
+            else:
+                async with self._console.reading:  # files are read beside the pages that lead, one at a time
+                    sections = await asyncio.to_thread(new.make, self._stage, self._show, at_ns)
+            if sections and new is self._new:
                 self._number += 1
-                at = self._new.time_ns if self._at_ns is None else self._at_ns
+                at = new.time_ns if at_ns is None else at_ns
                 await self._socket.send_bytes(frame(self._number, at, sections))

@@ -6,7 +6,7 @@ import gzip
 import json
 import logging
 import struct
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib.metadata import entry_points
 from typing import Any
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hub.participant import Params
 from hub.participant.view import Rgb, Scene
 from schemas.codec import decode
+from schemas.message import Message
 from schemas.ros import CompressedImage
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import ShownMarkers, SoftBodyState
@@ -36,6 +37,8 @@ log = logging.getLogger(__name__)
 GROUP = "trocar.scenes"
 """Entry-point group: kind of participant -> what makes its scene of its parameters."""
 _LENGTH = struct.Struct("<I")
+_FLESH: Rgb = (0.8, 0.38, 0.33)
+"""Colour of a surface that no scene has."""
 _GRID_M = 2.0**-16
 """Vertices are rounded to 15 um: it is not seen, and zeros at their ends compress."""
 
@@ -54,32 +57,18 @@ class Stage:
         self.scenes: dict[str, Scene] = {}
         """By participant, those with something to draw."""
         self._outlets = {one.name: one for one in outlets}
-        colours: dict[str, Rgb] = {}
-        for participant, spec in scenario.participants.items():
-            scene = self._scene(participant, spec.kind, params)
-            if scene is not None:
-                colours |= {f"{participant}.{port}": rgb for port, rgb in scene.surfaces.items()}
-                if scene.bodies:
-                    self.scenes[participant] = scene
+        colours = self._draw(scenario, params)
         signals = [one for one in outlets if one.port.variability == "signal"]
-        self.surfaces = {
-            one.name: colours.get(one.name, (0.8, 0.38, 0.33))
-            for one in signals
-            if one.port.type == SoftBodyState.ros_type
-        }
+        self.surfaces = {name: colours.get(name, _FLESH) for name in _of_type(signals, SoftBodyState)}
         """Colour of each soft surface, by the outlet of its nodes."""
-        self.markers = tuple(one.name for one in outlets if one.port.type == ShownMarkers.ros_type)
-        self.pictures = tuple(one.name for one in outlets if one.port.type == CompressedImage.ros_type)
+        self.markers = _of_type(outlets, ShownMarkers)
+        self.pictures = _of_type(outlets, CompressedImage)
         self.numbers = {one.name: VectorCodec(one.port) for one in signals if has_vector(one.port.type)}
         """The numeric outlets."""
         self.gauges = {one.name: GAUGES[one.port.type] for one in signals if one.port.type in GAUGES}
         """The outlets of the hub that can be plotted too."""
-        self._codecs = {
-            f"{participant}.{port}": self.numbers[f"{participant}.{port}"]
-            for participant, scene in self.scenes.items()
-            for port in scene.inputs
-            if f"{participant}.{port}" in self.numbers
-        }
+        drawn = {name for participant in self.scenes for name in self.inputs(participant)}
+        self._codecs = {name: codec for name, codec in self.numbers.items() if name in drawn}
         self.arrows = bond_arrows(scenario, self.numbers)
         self.felt = felt_wrenches(scenario, self.numbers)
         """By device that pages lead: the wrenches on the instruments that it moves."""
@@ -87,6 +76,17 @@ class Stage:
         of_arrows = (name for bond in self.arrows for name in bond)
         self.shown = frozenset((*self._codecs, *self.surfaces, *self.markers, *of_arrows, *of_hands))
         """The outlets that the scene itself needs."""
+
+    def _draw(self, scenario: Scenario, params: Callable[[str], Params]) -> dict[str, Rgb]:
+        """Make the scenes, and return the colours of their surfaces by outlet."""
+        colours: dict[str, Rgb] = {}
+        for participant, spec in scenario.participants.items():
+            scene = self._scene(participant, spec.kind, params)
+            if scene is not None:
+                colours |= {f"{participant}.{port}": rgb for port, rgb in scene.surfaces.items()}
+                if scene.bodies:
+                    self.scenes[participant] = scene
+        return colours
 
     def _scene(self, participant: str, kind: str, params: Callable[[str], Params]) -> Scene | None:
         for entry in entry_points(group=GROUP, name=kind):
@@ -236,6 +236,11 @@ class Stage:
         text = json.dumps(described, separators=(",", ":")).encode()
         text += b" " * (-(len(text) + _LENGTH.size) % 4)
         return _LENGTH.pack(len(text)) + text + bytes(blob)
+
+
+def _of_type(outlets: Iterable[Outlet], message: type[Message]) -> tuple[str, ...]:
+    """Return the names of the outlets that publish messages of a type."""
+    return tuple(one.name for one in outlets if one.port.type == message.ros_type)
 
 
 def _parts(scene: Scene, blob: bytearray) -> Iterator[dict[str, Any]]:

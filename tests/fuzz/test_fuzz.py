@@ -21,6 +21,7 @@ pytestmark = [
         ("meshes", ("--number", "400")),
         ("fmus", ("--number", "150")),
         ("ros", ("--number", "40")),
+        ("page", ("--number", "300")),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

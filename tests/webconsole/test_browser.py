@@ -1,13 +1,15 @@
 """The page in a real browser: what it draws, says and sends."""
 
+import asyncio
 import http.client
 import json
 import os
 import re
 import signal
+import struct
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import AsyncExitStack, contextmanager
 from io import BytesIO
 
 import numpy as np
@@ -18,10 +20,12 @@ from websockets.asyncio.client import connect
 from tests.waiting import until
 from tests.webconsole.conftest import CHROMIUM, finish, served
 from tests.webconsole.recorded_scene import EYES, write_scene
+from webconsole.frame import sections
 from webconsole.listening import on_loopback
 from webconsole.live import Live
 from webconsole.recorded import Recorded
 
+LED = [{"device": "hand", "pilot": "you"}]
 TIP = "trocar.scene.tips[0].axes.parent.position.toArray()"
 GAMEPAD = """
 let pressed = 0
@@ -241,13 +245,19 @@ def test_a_hub_that_is_gone_is_said_and_its_successor_is_shown(browser, tmp_path
         one.context.close()
 
 
-def inviter(link):
-    """Return what makes links of a server, by the first one that it has printed."""
-    host, path = re.fullmatch(r"http://([^/]+)(/.*)", link).groups()
+def cookie_of(host, path):
+    """Return the cookie of a browser that opens a link."""
     connection = http.client.HTTPConnection(host)
     connection.request("GET", path)
     cookie = connection.getresponse().headers["Set-Cookie"].partition(";")[0]
     connection.close()
+    return cookie
+
+
+def inviter(link):
+    """Return what makes links of a server, by the first one that it has printed."""
+    host, path = re.fullmatch(r"http://([^/]+)(/.*)", link).groups()
+    cookie = cookie_of(host, path)
 
     async def invite(role):
         headers = {"Cookie": cookie, "Origin": f"http://{host}"}
@@ -447,6 +457,72 @@ def test_the_past_of_the_running_session_is_shown_until_live_is_chosen(browser, 
     one.sees(f"trocar.time > {time} + 0.5")
     assert one.errors == []
     one.context.close()
+
+
+class Looker:
+    """A page without a browser: it acknowledges each frame, and keeps what it gets."""
+
+    def __init__(self, socket):
+        self.socket, self.times, self.state, self.errors = socket, [], {"pilots": []}, []
+
+    async def read(self):
+        async for message in self.socket:
+            if isinstance(message, bytes):
+                number, time_ns, _ = sections(message)
+                await self.socket.send(struct.pack("<I", number))
+                self.times.append(time_ns)
+                continue
+            content = json.loads(message)
+            if content["is"] == "state":
+                self.state = content
+            self.errors += [content["error"]] if "error" in content else []
+
+    async def send(self, **command):
+        await self.socket.send(json.dumps(command))
+
+
+def test_a_viewer_who_looks_at_the_past_leaves_the_leading_page_in_the_present(session):
+    """The viewer moves through the past as fast as it may; the other page leads on, and sees the present."""
+    _, invite = session
+
+    async def opened(stack, role):
+        host, path = re.fullmatch(r"http://([^/]+)(/.*)", await asyncio.to_thread(invite, role)).groups()
+        headers = {"Cookie": await asyncio.to_thread(cookie_of, host, path), "Origin": f"http://{host}"}
+        url = f"ws://{host}/page"
+        page = Looker(
+            await stack.enter_async_context(
+                connect(url, additional_headers=headers, origin=None, max_size=None)
+            )
+        )
+        reading = asyncio.create_task(page.read())
+        stack.callback(reading.cancel)
+        return page
+
+    async def true(condition):
+        while not condition():
+            await asyncio.sleep(0.01)
+
+    async def body():
+        async with asyncio.timeout(100), AsyncExitStack() as stack:
+            leader, viewer = await opened(stack, "operator"), await opened(stack, "viewer")
+            await true(lambda: leader.state["pilots"])  # the device takes part once the scene is made
+            await leader.send(do="lead", device="hand")
+            await true(lambda: leader.state["pilots"] == LED and viewer.state.get("end", 0.0) > 1.0)
+            seen, number = len(leader.times), 0
+            while leader.times[-1] < leader.times[seen - 1] + 500_000_000 or number < 300:
+                await viewer.send(do="at", time=0.2 + number % 80 / 100)
+                await leader.send(do="hand", number=number, dead_man=True)
+                await asyncio.sleep(0.004)
+                number += 1
+            assert leader.times == sorted(leader.times), "the present alone"
+            assert leader.state["pilots"] == LED
+            assert leader.errors == viewer.errors == []
+            await true(lambda: viewer.times[-1] < 1_100_000_000)
+            await leader.send(do="at", time=0.5)
+            await true(lambda: leader.errors)
+            assert "who leads a device sees what runs now" in leader.errors[0]
+
+    finish(body())
 
 
 def still(person):
