@@ -8,7 +8,7 @@ the covariance grows.
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Any, ClassVar, cast
+from typing import ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,9 @@ from controllers.needle_tracker.params import TrackerParams
 from controllers.needle_tracker.ports import tracker_ports
 from controllers.needle_tracker.segmentation import Region, detected, region_about
 from controllers.needle_tracker.tracking import Belief, Settings, followed
-from controllers.opencv import opencv, pixels
+from controllers.pictures import PictureController
 from controllers.ports import CAMERA
 from hub.participant import (
-    Controller,
     Inputs,
     Outputs,
     Params,
@@ -105,11 +104,12 @@ class TrackerState(Record):
     """Width and height of the eyes' pictures, px."""
 
 
-class NeedleTracker(Controller):
+class NeedleTracker(PictureController):
     """One needle in one gripper, seen by one eye or two."""
 
     params_model: ClassVar[type[Params]] = TrackerParams
     params: TrackerParams
+    kind = "needle-tracker"
 
     def __init__(self, name: str, params: TrackerParams) -> None:
         super().__init__(name, params)
@@ -128,8 +128,6 @@ class NeedleTracker(Controller):
         )
         self._now = TrackerState()
         self.keep(self._now)
-        self._warnings: list[StringMessage] = []
-        self._cv2: Any = None
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -138,7 +136,7 @@ class NeedleTracker(Controller):
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Start with the grasp that the parameters state. Raises MissingExtraError without OpenCV."""
-        self._cv2 = opencv(f"participant '{self.name}' (kind needle-tracker)")
+        self._load_opencv()
         grasp, now = self.params.grasp, self._now
         now.pose[:] = pose_to_matrix(np.array([*grasp.position, *grasp.orientation]))
         deviations = np.repeat([grasp.position_deviation, grasp.angle_deviation], 3)
@@ -161,7 +159,7 @@ class NeedleTracker(Controller):
         self._calibrate(inputs)
         pictures = self._pictures(inputs)
         overlay = self._follow(pictures, h * 1e-9)
-        if now.picture_ns < 0 or t - now.picture_ns > self.params.max_age:
+        if self._is_blind(t, now.picture_ns):
             now.phase = Phase.BLIND
         elif pictures:
             now.phase = Phase.TRACKING if now.seen else Phase.PREDICTING
@@ -194,13 +192,8 @@ class NeedleTracker(Controller):
             return found
         taken = max(image.header.stamp.ns for _, image in newest)
         for i, image in newest:
-            picture = pixels(image)
-            if picture is None or picture.shape[1::-1] != tuple(now.sizes[i]):
-                self._warn(
-                    f"a picture of {image.width} x {image.height} ({image.encoding}) is refused: camera_info"
-                    f" states {now.sizes[i, 0]:g} x {now.sizes[i, 1]:g}, and rgb8 or bgr8 is needed"
-                )
-            elif image.header.stamp.ns == taken:
+            picture = self._accepted_pixels(image, *now.sizes[i].tolist())
+            if picture is not None and image.header.stamp.ns == taken:
                 found[i] = picture
         if found:
             now.picture_ns = taken
@@ -245,9 +238,6 @@ class NeedleTracker(Controller):
         now = self._now
         kept = min(now.steps, _KEPT)
         return now.grippers[int(np.argmin(abs(now.at[:kept] - seconds)))]
-
-    def _warn(self, text: str) -> None:
-        self._warnings.append(StringMessage(data=text))
 
     def _outputs(
         self, t: int, in_base: Vector, in_camera: Vector, before: Phase, overlay: tuple[Image, ...]

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from controllers.opencv import opencv, pixels
+from controllers.pictures import PictureController
 from controllers.visual_servoing.blobs import find_blobs
 from controllers.visual_servoing.camera import kept_view
 from controllers.visual_servoing.law import Limits, joint_velocities
@@ -21,7 +21,6 @@ from controllers.visual_servoing.params import ServoingParams
 from controllers.visual_servoing.ports import servoing_ports
 from controllers.visual_servoing.target import recognised
 from hub.participant import (
-    Controller,
     Inputs,
     Outputs,
     Params,
@@ -96,11 +95,12 @@ class ServoingState(Record):
     started = flag()
 
 
-class VisualServoing(Controller):
+class VisualServoing(PictureController):
     """One endoscope, one target of four discs."""
 
     params_model: ClassVar[type[Params]] = ServoingParams
     params: ServoingParams
+    kind = "visual-servoing"
 
     def __init__(self, name: str, params: ServoingParams) -> None:
         super().__init__(name, params)
@@ -108,8 +108,6 @@ class VisualServoing(Controller):
         self._points = np.column_stack([np.array(params.points), np.zeros(4)])  # (4, 3)
         self._now = ServoingState()
         self.keep(self._now)
-        self._warnings: list[StringMessage] = []
-        self._cv2: Any = None
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -118,7 +116,7 @@ class VisualServoing(Controller):
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Start with the arm held where the parameters state it. Raises MissingExtraError without OpenCV."""
-        self._cv2 = opencv(f"participant '{self.name}' (kind visual-servoing)")
+        self._load_opencv()
         now = self._now
         now.command[0], now.goal[:] = self.params.start, self.params.goal
         now.features[:], now.pose[6] = now.goal, 1.0
@@ -172,12 +170,8 @@ class VisualServoing(Controller):
             return
         image = cast("Image", pictures[-1])
         fx, fy, cx, cy, width, height = now.camera.tolist()
-        picture = pixels(image)
-        if picture is None or picture.shape[:2] != (height, width):
-            self._warn(
-                f"a picture of {image.width} x {image.height} ({image.encoding}) is refused: camera_info"
-                f" states {width:g} x {height:g}, and rgb8 or bgr8 is needed"
-            )
+        picture = self._accepted_pixels(image, width, height)
+        if picture is None:
             return
         now.picture_ns = image.header.stamp.ns
         intrinsics = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
@@ -193,7 +187,7 @@ class VisualServoing(Controller):
         now = self._now
         if not (now.ready and now.started):
             return Phase.WAITING
-        if now.picture_ns < 0 or t - now.picture_ns > self.params.max_age:
+        if self._is_blind(t, now.picture_ns):
             return Phase.BLIND
         if not now.seen:
             return Phase.SEARCHING
@@ -228,9 +222,6 @@ class VisualServoing(Controller):
         now, chain = self._now, self._chain
         view = kept_view(now.camera, self.params.radius / float(depths.min()), self.params.margin)
         return Limits(chain.lower, chain.upper, chain.velocity, view, _APPROACH)
-
-    def _warn(self, text: str) -> None:
-        self._warnings.append(StringMessage(data=text))
 
     def _outputs(self, before: Phase) -> Outputs:
         now = self._now
