@@ -13,7 +13,19 @@ from engines.mujoco.markers.frames import SceneFrames, frame_names
 from engines.mujoco.markers.store import MarkerStore
 from engines.mujoco.params import SceneParams
 from engines.mujoco.ports import position_count
-from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
+from hub.participant import (
+    Inputs,
+    Outputs,
+    Params,
+    Setup,
+    Stepped,
+    Value,
+    event_in,
+    event_out,
+    signal_in,
+    signal_out,
+    state_hash,
+)
 from schemas.codec import decode, encode
 from schemas.errors import MessageError, MissingExtraError, StateError
 from schemas.ports import Port
@@ -61,35 +73,17 @@ class Markers(Stepped):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Messages in, of any number of sources, and `qpos`; what is shown and what was rejected out."""
+        size, add = (
+            position_count(self.params),
+            "to add, change and delete; frames: " + ", ".join(self._frames),
+        )
+        qpos = "joint positions of the scene, as the mujoco engine publishes them"
+        period_ns, shown = self.params.publish_period, "all markers, for cameras"
         return (
-            Port(
-                name="qpos",
-                causality="input",
-                size=position_count(self.params),
-                description="joint positions of the scene, as the mujoco engine publishes them",
-            ),
-            Port(
-                name="markers",
-                causality="input",
-                type=MarkerArray.ros_type,
-                variability="event",
-                description="to add, change and delete; frames: " + ", ".join(self._frames),
-            ),
-            Port(
-                name="shown",
-                causality="output",
-                type=ShownMarkers.ros_type,
-                frame="world",
-                period_ns=self.params.publish_period,
-                description="all markers, for cameras",
-            ),
-            Port(
-                name="error",
-                causality="output",
-                type=StringMessage.ros_type,
-                variability="event",
-                description="which markers were rejected, and why",
-            ),
+            signal_in("qpos", description=qpos, size=size),
+            event_in("markers", MarkerArray, add),
+            signal_out("shown", ShownMarkers, shown, frame="world", period_ns=period_ns),
+            event_out("error", StringMessage, "which markers were rejected, and why"),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002

@@ -20,7 +20,7 @@ from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.skins import SoftBody
 from engines.mujoco.ports import position_count
-from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, event_out, signal_in, state_hash
 from robots.dvrk.endoscope import EYES, Eye, StereoCamera
 from schemas.codec import decode, encode
 from schemas.errors import MessageError, MissingExtraError, StateError
@@ -56,13 +56,7 @@ class Endoscope(Stepped):
         if params.images in ("compressed", "both"):
             kinds["image_raw/compressed"] = CompressedImage
         self._pictures = tuple(
-            Port(
-                name=f"{eye}/{kind}",
-                causality="output",
-                type=model.ros_type,
-                variability="event",
-                frame=self._frame,
-            )
+            event_out(f"{eye}/{kind}", model, frame=self._frame)
             for eye in EYES
             for kind, model in kinds.items()
         )
@@ -76,30 +70,12 @@ class Endoscope(Stepped):
         The outputs have ROS's names. Pictures are events: the first is published at the first step, and none
         on a machine without OpenGL.
         """
-        qpos = Port(
-            name="qpos",
-            causality="input",
-            size=self._positions.size,
-            description="joint positions of the scene, as the mujoco engine publishes them",
-        )
+        positions = "joint positions of the scene, as the mujoco engine publishes them"
         nodes = "positions of the nodes of a soft body; the first message brings its surface"
-        bodies = (
-            Port(
-                name=f"{organ}/nodes",
-                causality="input",
-                type=SoftBodyState.ros_type,
-                frame="world",
-                description=nodes,
-            )
-            for organ in self._bodies
-        )
-        markers = Port(
-            name="markers",
-            causality="input",
-            type=ShownMarkers.ros_type,
-            frame="world",
-            description="all markers to draw, as a participant of kind `markers` publishes them",
-        )
+        shown = "all markers to draw, as a participant of kind `markers` publishes them"
+        qpos = signal_in("qpos", description=positions, size=self._positions.size)
+        bodies = (signal_in(f"{organ}/nodes", SoftBodyState, nodes, frame="world") for organ in self._bodies)
+        markers = signal_in("markers", ShownMarkers, shown, frame="world")
         return (qpos, *bodies, *((markers,) if self.params.markers else ()), *self._pictures)
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
