@@ -16,15 +16,15 @@ import numpy as np
 
 from controllers.expert.hand import RobotHand
 from controllers.stitching.geometry import Stitch
-from controllers.stitching.handing import Handing, Hold
+from controllers.stitching.handing import Handing
 from controllers.stitching.params import StitchParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import stitch_through
 from controllers.stitching.procedure import Procedure
 from controllers.stitching.stage import COMMANDS, Stage
-from controllers.stitching.way_on import WayOn, behind_tip, is_inside, way_on
+from controllers.stitching.way_on import WayOn, is_inside, way_on
 from hub.participant import Record, array, choice, flag, integer, number
-from robots.transform import inverse_transform, pose_to_matrix
+from robots.transform import inverse_transform
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -231,17 +231,6 @@ class GuidedSurgeon(Procedure):
                 " it can, or the arms would meet"
             )
         return plan
-
-    @property
-    def _held(self) -> Hold | None:
-        """How the needle is held, by which hand. Raises MotionError if it is another one."""
-        for hand in self.hands:
-            if hand.number == self.state.holder:
-                grip = inverse_transform(self.state.needle) @ pose_to_matrix(hand.measured)
-                return Hold(hand, grip, behind_tip(grip, hand, self.stitch))
-        if self.state.holder:
-            super()._way_on()  # says that it is neither
-        return None
 
     def _go_on(self, plan: WayOn) -> None:
         """Let the hands go to where a plan begins, each from its setpoint."""

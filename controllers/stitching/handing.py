@@ -17,7 +17,7 @@ from math import pi, radians
 import numpy as np
 
 from controllers.expert.hand import RobotHand
-from controllers.stitching.feasibility import reach, room
+from controllers.stitching.feasibility import MARGIN, reach, room
 from controllers.stitching.gap import ROOM, gap
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.itinerary import Itinerary
@@ -117,10 +117,10 @@ class Handing:
         for exchanged, driver in enumerate(self._hands):
             puller = driver if alone else self._hands[1 - exchanged]
             grips = _grips(puller, params.taken, stitch)
-            taken = tuple(grip for grip in grips if _margin(puller, grip, self._pull) >= 0.0)
+            taken = tuple(grip for grip in grips if _margin(puller, grip, self._pull) >= MARGIN)
             for hold in self._drivers(driver) if taken else ():
                 margin = _margin(driver, hold.grip, self._drive)
-                if margin >= 0.0:
+                if margin >= MARGIN:
                     found.append(_Goal(hold, puller, taken, margin, bool(exchanged), alone))
         return sorted(found, key=lambda goal: -goal.margin)
 
@@ -144,7 +144,7 @@ class Handing:
             hold
             for hold in self._holds
             if -(self._needle[:3, :3] @ hold.grip[:3, 2]) @ up > _DOWN
-            and _margin(hold.hand, hold.grip, np.stack([self._up, self._needle])) >= 0.0
+            and _margin(hold.hand, hold.grip, np.stack([self._up, self._needle])) >= MARGIN
         ]
 
     @cached_property
@@ -188,7 +188,7 @@ class Handing:
             rooms = [self._meeting(giver, taker) for giver, taker in pairs]
             at = [int(each.argmax()) for each in rooms]
             margin = min(goal.margin, *(float(each[i]) for each, i in zip(rooms, at, strict=True)))
-            if margin >= 0.0:
+            if margin >= MARGIN:
                 scored.append((margin, holds, at, goal))
         scored.sort(key=lambda each: -each[0])
         for _, holds, at, goal in scored[:_TRIED]:
@@ -235,7 +235,7 @@ class Handing:
         going[driver.hand].leave(None if goal.alone else rests[driver.hand])
         other = next(hand for hand in self._hands if hand is not goal.puller)
         at_least = going[other].margin
-        if at_least < 0.0 or not self._is_clear(going):
+        if at_least < MARGIN or not self._is_clear(going):
             return None
         for grip in goal.pullers:
             if not (goal.alone or self._can_take_out(driver, goal.puller, grip)):
@@ -244,7 +244,7 @@ class Handing:
             pulling.take(self._drive[-1], grip)
             pulling.follow(self._pull, grip)
             margin = min(at_least, pulling.margin)
-            if margin >= 0.0:
+            if margin >= MARGIN:
                 return self._way_on(goal, first, grip, needles, holds[1:], margin)
         return None
 

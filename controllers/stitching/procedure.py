@@ -14,13 +14,15 @@ from math import radians
 import numpy as np
 
 from controllers.expert.hand import RobotHand
+from controllers.stitching.feasibility import reach
 from controllers.stitching.geometry import Stitch, before
+from controllers.stitching.handing import Hold
 from controllers.stitching.params import StitchParams
 from controllers.stitching.parts import Parts
 from controllers.stitching.phase import Phase
-from controllers.stitching.plan import BEFORE, BEYOND
+from controllers.stitching.plan import BEFORE, BEYOND, driving
 from controllers.stitching.rejoin import BACK, OPEN, OPENED, SHUT, Rejoin
-from controllers.stitching.way_on import WayOn, way_on
+from controllers.stitching.way_on import WayOn, behind_tip, way_on
 from robots import rotation
 from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
 from schemas.errors import MotionError
@@ -129,6 +131,17 @@ class Procedure(Parts, ABC):
 
     def _way_on(self) -> WayOn:
         return way_on(self.params, *self.hands, self.stitch, self.state.needle, self.state.holder)
+
+    @property
+    def _held(self) -> Hold | None:
+        """How the needle is held, by which hand. Raises MotionError if it is another one."""
+        for hand in self.hands:
+            if hand.number == self.state.holder:
+                grip = inverse_transform(self.state.needle) @ pose_to_matrix(hand.measured)
+                return Hold(hand, grip, behind_tip(grip, hand, self.stitch))
+        if self.state.holder:
+            Procedure._way_on(self)  # says that it is neither
+        return None
 
     def _follow(self, plan: WayOn) -> None:
         """Let the hands go to where a plan goes on."""
@@ -265,9 +278,17 @@ class Procedure(Parts, ABC):
 
     def _approach(self) -> None:
         if self._arrived(self.driver):
+            self._require_room()
             self.state.angle[0] = self.stitch.entry - BEFORE
             self._lead(self.driver, self.stitch.pose(self.state.angle[0]), _GENTLE)
             self._enter(Phase.ALIGN)
+
+    def _require_room(self) -> None:
+        """Raise MotionError if the joints cannot drive the needle as it lies in the jaw now."""
+        params, hand = self.params, self.driver
+        way = driving(self.stitch, params.emerge, params.lift, self.stitch.entry - BEFORE)
+        if problem := reach(hand.chain, hand.base, np.array(way) @ self.state.grip).problem:
+            raise MotionError(f"the needle has turned in the jaw of {hand.arm}, whose {problem}")
 
     def _align(self) -> None:
         if self.driver.has_arrived:

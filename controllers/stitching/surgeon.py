@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from controllers.expert.hand import RobotHand
 from controllers.stitching.geometry import Stitch
+from controllers.stitching.handing import Handing
 from controllers.stitching.looking import Looking
 from controllers.stitching.params import StitchingParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import make_plan, make_stitch
 from controllers.stitching.procedure import ATTEMPTS, HOVER, Procedure
 from controllers.stitching.rejoin import OPEN
-from controllers.stitching.way_on import is_inside
+from controllers.stitching.way_on import WayOn, is_inside
 from schemas.errors import MotionError
 
 __all__ = ["Surgeon"]
@@ -67,6 +68,19 @@ class Surgeon(Procedure):
             hand.move_jaw(OPEN)
         self.driver.go(self._pick(HOVER))
         self._enter(Phase.HOVER)
+
+    def _way_on(self) -> WayOn:
+        """Return how the stitch goes on; a needle that lies badly in a jaw is handed over and taken anew."""
+        params, state = self.params, self.state
+        try:
+            return super()._way_on()
+        except MotionError:
+            if not state.holder or is_inside(params, state.needle):
+                raise
+            plan = Handing(params, self.hands, self.stitch, state.needle, self._held, state.park).plan()
+            if plan is None:
+                raise
+            return plan
 
     def _recover(self, why: str) -> None:
         """Go on from where the needle is now, if that can be done, and has not been done too often."""

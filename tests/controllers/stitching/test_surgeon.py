@@ -10,6 +10,7 @@ from controllers.stitching.params import StitchingParams
 from controllers.stitching.phase import Phase
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
+from robots import rotation
 from robots.dvrk.inverse import inverse
 from robots.training.needles import NEEDLES
 from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
@@ -129,6 +130,19 @@ def test_a_needle_that_is_dropped_in_the_tissue_is_said_to_be_there_and_taken_ag
     assert world.said[-1].endswith("it is taken again")
     assert world.lead._surgeon.state.made[0] == 1.0
     assert list(world.grips) == ["PSM2"]
+
+
+def test_a_needle_that_has_turned_in_the_jaw_is_handed_over_and_taken_anew():
+    world = World(stitches=1).run(60, until=lambda w: w.phase is Phase.APPROACH)
+    turn, contact = np.eye(4), np.eye(4)
+    turn[:3, :3] = rotation.matrix(rotation.exp(np.array([0.0, np.radians(40.0), 0.0])))
+    contact[2, 3] = 9.2e-3
+    world.grips["PSM1"] = contact @ turn @ inverse_transform(contact) @ world.grips["PSM1"]
+    world.run(90)
+    assert world.lead.ended == "all stitches are made", world.said
+    (said,) = [each for each in world.said if "has turned in the jaw" in each]
+    assert re.search(r"of PSM1, whose \w+ would be .* degrees, allowed .*; it is taken again", said)
+    assert world.lead._surgeon.state.made[0] == 1.0
 
 
 def test_a_needle_that_nobody_can_take_ends_it_with_where_it_is_and_why():
