@@ -1,4 +1,4 @@
-"""The files that parameters may name: a validation without `Files` in its context opens none."""
+"""Files named by parameters: a validation without `Files` in its context opens none."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ MAX_FILE_BYTES = 4 * 2**30
 
 
 class Files:
-    """Where relative paths start, and which contents may be read.
+    """The start of relative paths, and the contents open to readers.
 
     Args:
         directory: Where relative paths start.
-        hashes: SHA-256 of every file that may be read; None: the user's own scenario may name any.
+        hashes: SHA-256 of every readable file; None: any file, as in a scenario of the user.
     """
 
     def __init__(self, directory: Path, hashes: Collection[str] | None = None) -> None:
@@ -32,14 +32,14 @@ class Files:
 
     @cached_property
     def context(self) -> dict[str, Any]:
-        """The context with which pydantic validates parameters."""
+        """The context for the validation of parameters by pydantic."""
         return {"directory": self.directory, "files": self}
 
     def find(self, path: Path) -> Path:
-        """Return the full path of a file or a directory of files; a missing one is left to its reader.
+        """Return the full path of a file or a directory of files; a missing file is left to its reader.
 
-        Raises ValueError if a pipe, a device or anything else stands there that is not a regular file, if it
-        is too large, or if it has other contents than the allowed ones.
+        Raises ValueError for a pipe, a device or any other irregular file, for a file that is too large, and
+        for contents that are not allowed.
         """
         if str(self.directory / path).startswith(("\\\\", "//")) and self._hashes is not None:
             raise ValueError(f"the network path '{path}' is not looked at")
@@ -55,9 +55,9 @@ class Files:
 
 
 def find_file(path: Path, info: ValidationInfo) -> Path:
-    """Return the full path of a file that parameters name, for a validator that opens it.
+    """Return the full path of a file for the validator of a parameter, before the validator opens the file.
 
-    Raises ValueError if the validation has no `Files`: what is validated may be a stranger's.
+    Raises ValueError if the validation has no `Files`: the parameters may be a stranger's.
     """
     context: dict[str, Any] = info.context or {}
     files: Files | None = context.get("files")
@@ -72,16 +72,16 @@ def find_file(path: Path, info: ValidationInfo) -> Path:
 
 
 def has_contents(path: Path, hashes: Collection[str]) -> bool:
-    """Return whether there is a file at `path` whose SHA-256 is among `hashes`.
+    """Return whether the SHA-256 of the file at `path` is among `hashes`.
 
-    A directory stands for all that is directly in it, so that a directory with another one in it has none.
+    A directory has allowed contents if all of its entries have; a directory inside has none.
     """
     if _problem(path):
         return False
     try:
         files = list(path.iterdir()) if path.is_dir() else [path]
         return bool(files) and all(file_hash(file) in hashes for file in files)
-    except OSError:  # what cannot be read has no contents that could have been recorded
+    except OSError:  # an unreadable file has no recorded contents
         return False
 
 
@@ -92,7 +92,7 @@ def file_hash(file: Path) -> str:
 
 
 def _problem(path: Path) -> str:
-    """Return why there is neither a readable file nor a directory of them; empty if there is."""
+    """Return the reason against a file or a directory of files; empty if regular and small enough."""
     try:
         entries = [path, *path.iterdir()] if path.is_dir() else [path]
         stats = [entry.stat() for entry in entries if entry == path or entry.exists()]

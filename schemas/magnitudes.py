@@ -1,7 +1,7 @@
-"""Least and greatest sizes of physical parameters: beyond them a simulation gives numbers without a meaning.
+"""Least and greatest sizes of physical parameters: beyond, a simulation gives numbers without a meaning.
 
 A gravity of 1e200 m/s^2 ended as `done`, with tissue that stood still, and was the same again in `verify`.
-The limits are some powers of ten beyond every robot, tool and tissue, so that no sensible scene meets one.
+The limits are some powers of ten beyond every robot, tool and tissue: no sensible scene meets a limit.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from typing import NamedTuple
 __all__ = ["ABSURD", "MAGNITUDES", "Magnitude", "require_magnitude"]
 
 ABSURD = 1e9
-"""Size in SI units at which a force, a pose or a joint of a running session is out of any sense."""
+"""Size in SI units above which a force, a pose or a joint position of a session has no meaning."""
 
 
 class Magnitude(NamedTuple):
-    """The sizes that a quantity may have, apart from zero, and examples of what is at the ends."""
+    """The allowed sizes of a quantity, apart from zero, and examples at both ends."""
 
     least: float
     most: float
@@ -34,7 +34,7 @@ MAGNITUDES = {
     "m/s": Magnitude(1e-9, 1e4, "to ten times a bullet"),
     "m/s^2": Magnitude(1e-9, 1e3, "to a hundred times standard gravity"),
 }
-"""By SI unit."""
+"""Limits by SI unit."""
 
 
 def require_magnitude(number: float, unit: str) -> float:

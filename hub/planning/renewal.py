@@ -1,4 +1,4 @@
-"""Participants that go on with other parameters from a step on: what a fork of a session changes."""
+"""Changes of parameters at a step: the difference between a fork and its parent."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ __all__ = ["Renewal"]
 
 
 class Renewal(BaseModel):
-    """Before `step`, participants took the parameters that they have now, and kept their state."""
+    """Before `step`, participants took their present parameters, and kept their state."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     step: int = Field(gt=0)
     before: dict[str, dict[str, Any]]
-    """The parameters that they had until then, by name."""
+    """The earlier parameters, by name of participant."""
 
     @field_validator("before")
     @classmethod
@@ -31,5 +31,5 @@ class Renewal(BaseModel):
         return before
 
     def of(self, names: Iterable[str]) -> Renewal:
-        """Return the part that concerns the participants `names`."""
+        """Return the part for the participants `names`."""
         return Renewal(step=self.step, before={n: self.before[n] for n in names if n in self.before})

@@ -1,4 +1,4 @@
-"""Kinds and parameters of participants that may be built: nothing else builds any but a scenario file."""
+"""Kinds and parameters of a session: the only way to participants beside a scenario file."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from schemas.scenario import Scenario
 __all__ = ["SessionParameters", "Successors"]
 
 Successors = Mapping[str, Sequence[tuple[int, Stepped]]]
-"""By participant: who takes over its state, and before which step, the earliest first."""
+"""Successors of each participant, each with the step of its takeover, the earliest first."""
 
 
 @dataclass(frozen=True)
 class SessionParameters:
-    """Kinds and parameters of participants over a session, and the files that these may name.
+    """Kinds and parameters of participants over a session, and the files open to parameters.
 
-    To build a participant imports its kind and may run native code and read files. A caller that makes such a
-    value answers for its source: the user's own scenario, a hub that a host has joined, or, for a recording,
-    `trusted_parameters` alone (hub/recording/trust.py).
+    Building a participant imports its kind, and may run native code and read files. So the maker of a
+    `SessionParameters` answers for the source: the user's own scenario, the hub joined by a host, or for a
+    recording `trusted_parameters` alone (hub/recording/trust.py).
     """
 
     kinds: Mapping[str, str]

@@ -1,6 +1,6 @@
-"""Bounds for `rosbags`, which unpacks chunks, messages and files of a bag whole, whatever comes out of them.
+"""Bounds for `rosbags`: it unpacks chunks and messages of a bag whole, whatever their unpacked size.
 
-Its tables of decompressors are replaced when this module is imported; ours refuse what is too large.
+Our decompressors take the places of its own, and refuse large results.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Recordings and their forks: which one comes from which."""
+"""Recordings and their forks as a tree."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Member:
-    """One recording, and how far it is from a recording that is no fork."""
+    """A recording, and its distance from the root of its tree."""
 
     file: Path
     depth: int

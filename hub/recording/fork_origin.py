@@ -1,4 +1,4 @@
-"""Where a fork comes from: its parent, the instant, and what was changed there."""
+"""The origin of a fork: its parent, the instant, and the changes."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ ATTACHMENT = "fork.json"
 
 
 class ForkOrigin(BaseModel):
-    """What the recording of a fork says of its origin.
+    """The origin of a fork, as its recording states it.
 
-    Up to `step` it holds the grants of the parent once more, so it is complete in itself.
+    Up to `step` the recording repeats the grants of the parent, so it is complete in itself.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     parent: str
-    """The parent's recording, as it was named."""
+    """Path of the parent's recording, as given."""
     parent_run: str
-    """The parent's number of the run, in hexadecimal digits, which its grants hold."""
+    """Run number in the parent's grants, in hexadecimal digits."""
     step: int = Field(gt=0)
     time_ns: int = Field(gt=0)
-    """Simulated time from which on it is another session."""
+    """Simulated time of the fork."""
     changes: tuple[str, ...] = ()
-    """`a.b.c=value`, as they were given."""
+    """Overrides `a.b.c=value`, as given."""
     renewals: tuple[Renewal, ...] = ()
-    """Of the whole session, those of its ancestors included."""
+    """Renewals of the whole session, with those of its ancestors."""
 
 
 def fork_origin(recording: Recording) -> ForkOrigin | None:

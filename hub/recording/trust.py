@@ -1,7 +1,7 @@
-"""What a recording may ask for: by itself, installed kinds and files with the recorded contents.
+"""The trust check of a recording: without trust, installed kinds and files with recorded contents only.
 
 Anyone may have made a recording. Its scenario, its plan and the renewals of a fork can name any class,
-library, FMU or file of this machine, and to build a participant from them would run or read it.
+library, FMU or file of this machine; building a participant would run or read it.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ log = logging.getLogger(__name__)
 def trusted_parameters(
     recording: Recording, names: Iterable[str], directory: Path | None = None, *, trust: bool = False
 ) -> SessionParameters:
-    """Return kinds and parameters of participants, checked before anything of them is imported or read.
+    """Return kinds and parameters of participants, checked before any import and any reading.
 
     Args:
         recording: The recording; its plan, its scenario and its renewals need not fit together.
-        names: The participants that are to be made or drawn.
-        directory: Where relative paths start, by default where they did.
-        trust: Allow classes that are not installed, native code and files with other contents. A file with
-            other contents is then logged.
+        names: The participants to be made or drawn.
+        directory: The start of relative paths, by default the recorded directory.
+        trust: Allow classes that are not installed, native code, and files with other contents, each with a
+            line in the log.
 
-    Raises TrustError with the list of what they ask for, RecordingError if plan, scenario and renewals
-    contradict each other or the installed kinds, and ScenarioError if a kind cannot be loaded.
+    Raises TrustError with the list of all demands, RecordingError if plan, scenario and renewals contradict
+    each other or the installed kinds, and ScenarioError if a kind cannot be loaded.
     """
     if remark := recording.made_by_newer():
         log.warning("'%s'%s", recording.file, remark)
@@ -80,9 +80,9 @@ def trusted_parameters(
 
 
 def recorded_files(recording: Recording, directory: Path | None = None, *, trust: bool = False) -> Files:
-    """Return the files that a recording may name: with the recorded contents, or with `trust` any.
+    """Return the readable files of a recording: files with recorded contents, or with `trust` any file.
 
-    `directory` is where relative paths start, by default where they did.
+    `directory` is the start of relative paths, by default the recorded directory.
     """
     hashes = None if trust else frozenset(recording.files().values())
     return Files(directory or recording.directory(), hashes)
@@ -93,9 +93,9 @@ def _of(name: str, found: Iterable[str]) -> Iterator[str]:
 
 
 def _check_kind(recording: Recording, planned: PlannedParticipant, kind: str) -> None:
-    """Raise RecordingError if the plan has a participant of another kind, or in a role that its kind has not.
+    """Raise RecordingError if the plan has a participant with another kind, or with a role of another kind.
 
-    A device that is planned as an engine would be opened.
+    A device planned as an engine would be opened.
     """
     if planned.kind != kind:
         raise RecordingError(
@@ -111,7 +111,7 @@ def _check_kind(recording: Recording, planned: PlannedParticipant, kind: str) ->
 
 
 def _unseen(kind: str, params: Mapping[str, Any], directory: Path) -> Iterator[str]:
-    """Yield what must not even be looked at: a class is imported, a network path signs in to its machine."""
+    """Yield demands refused unseen: a look at a class imports it, a look at a network path signs in there."""
     if names_class(kind):
         yield f"the class '{shown(kind)}', which no installed package has as a kind"
     for text in (str(directory), *_texts(params)):

@@ -1,4 +1,4 @@
-"""Unpacking with a bound: what is compressed in a stranger's file may be a bomb, whatever size it states."""
+"""Unpacking with a bound: compressed bytes of a stranger may be a bomb, whatever their stated size."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAX_CHUNK_BYTES = 64 * 2**20
 _RATIO = 255
 """Greatest ratio of lz4: a byte of a match stands for 255 bytes at most (lz4_Block_format.md)."""
 _FREE_BYTES = 256 * 2**20
-"""Unpacked size of a file that is not measured by its ratio."""
+"""Unpacked size of a file with any ratio."""
 _MAX_WINDOW_BYTES = 2**27
 """Memory for one zstd frame, as the program `zstd` allows by default (ZSTD_WINDOWLOG_LIMIT_DEFAULT)."""
 

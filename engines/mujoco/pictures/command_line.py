@@ -45,6 +45,9 @@ def render(
         str | None,
         typer.Option(metavar="NAME", help="Whose scene, where several participants are of kind mujoco."),
     ] = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Read files other than those it was recorded with.")
+    ] = False,
 ) -> None:
     """Draw the scene of a recording at one moment, with its soft bodies and markers."""
     if output.suffix.lower() not in (".png", ".jpg", ".jpeg"):
@@ -57,7 +60,7 @@ def render(
     from engines.mujoco.pictures.recorded_scene import RecordedScene
     from hub.recording.recording import Recording
 
-    scene = RecordedScene(Recording(recording), robot)
+    scene = RecordedScene(Recording(recording), robot, trust=trust)
     eyes = None if position is None else _point(position, "--from")
     picture = scene.picture(
         round(time * 1e9), camera, (width, height), eyes, None if target is None else _point(target, "--at")

@@ -46,8 +46,8 @@ _OVERSAMPLING = 2
 class RecordedScene:
     """The robot of a recording and all soft bodies in it."""
 
-    def __init__(self, recording: Recording, robot: str | None = None) -> None:
-        """Find the participant `robot`, by default the first of kind mujoco.
+    def __init__(self, recording: Recording, robot: str | None = None, *, trust: bool = False) -> None:
+        """Find the participant `robot`, by default the first of kind mujoco; `trust` allows changed files.
 
         Raises RecordingError if there is none, or if no scene can be built of its parameters, and TrustError
         if these name files with other contents than the recorded ones.
@@ -62,7 +62,7 @@ class RecordedScene:
                 f" {', '.join(robots) or 'none'}"
             )
         name = robot or robots[0]
-        parameters = trusted_parameters(recording, [name])
+        parameters = trusted_parameters(recording, [name], trust=trust)
         try:
             params = parameters.validated(name)
         except ScenarioError as error:

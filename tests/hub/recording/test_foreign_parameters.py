@@ -178,6 +178,7 @@ def _invoke(*words: str) -> Callable[[Recording], None]:
     def run(recording: Recording) -> None:
         given = [word.format(file=recording.file.parent, out=recording.file.parent / "out") for word in words]
         result = CliRunner().invoke(app, given)
+        assert "Usage:" not in result.output
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             raise result.exception
 
@@ -189,7 +190,7 @@ COMMANDS: dict[str, Callable[[Recording], object]] = {
     "fork": _fork,
     "view": _view,
     "score": _invoke("score", "{file}"),
-    "render": _invoke("render", "{file}", "-o", "{out}.png", "--at", "0 s"),
+    "render": _invoke("render", "{file}", "-o", "{out}.png", "--robot", "guest"),
     "dataset": _invoke("dataset", "{file}", "-o", "{out}"),
     "report": _invoke("report", "{file}", "-o", "{out}.html"),
     "ros bag": _invoke("ros", "bag", "{file}", "-o", "{out}.bag"),
