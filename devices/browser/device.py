@@ -22,7 +22,7 @@ from schemas.quantity import Duration
 __all__ = ["Browser", "BrowserParams"]
 
 _WAY_NS = 2_000_000
-"""From a read to the communication point at which it enters, on one machine (bench/webconsole_session.py)."""
+"""Time from a read to the communication point, on one machine, ns (bench/webconsole_session.py)."""
 
 
 class BrowserParams(VirtualHandParams):

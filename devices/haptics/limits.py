@@ -48,9 +48,9 @@ class Limits:
     force: float = 2.0
     """Norm of the force, N."""
     stiffness: float = 400.0
-    """Of all planes that are touched together, in the stiffest direction, N/m."""
+    """Stiffness of all touched planes together, in the stiffest direction, N/m."""
     damping: float = 4.0
-    """The same, N s/m."""
+    """Damping, likewise, N s/m."""
     slew: float = 0.1
     """Largest growth or turn of the force in one tick, N. It may fall at once."""
     speed: float = 1.0

@@ -50,7 +50,6 @@ class StylusSamples:
     """What a stylus samples at every reading, in the frame of its ports, at a time (ns) of their clock."""
 
     def __init__(self, ports: StylusPorts) -> None:
-        """Take the ports."""
         self._pose, self._twist, self._force = map(VectorCodec, (ports.pose, ports.twist, ports.force))
 
     def pose(self, time_ns: int, position: Vector3, orientation: Quaternion) -> Sample:

@@ -1,1 +1,1 @@
-"""Haptic styluses on OpenHaptics: a servo process that holds HDAPI, and the device that supervises it."""
+"""Haptic styluses on OpenHaptics: HDAPI, its driver in the servo process, and the device."""

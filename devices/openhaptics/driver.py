@@ -44,10 +44,10 @@ _CONFIGURATION = "/usr/share/3DSystems"
 
 
 class HdapiDriver(Driver):
-    """All devices of HDAPI, which has one scheduler thread; a frame makes its device the current one."""
+    """All devices of HDAPI. There is one scheduler thread; a frame makes a device the current device."""
 
     def __init__(self, library: str) -> None:
-        """Load the library. Raises DeviceError if it cannot be loaded or is another one."""
+        """Load the library. Raises DeviceError if the file is no HDAPI."""
         super().__init__(library=library)
         if sys.platform != "win32":
             os.environ.setdefault("GTDD_HOME", _CONFIGURATION)
@@ -57,7 +57,7 @@ class HdapiDriver(Driver):
         self._schedule: int | None = None
 
     def open(self, spec: StylusSpec) -> Opened | Unavailable:
-        """Open a device; its limits are HDAPI's nominal ones."""
+        """Open a device, with HDAPI's nominal limits."""
         hd = self.hd
         handle = hd.hdInitDevice(None if spec.device is None else spec.device.encode())
         code = next((code for code, _ in errors(hd)), 0)
@@ -85,13 +85,13 @@ class HdapiDriver(Driver):
         self._devices[handle].write(ZERO)
 
     def errors(self) -> Sequence[DriverError]:
-        """Return the errors of this tick: those found while calibrating, then those on HDAPI's stack."""
-        found = [error for device in self._devices.values() for error in device.take_errors()]
+        """Return the errors of this tick: first those of the calibration, then HDAPI's stack."""
+        found = [error for device in self._devices.values() for error in device.pop_errors()]
         found += errors(self.hd)
         return [DriverError(code, handle, _phase(code)) for code, handle in found]
 
     def start(self, tick: Callable[[float], bool]) -> None:
-        """Schedule the callback and start the scheduler, which takes its priority from this thread."""
+        """Schedule the callback and start the scheduler, with the priority of this thread."""
         known = False
 
         def call(_: object) -> int:
@@ -171,8 +171,8 @@ class _Device:
         self._hd.hdSetDoublev(Get.FORCE, self._force)
         self._hd.hdEndFrame(self._handle)
 
-    def take_errors(self) -> list[tuple[int, int]]:
-        """Return those errors (code, handle) of this tick that are no longer on HDAPI's stack."""
+    def pop_errors(self) -> list[tuple[int, int]]:
+        """Return the errors (code, handle) of this tick from before the calibration, and forget them."""
         found, self._errors = self._errors, []
         return found
 
@@ -203,7 +203,7 @@ class _Device:
         return next((style for style in Style if self._styles.value & style), 0)
 
     def _is_placeholder(self) -> bool:
-        """Return whether the frame is the one for a process that does not own the device."""
+        """Return whether HDAPI gives a placeholder: another process owns the device."""
         if tuple(self._transform[12:15]) != PLACEHOLDER_MM:
             return False
         self._hd.hdGetDoublev(Get.JOINT_ANGLES, self._joints)
@@ -211,10 +211,7 @@ class _Device:
 
 
 def _phase(code: int) -> Phase:
-    """Return the condition in which an error leaves the stylus.
-
-    Only a fault of the device (0x3xx) ends its use.
-    """
+    """Return the condition of the stylus after an error; only a fault of the device (0x3xx) ends the use."""
     if Code.is_busy(code):
         return Phase.BUSY
     return Phase.FAULT if Code.is_fault(code) else Phase.WARNED

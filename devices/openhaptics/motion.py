@@ -33,7 +33,7 @@ class Tip:
         self.position: Vector3 = ZERO
         """m."""
         self.rotation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-        """Of the tip's frame, row after row."""
+        """Rotation matrix of the tip's frame, row after row."""
         self.linear: Vector3 = ZERO
         """m/s."""
         self.angular: Vector3 = ZERO

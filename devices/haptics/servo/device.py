@@ -36,8 +36,8 @@ _SETTLING = 1.0
 class HapticDevice(Device):
     """The styluses of this machine; a kind states its driver and the parameters of each stylus.
 
-    A stylus that is absent, busy, not calibrated or faulty gives no pose, twist or force; its diagnosis says
-    what to do, and it is used again as soon as it works.
+    An absent, busy, uncalibrated or faulty stylus gives no pose, twist or force; the diagnosis says how to
+    mend that, and a stylus that works again is used at once.
     """
 
     driver: ClassVar[str]
@@ -155,9 +155,9 @@ class _Stylus:
         self._settling: float | None = None
 
     def opened(self, process: ServoProcess, hardware: str, stated: dict[str, float]) -> None:
-        """Allow `process` to give force within the scenario's limits, unless they exceed the device's.
+        """Allow `process` to give force within the scenario's limits, unless one exceeds the device's.
 
-        A limit that the device does not state is the kind's nominal one.
+        The kind's nominal limit stands for a limit without a statement of the device.
         """
         self._hardware, self._refusal = hardware, ""
         limits = DeviceLimits(

@@ -1,8 +1,8 @@
 """The interface between the servo process and a vendor's library.
 
-The servo process makes one driver for all styluses of a host, from the class that the device names. Each tick
-is `read`, then `write`, stylus after stylus, then `errors`. What passes here is checked on the other side:
-watchdog, dead-man, clamp, slew and ramp are the servo's, and no driver can leave them out.
+The servo process makes one driver for all styluses of a host, of the class named by the device. Each tick is
+`read`, then `write`, stylus after stylus, then `errors`. Watchdog, dead-man, clamp, slew and ramp are part of
+the servo, so no driver can leave a limit out.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Records of doubles in shared memory between a servo process and its device, without locks.
 
-Each direction is a ring with one writer and one reader. A slot has its number and a checksum over number
-and content, so a record that is being overwritten is recognised, on any processor, and a writer that ends
-half-way leaves the slots before intact: neither side ever waits. The memory has no name that could outlive
-its users: on Linux the reading process inherits the file, on Windows it ends with the last handle.
+Each direction is a ring with one writer and one reader. A slot has a number, and a checksum over number and
+content, so a reader recognises a record under change, on any processor. A writer that ends half-way leaves
+the slots before intact: neither side ever waits. The memory has no name: on Linux the reading process
+inherits the file, on Windows the memory ends with the last handle.
 
-Behind the rings is a counter, the sign of life of the process that watches the servo process.
+Behind the rings is a counter, the sign of life of the watcher.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ pauses for some hundredths of a second.
 """
 MOST_PLANES = 4
 MODEL_DOUBLES = 3 + MOST_PLANES * len(Plane._fields)
-"""Of a contact model: arrival (s of time.perf_counter), stamp (ns), number of planes, and their numbers."""
+"""Numbers of a contact model: arrival (s of time.perf_counter), stamp (ns), number of planes, the planes."""
 STATE_DOUBLES = 6 + 3 + 9 + 3 + 3 + 3
 
 
@@ -81,9 +81,9 @@ class State(NamedTuple):
     cause: int
     """Why the force is on or off: index into the participants of devices.haptics.safety.Condition."""
     position: Vector3
-    """Of the tip, m."""
+    """Tip position, m."""
     rotation: tuple[float, ...]
-    """Of the stylus' own frame, nine numbers, row after row."""
+    """Rotation matrix of the stylus' own frame, nine numbers, row after row."""
     linear: Vector3
     """Velocity of the tip, m/s."""
     angular: Vector3
@@ -93,7 +93,7 @@ class State(NamedTuple):
 
     @classmethod
     def of(cls, record: tuple[float, ...]) -> State:
-        """Return the state in a record of the ring: its fields one after the other."""
+        """Return the state in a record of the ring."""
         phase, code, buttons, permitted, cause = map(int, record[1:6])
         position, linear, angular, force = (
             (record[i], record[i + 1], record[i + 2]) for i in (6, 18, 21, 24)
@@ -190,9 +190,9 @@ def _parts(memory: memoryview, index: int) -> tuple[memoryview, memoryview]:
 
 
 def create(size: int) -> tuple[mmap.mmap, int | str]:
-    """Return new shared memory, and the handle for `attach` in a process that inherits it.
+    """Return new shared memory, and a handle for `attach` in an inheriting process.
 
-    The handle is a file descriptor, which the caller closes, or on Windows a name.
+    The handle is a file descriptor, to be closed by the caller, or on Windows a name.
     """
     if sys.platform == "win32":
         name = f"trocar-{uuid.uuid4()}"

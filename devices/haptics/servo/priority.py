@@ -10,8 +10,8 @@ import sys
 __all__ = ["SERVO", "WATCHER", "raise_priority"]
 
 SERVO, WATCHER = 19, 20
-"""SCHED_FIFO: above everything that is not real-time, below the kernel's interrupt threads (50). The watcher
-is above the servo, which would delay it if it never slept. A user is allowed the larger (limits.conf).
+"""SCHED_FIFO: above all ordinary threads, below the kernel's interrupt threads (50). The watcher is above the
+servo: a servo that never sleeps must not delay the watcher. limits.conf allows a user the larger number.
 """
 _HIGH_PRIORITY_CLASS = 0x80
 

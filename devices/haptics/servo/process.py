@@ -32,7 +32,7 @@ class DriverChoice:
     """The driver that a servo process makes."""
 
     driver: str
-    """Its class, as `module:Class`."""
+    """Driver class, `module:Class`."""
     options: dict[str, Any]
     """Keyword arguments of the class, which JSON can hold."""
 
@@ -90,11 +90,11 @@ class ServoProcess:
 
     @property
     def was_killed_by_watcher(self) -> bool:
-        """Whether it stood still with force on a hand, and was killed for that; known after `close`."""
+        """Whether the watcher killed a standing process with force on a hand; known after `close`."""
         return self._watcher.returncode == HAS_KILLED
 
     def said(self, timeout_s: float = 0.0) -> list[dict[str, Any]]:
-        """Return its messages since the last call; wait up to `timeout_s` for the first."""
+        """Return the messages since the last call; wait up to `timeout_s` for the first."""
         found: list[dict[str, Any]] = []
         with contextlib.suppress(Empty):
             if timeout_s:
@@ -108,17 +108,17 @@ class ServoProcess:
         self._send({"stylus": stylus, "limits": asdict(limits), "passivity": passivity})
 
     def end(self) -> None:
-        """Make it give a last frame without force and end."""
+        """Ask for a last frame without force, and for the end."""
         with contextlib.suppress(OSError):
             assert self._process.stdin
             self._process.stdin.close()
 
     def kill(self) -> None:
-        """End it at once. Whether the force ends with it depends on the driver."""
+        """End the process at once. The end of the force depends on the driver."""
         self._process.kill()
 
     def close(self) -> None:
-        """End it and wait until it is gone."""
+        """End the process and wait for the end."""
         self.end()
         try:
             self._process.wait(_PATIENCE_S)
@@ -149,7 +149,7 @@ class ServoProcess:
 
 
 def _watcher(memory: int | str, styluses: int, pid: int) -> subprocess.Popen[bytes]:
-    """Start the watcher of process `pid`, which the caller has not reaped."""
+    """Start the watcher of process `pid`, not yet reaped by the caller."""
     process = pid if sys.platform == "win32" else os.pidfd_open(pid)
     files = () if sys.platform == "win32" else (int(memory), process)
     try:

@@ -1,8 +1,9 @@
 """The servo process: a vendor's library and the servo loop, and nothing else.
 
-devices.haptics.servo.process starts it. One line of JSON on its standard input lists what to open; a second
-one, per stylus, the limits of the force. The process ends with its input, which happens when the device
-closes it and when the device's process ends. Then the hand gets one last frame, without force.
+devices.haptics.servo.process starts it. The first line of JSON on the standard input names the driver and the
+styluses; each later line states the limits of the force of one stylus. The process ends with the input: when
+the device closes the input, and when the device's process ends. Then the hand gets a last
+frame without force.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def _load(choice: str, options: Mapping[str, Any]) -> Driver:
 def _opened(
     driver: Driver, config: Mapping[str, Any], memory: memoryview, say: Say
 ) -> Iterator[tuple[str, Stylus]]:
-    """Open the devices; report model and limits of each, or why it is not available."""
+    """Open the devices; report model and limits of each, or the reason of a failure."""
     for index, values in enumerate(config["styluses"]):
         spec = StylusSpec(**values)
         models, states = servo_ends(memory, index)
@@ -61,7 +62,7 @@ def _opened(
 
 
 def _await_watcher(sign: memoryview) -> None:
-    """Wait until the watcher runs: no tick is without it. Raises DeviceError if it does not start."""
+    """Wait for the watcher: no tick runs without a watcher. Raises DeviceError after five seconds."""
     for _ in range(round(_FIRST_BEAT / 0.005)):
         if sign[0]:
             return
@@ -72,7 +73,7 @@ def _await_watcher(sign: memoryview) -> None:
 def _output() -> Say:
     """Return a function that sends a message to the device.
 
-    Libraries may write to the standard output, which is redirected to the standard error.
+    The standard output is redirected to the standard error: libraries may write there.
     """
     stream = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)

@@ -14,8 +14,8 @@ __all__ = ["Servo", "failure_text"]
 
 _LAST_FRAME_S = 0.1
 _UNWATCHED, _ABANDONED = 100, 1000
-"""Ticks without a sign of life of the watcher after which there is no force, and after which this process is
-of no use. Ticks, not seconds: after a pause of the whole machine the watcher is not the one to blame.
+"""Ticks without a sign of life of the watcher: limit for force, and limit for this process. Ticks, not
+seconds: after a pause of the whole machine the watcher is not to blame.
 """
 
 
@@ -23,17 +23,17 @@ class Servo:
     """All styluses of this host behind one driver."""
 
     def __init__(self, driver: Driver, styluses: list[Stylus], beat: memoryview) -> None:
-        """`styluses`: those that were opened; `beat`: the watcher's counter in the shared memory."""
+        """`styluses`: all open styluses; `beat`: the watcher's counter in the shared memory."""
         self._driver, self._styluses = driver, styluses
         self._by_handle = {stylus.handle: [stylus] for stylus in styluses}
         self._beat, self._last_beat, self._unwatched = beat, 0, 0
         self._ending, self._ended = False, threading.Event()
         self._started = False
         self.failure = ""
-        """What a tick raised."""
+        """Error of a tick, in words."""
 
     def start(self) -> None:
-        """Start the driver's loop, which takes its priority from this thread."""
+        """Start the driver's loop, with the priority of this thread."""
         self._started = True
         self._driver.start(self.tick)
 
@@ -90,5 +90,5 @@ class Servo:
 
 
 def failure_text(error: BaseException) -> str:
-    """Return what failed; an error that is not ours with its class, as a driver may raise anything."""
+    """Return an error in words; with the class unless we raise it on purpose: a driver may raise anything."""
     return str(error) if isinstance(error, DeviceError) else f"{type(error).__name__}: {error}"

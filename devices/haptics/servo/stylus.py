@@ -1,6 +1,6 @@
-"""One stylus inside the servo loop: its condition, its haptic loop and its states.
+"""One stylus inside the servo loop: condition, haptic loop and states.
 
-It runs a thousand times a second: plain floats, one clock.
+The code runs a thousand times a second: plain floats, one clock.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _CLEAN_FRAMES = 3
 _WARNING = 1.0
 """Time without a warning of the device after which force may come back, s."""
 _READY, _SETTLING = Phase.READY, Phase.SETTLING
-"""As plain names: Python 3.11 takes 0.25 us to look up a member of an enumeration."""
+"""Plain names: Python 3.11 takes 0.25 us to look up a member of an enumeration."""
 _UNMOVED = Reading(ZERO, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), ZERO, valid=False)
 
 
@@ -61,9 +61,9 @@ class Stylus:
     def on_error(self, code: int, phase: Phase, now: float) -> None:
         """Handle an error that the driver reports after the tick at `now`.
 
-        Only the loss of the device ends its use. Any other error switches the force off for a time: a warning
-        is meant so, and after an error of the tick it is unknown which force was sent. A stylus that is not
-        calibrated has no force.
+        Only the loss of the device ends the use of the stylus. Any lesser error switches the force off for a
+        second: a warning asks for that, and after an error of the tick the sent force is unknown. An
+        uncalibrated stylus has no force.
         """
         if phase.is_lost:
             self.phase, self._code = phase, code

@@ -1,9 +1,9 @@
-"""Keeps a servo process running with every stylus that is available, and looks for those that are lost.
+"""Keeps a servo process running with every available stylus, and looks for lost styluses.
 
-All styluses of a host are in one process. When one of them is lost, the process is replaced by one with the
-others: a library may recover in a new process only. A second process beside the first finds out whether a
-lost stylus is available again, so that no hand loses force meanwhile; the stylus is used again when no other
-hand holds its dead-man.
+All styluses of a host are in one process. When one stylus is lost, a process with the rest replaces the
+present process: a library may recover in a new process only. A second process beside the first finds out
+whether a lost stylus is available again, so no hand loses force meanwhile. The next servo process with the
+stylus starts when no hand holds a dead-man.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ class Lost:
     code: int
     cause: str
     retry: float
-    """When it is tried again, s of time.perf_counter."""
+    """Time of the next try, s of time.perf_counter."""
     found: bool = False
-    """It is available again, and waits for the next servo process."""
+    """Whether the stylus is available again, and waits for the next servo process."""
 
 
 class Supervisor:
@@ -61,7 +61,7 @@ class Supervisor:
         specs: Mapping[str, StylusSpec],
         opened: Callable[[ServoProcess, dict[str, Any]], None],
     ) -> None:
-        """`opened` is called for every stylus that was opened, with its process and the message of that."""
+        """Call `opened` for every open stylus, with the process and the message about the stylus."""
         self._driver, self._specs, self._opened = driver, dict(specs), opened
         self.lost: dict[str, Lost] = {}
         self._process: ServoProcess | None = None
@@ -75,7 +75,7 @@ class Supervisor:
 
     @property
     def process(self) -> ServoProcess | None:
-        """The process that holds the styluses now."""
+        """Present servo process."""
         return self._process
 
     def start(self, now: float) -> None:
@@ -152,7 +152,7 @@ class Supervisor:
             log.warning(_NO_PRIORITY)
 
     def _check(self, process: ServoProcess, now: float) -> None:
-        """Handle a process that has ended, and end one that hangs."""
+        """Handle the end of a process, and end a hanging process."""
         ended, patience = not process.is_alive, _SILENCE if self._has_ticked else _OPENING
         if not ended and self._ending is None and now - self._last_frame > patience:
             self._end(process, now)
@@ -183,7 +183,7 @@ class Supervisor:
         self.lost[name] = Lost(phase, code, cause, now + delay)
 
     def _retry(self, now: float) -> None:
-        """Start the servo process or a probe, if a lost stylus is due."""
+        """Start the servo process or a probe if a lost stylus is due."""
         due = [
             name
             for name in self._specs
@@ -203,7 +203,7 @@ class Supervisor:
                 self._probe = Probe(ServoProcess(self._driver, [self._specs[name] for name in due]), now)
 
     def _use(self, found: Mapping[str, Finding | None], now: float) -> None:
-        """Use what a probe has found of lost styluses."""
+        """Use the findings of a probe about lost styluses."""
         for name, finding in found.items():
             lost = self.lost[name]
             if finding is not None and not finding.phase.is_lost:

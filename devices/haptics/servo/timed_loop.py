@@ -1,4 +1,4 @@
-"""A loop of a fixed rate, for a library that has none of its own."""
+"""A loop of a fixed rate, for a library without a loop."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _END_S = 0.1
 
 
 class TimedLoop:
-    """Calls a function at a fixed rate, in a thread with the priority of the one that starts it."""
+    """Calls a function at a fixed rate, in a thread with the priority of the starting thread."""
 
     def __init__(self, rate: float, tick: Callable[[float], bool]) -> None:
-        """Start; `tick` gets the time (s of time.perf_counter) and returns whether to go on."""
+        """Start; `tick` gets the time (s of time.perf_counter) and returns True to go on."""
         self._period, self._tick, self._ending = 1.0 / rate, tick, False
         self._thread = threading.Thread(target=self._run, name="servo loop", daemon=True)
         self._thread.start()

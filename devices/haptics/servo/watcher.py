@@ -1,13 +1,13 @@
-"""The watcher process: it kills a servo process that stands still with force on a hand.
+"""The watcher process: kills a servo process that stands still with force on a hand.
 
-A motor keeps its last force while the servo stands still: stopped by a signal, or in a call of the driver
-that does not return. Libraries give a device to one process only, so no other process can set its force to
-zero; the end of the servo process closes the device.
+A motor keeps the last force while the servo stands still: stopped by a signal, or blocked in a call of the
+driver. Libraries give a device to one process only, so no second process can set the force to zero; the end
+of the servo process closes the device.
 
-devices.haptics.servo.process starts it beside every servo process, with the shared memory and a handle of
-that process. It ends with the servo process, and by nothing else: the device's process may have died before.
-It shares no interpreter with either, so neither delays it. Its sign of life is a counter in the shared
-memory; without it the servo gives no force (devices.haptics.servo.servo).
+devices.haptics.servo.process starts the watcher beside every servo process, with the shared memory and a
+handle of the servo process. Only the end of the servo process ends the watcher: the device's process may
+have died before. Each of the three has an interpreter of its own, so none delays another. The sign of life is
+a counter in the shared memory; without it the servo gives no force (devices.haptics.servo.servo).
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ PERIOD = 0.004
 _STILL = 0.11
 """Age of the last frame above which the servo stands still, s: a stop of 0.1 s is left alone."""
 _LOOKS = 3
-"""Looks in a row that must find it so: after a pause of the whole machine the servo gets time for a tick."""
+"""Looks in a row before a kill: after a pause of the whole machine the servo gets time for a tick."""
 HAS_KILLED = 3
-"""Exit status of a watcher that has killed its servo process."""
+"""Exit status after the servo process was killed."""
 
 _OFF = tuple(Condition).index(Condition.OFF)
 
 
 class Watch:
-    """Finds out whether the servo stands still while there may be force on a hand."""
+    """Finds a servo that stands still while there may be force on a hand."""
 
     def __init__(self, states: Sequence[RingReader]) -> None:
         """`states`: the reading ends of all styluses of the servo process."""
