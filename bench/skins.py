@@ -108,7 +108,7 @@ def pair(mesh: TetMesh | None, gl: str) -> float:
     if mesh is not None:
         bodies["body"] = body = SoftBody("body/nodes")
         faces = mesh.triangles.astype(np.uint32).ravel()
-        body.take(
+        body.accept(
             SoftBodyState(
                 header=Header(), body="body", nodes_m=mesh.nodes.astype(np.float32).ravel(), triangles=faces
             )

@@ -62,7 +62,7 @@ def _row(text: str, count: int, option: str) -> list[float]:
     return numbers
 
 
-def _checked(text: str | None) -> str | None:
+def _check_numbers(text: str | None) -> str | None:
     if text is not None and not _numbers(text):
         raise typer.BadParameter(
             f"'{text}' contains no numbers; write one per joint in SI units, separated by spaces or commas"
@@ -88,14 +88,14 @@ Tool = Annotated[
     ),
 ]
 Positions = Annotated[
-    str, typer.Option("--q", metavar="Q1 Q2 ...", callback=_checked, help="Joint positions, rad and m.")
+    str, typer.Option("--q", metavar="Q1 Q2 ...", callback=_check_numbers, help="Joint positions, rad and m.")
 ]
 Velocities = Annotated[
     str | None,
     typer.Option(
         "--dq",
         metavar="V1 V2 ...",
-        callback=_checked,
+        callback=_check_numbers,
         help="Joint velocities for the friction, rad/s and m/s; 0 unless given.",
     ),
 ]
@@ -115,7 +115,7 @@ Orientation = Annotated[
     str | None,
     typer.Option(
         metavar="X Y Z W",
-        callback=_checked,
+        callback=_check_numbers,
         help="Of a free base in the world, whose z is up: a quaternion; upright unless given.",
     ),
 ]
@@ -123,7 +123,7 @@ SetupJoints = Annotated[
     str | None,
     typer.Option(
         metavar="Q1 ... Q6",
-        callback=_checked,
+        callback=_check_numbers,
         help="Of the setup joints that carry it on the cart, m and rad; the simulated ones unless given.",
     ),
 ]

@@ -24,9 +24,9 @@ from schemas.ros import PoseStamped
 from schemas.vectors import Vector
 
 if TYPE_CHECKING:
-    from engines.mujoco.interaction.contact_spheres import Spheres
-    from engines.mujoco.interaction.probe import Probe
-    from engines.mujoco.interaction.wire import Wire
+    from engines.mujoco.interaction.contact_spheres_bond import ContactSpheresBond
+    from engines.mujoco.interaction.probe_bond import ProbeBond
+    from engines.mujoco.interaction.wire_bond import WireBond
 
 __all__ = ["MujocoEngine"]
 
@@ -49,8 +49,8 @@ class MujocoEngine(Stepped):
 
     def __init__(self, name: str, params: MujocoParams) -> None:
         super().__init__(name, params)
-        self._touching: list[Probe | Spheres | Wire] = []
-        self._wires: list[Wire] = []
+        self._touching: list[ProbeBond | ContactSpheresBond | WireBond] = []
+        self._wires: list[WireBond] = []
         self._keepers: list[_Keeper] = []
         self._effective_mass: dict[str, float] = {}
         self._outputs: dict[str, Value] = {}
@@ -154,10 +154,10 @@ class MujocoEngine(Stepped):
         return self._outputs
 
     def _couple(self, setup: Setup) -> None:
-        from engines.mujoco.interaction.contact_spheres import Spheres
-        from engines.mujoco.interaction.probe import Probe
+        from engines.mujoco.interaction.contact_spheres_bond import ContactSpheresBond
+        from engines.mujoco.interaction.probe_bond import ProbeBond
 
-        kinds = {"probe": Probe, "contact": Spheres}
+        kinds = {"probe": ProbeBond, "contact": ContactSpheresBond}
         for bond in self.bonds:
             owner, _, kind = bond.name.partition("/")
             plan = setup.bonds.get(bond.name)
@@ -181,12 +181,12 @@ class MujocoEngine(Stepped):
         ]
 
     def _couple_needle(self, thing: str, bond: BondSide, plan: BondPlan | None) -> None:
-        from engines.mujoco.interaction.wire import Wire
+        from engines.mujoco.interaction.wire_bond import WireBond
 
         params = cast("NeedleParams", self.params.objects[thing])
-        self._effective_mass[bond.name] = Wire.least_mass(thing, params, self._model, self._data)
+        self._effective_mass[bond.name] = WireBond.least_mass(thing, params, self._model, self._data)
         if plan:
-            wire = Wire(thing, params, MotionSide(bond, plan), self._model, self._data)
+            wire = WireBond(thing, params, MotionSide(bond, plan), self._model, self._data)
             self._touching.append(wire)
             self._wires.append(wire)
             self._outputs.update(wire.outputs)

@@ -111,11 +111,11 @@ def _feasible(tool: Instrument, needle: Needle, alike: Sequence[Stitch], rolls: 
     paths = np.stack([stitch.path(each, needle) for each in alike])  # (k, points, 4, 4)
     seven = held_needle.chain(tool, needle, one.hold * needle.arc)
     q = held_needle.solutions(tool, seven, paths, rolls)  # (4, k, points, m, 6)
-    allowed = _allowed(tool, q, stitch.tissue(one.tilt))
+    allowed = _find_allowed(tool, q, stitch.tissue(one.tilt))
     # worth following: somehow possible at each point
     whole = np.flatnonzero(_any(allowed, (0, 3)).sum(axis=1) == paths.shape[1])
     branches = np.flatnonzero(_any(allowed, (1, 2, 3)))
-    states, valid = _wound(tool, q[branches][:, whole], allowed[branches][:, whole])
+    states, valid = _roll_by_a_turn(tool, q[branches][:, whole], allowed[branches][:, whole])
     seconds = (2.0 * one.entry + stitch.EMERGE) / (paths.shape[1] - 1) / DRIVE
     reach, turns = _reach(seven, seconds), int(seven.velocity[-1] * seconds / (rolls[1] - rolls[0]) + 1e-9)
     constant, rolling = np.zeros((len(alike), len(rolls)), bool), np.zeros(len(alike), bool)
@@ -138,7 +138,7 @@ def _reach(seven: SerialChain, seconds: float) -> Vector:
     return np.where(revolute, np.minimum(reach, _JUMP), reach)
 
 
-def _allowed(tool: Instrument, q: Vector, surface: Vector) -> Mask:
+def _find_allowed(tool: Instrument, q: Vector, surface: Vector) -> Mask:
     """Say, shape (...), which `q`, shape (..., 6), are allowed.
 
     All joints but the shaft's roll are in range and the instrument is outside the tissue.
@@ -161,7 +161,7 @@ def _allowed(tool: Instrument, q: Vector, surface: Vector) -> Mask:
     return allowed
 
 
-def _wound(tool: Instrument, q: Vector, allowed: Mask) -> tuple[Vector, Mask]:
+def _roll_by_a_turn(tool: Instrument, q: Vector, allowed: Mask) -> tuple[Vector, Mask]:
     """Return positions with the shaft's roll also a turn less and a turn more, shape (3, ..., 6).
 
     The second value states which of them are allowed, shape (3, ...).

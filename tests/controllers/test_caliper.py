@@ -60,7 +60,7 @@ class Run:
         self.command = HAND.command("caliper", 0.1)
 
     def step(self, start=1.0):
-        q = HAND.unloaded(self.command)
+        q = HAND.unloaded_positions(self.command)
         contacts = HAND.contacts(q)
         force = np.zeros((3, 3, 3))
         for finger in range(2):

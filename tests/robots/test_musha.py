@@ -14,7 +14,7 @@ commands = st.tuples(*(st.floats(joint.lower, joint.upper) for joint in HAND.joi
 
 
 def test_the_folded_hand_passes_the_trocar_with_its_spheres():
-    centres = HAND.contacts(HAND.unloaded(HAND.command("folded", 0.0)))
+    centres = HAND.contacts(HAND.unloaded_positions(HAND.command("folded", 0.0)))
     assert (np.hypot(centres[..., 0], centres[..., 1]) + HAND.radius < TROCAR_RADIUS).all()
 
 
@@ -26,7 +26,7 @@ def test_fingers_of_the_folded_hand_lie_side_by_side():
 
 @given(commands)
 def test_an_unloaded_finger_winds_up_what_it_is_told_or_its_tendon_is_slack(command):
-    q = HAND.unloaded(command)
+    q = HAND.unloaded_positions(command)
     for finger, (closing, spread) in enumerate(command.reshape(2, 3).T.tolist()):
         tension = HAND.tension(closing, spread)
         assert tension >= 0.0
@@ -38,7 +38,7 @@ def test_an_unloaded_finger_winds_up_what_it_is_told_or_its_tendon_is_slack(comm
 @given(commands)
 def test_an_unloaded_finger_is_in_balance(command):
     """Where a joint is at no stop, the torque of its tendon is that of its spring."""
-    q = HAND.unloaded(command)
+    q = HAND.unloaded_positions(command)
     for finger, (closing, spread) in enumerate(command.reshape(2, 3).T.tolist()):
         tension = HAND.tension(closing, spread)
         for j, p in enumerate(HAND.phalanges):
@@ -71,7 +71,7 @@ def test_contacts_are_where_the_links_are():
 
 @pytest.mark.parametrize("closing", [0.0, 0.3, 0.7, 0.95])
 def test_the_caliper_closes_two_parallel_fingers_and_clears_the_third(closing):
-    q = HAND.unloaded(HAND.command("caliper", closing))
+    q = HAND.unloaded_positions(HAND.command("caliper", closing))
     assert np.allclose(q[:2].sum(axis=1), 0.0, atol=np.radians(0.05))
     tips = HAND.contacts(q)[:, -1]
     assert np.allclose(tips[0] * [-1, 1, 1], tips[1], atol=1e-15)
@@ -79,7 +79,7 @@ def test_the_caliper_closes_two_parallel_fingers_and_clears_the_third(closing):
 
 
 def test_the_retractor_fans_straight_fingers_out():
-    q = HAND.unloaded(HAND.command("retractor", 0.0))
+    q = HAND.unloaded_positions(HAND.command("retractor", 0.0))
     assert np.allclose(q[:, 0], np.radians(-85.0))
     assert np.allclose(q[:, 1:], 0.0)
 

@@ -145,11 +145,11 @@ class Servos:
             layout[at + 1, [drive, n + drive]] = share / period, -share / period
             # both fingers with the jaw's torque: their work is then that of the jaw
             layout[at + 2, 2 * n + drive] = 1.0
-            for joint, coefficient in self._moved(actuator):
+            for joint, coefficient in self._joints_of_actuator(actuator):
                 measure[drive, model.jnt_qposadr[joint]] = coefficient
         return layout, measure
 
-    def _moved(self, actuator: int) -> list[tuple[int, float]]:
+    def _joints_of_actuator(self, actuator: int) -> list[tuple[int, float]]:
         """Return the joints of an actuator, each with the factor of its share in the actuator's position."""
         model, target = self._model, int(self._model.actuator_trnid[actuator, 0])
         if model.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_TENDON:
@@ -162,7 +162,7 @@ class Servos:
         model = self._model
         stiffness, rest = np.zeros(n), np.zeros(n)
         for actuator, drive, _share in shares:
-            joint = self._moved(actuator)[0][0]
+            joint = self._joints_of_actuator(actuator)[0][0]
             stiffness[drive], rest[drive] = (
                 np.ravel(model.jnt_stiffness[joint])[0],
                 model.qpos_spring[model.jnt_qposadr[joint]],

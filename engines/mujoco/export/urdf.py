@@ -164,7 +164,7 @@ def _add_joint(
     if moving is None:
         return
     SubElement(joint, "axis", xyz=numbers(moving.axis))
-    lead = leads.get(moving.name) or _tied(spec, moving.name)
+    lead = leads.get(moving.name) or _lead_by_tie(spec, moving.name)
     if lead.joint:
         SubElement(joint, "mimic", joint=_joint(lead.joint), multiplier=repr(lead.ratio), offset="0")
     is_slide_of_turn = moving.name in leads and joint.get("type") == "prismatic"
@@ -174,7 +174,7 @@ def _add_joint(
     )
 
 
-def _tied(spec: mujoco.MjSpec, joint: str) -> _Lead:
+def _lead_by_tie(spec: mujoco.MjSpec, joint: str) -> _Lead:
     """Return how a joint of the arm or of the linkage is driven."""
     tie = spec.equality(joint)
     return _Lead(tie.name2, float(tie.data[1]), tie.name2) if tie else _Lead("", 0.0, joint)

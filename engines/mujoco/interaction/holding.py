@@ -13,7 +13,7 @@ from math import acos
 import mujoco
 import numpy as np
 
-from engines.mujoco.interaction.proximity import Rays
+from engines.mujoco.interaction.proximity_rays import ProximityRays
 from engines.mujoco.model.poses import ROS_ORDER
 from engines.mujoco.model.rigid import RIGID
 from engines.mujoco.params import SceneParams
@@ -30,18 +30,18 @@ def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
     """Add to the model of `scene` the welds between jaws and objects, not active yet."""
     if scene.grasp != "friction":
         for thing in scene.objects:
-            for arm in _jawed(scene):
+            for arm in _arms_with_jaw(scene):
                 ends = {"objtype": mujoco.mjtObj.mjOBJ_BODY, "name1": f"{arm}/wrist_yaw", "name2": thing}
                 spec.add_equality(
                     name=f"{thing}/{arm}/weld", type=mujoco.mjtEq.mjEQ_WELD, active=False, **ends, **RIGID
                 )
 
 
-def _jawed(scene: SceneParams) -> list[str]:
-    return list(_jaws(scene))
+def _arms_with_jaw(scene: SceneParams) -> list[str]:
+    return list(_finger_lengths(scene))
 
 
-def _jaws(scene: SceneParams) -> dict[str, float]:
+def _finger_lengths(scene: SceneParams) -> dict[str, float]:
     """Return the length of the fingers of every arm with a jaw, m."""
     return {
         name: arm.end_effector.length for name, arm in scene.arms.items() if isinstance(arm.end_effector, Jaw)
@@ -53,9 +53,11 @@ class Holding:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scene: SceneParams, period: float) -> None:
         """Watch the objects of `scene`; `update` is called every `period` seconds."""
-        things, arms = list(scene.objects), _jawed(scene)
+        things, arms = list(scene.objects), _arms_with_jaw(scene)
         self._model, self._data = model, data
-        self._rays = Rays(model, data, things, _jaws(scene)) if scene.grasp == "proximity" else None
+        self._rays = (
+            ProximityRays(model, data, things, _finger_lengths(scene)) if scene.grasp == "proximity" else None
+        )
         self._settled = 1 if self._rays is not None else max(1, round(_SETTLED / period))
         self._things, self._arms = {thing: i for i, thing in enumerate(things)}, arms
         self._numbers = [int(arm[-1]) for arm in arms]
@@ -103,7 +105,7 @@ class Holding:
             self._touched += 1.0
             self._touched *= touch
             for i, j in np.argwhere(self._touched == self._settled):
-                self._take(i, j)
+                self._begin_hold(i, j)
             if self._welds is not None:
                 self._data.eq_active[self._welds[~touch]] = 0
             for i in range(len(self._bodies)):
@@ -150,7 +152,7 @@ class Holding:
         if holder < 0 or not self._touched[i, holder]:
             self._holder[i] = int(np.argmax(holding)) if holding.any() else -1
 
-    def _take(self, i: int, j: int) -> None:
+    def _begin_hold(self, i: int, j: int) -> None:
         data, body, finger = self._data, self._bodies[i], self._fingers[j]
         contacts = self._contacts[i, j]
         point = (contacts[:, 1:] / contacts[:, :1]).mean(axis=0)

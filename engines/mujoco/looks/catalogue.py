@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import get_args
 
-from engines.mujoco.looks import cart, contact, ecm, instruments, psm, setup_joints
+from engines.mujoco.looks import cart, collision_shapes, ecm, instruments, psm, setup_joints
 from engines.mujoco.looks.part import Collisions, Looks
 from robots.dvrk.instruments import instrument
 from robots.dvrk.setup_joints import CartArm
@@ -48,11 +48,11 @@ def collision(what: str) -> Collisions:
         MotionError: no such instrument, or nothing of this name.
     """
     if what.startswith(_INSTRUMENT):
-        return contact.instrument(instrument(what.removeprefix(_INSTRUMENT)))
+        return collision_shapes.instrument(instrument(what.removeprefix(_INSTRUMENT)))
     for arm in get_args(CartArm):
         if what == f"suj/{arm}":
-            return contact.setup_joint(arm)
-    simple = {"psm": contact.psm, "ecm": contact.ecm, "cart": contact.cart}
+            return collision_shapes.setup_joint(arm)
+    simple = {"psm": collision_shapes.psm, "ecm": collision_shapes.ecm, "cart": collision_shapes.cart}
     if what not in simple:
         raise _nothing(what)
     return simple[what]()

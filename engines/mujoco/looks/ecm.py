@@ -17,9 +17,9 @@ from engines.mujoco.looks.solids import (
     outline,
     part,
     plate,
+    revolve,
     rod,
     taper,
-    turned,
     union,
 )
 from robots.dvrk.linkage import ECM
@@ -50,7 +50,7 @@ def parts() -> Looks:
 
 def _base() -> tuple[Part, ...]:
     """Drum of the yaw motor on the mount, 0.6126 m behind the remote centre and 0.1016 m below it."""
-    drum = turned(
+    drum = revolve(
         [(0.0, 0.0), (0.046, 0.0), (0.0586, 0.014), (0.0586, 0.142), (0.0, 0.142)],
         (0.0, -0.695, 0.0),
         (0.0, 1.0, 0.0),
@@ -233,7 +233,7 @@ def _endoscope() -> tuple[Part, ...]:
     """
     shaft = rod((0.0, 0.0, -0.0002), (0.0, 0.0, 0.335), 0.006)
     lens = rod((0.0, 0.0, -0.0007), (0.0, 0.0, -0.0002), 0.0054)
-    adapter = turned(
+    adapter = revolve(
         [
             (0.0, 0.330),
             (0.0100, 0.330),
@@ -244,7 +244,7 @@ def _endoscope() -> tuple[Part, ...]:
             (0.0, 0.440),
         ]
     )
-    collar = turned([(0.0, 0.440), (0.0330, 0.440), (0.0330, 0.487), (0.0270, 0.495), (0.0, 0.495)])
+    collar = revolve([(0.0, 0.440), (0.0330, 0.440), (0.0330, 0.487), (0.0270, 0.495), (0.0, 0.495)])
     head = plate(
         "z",
         outline([(-0.035, -0.0403), (0.035, -0.0403), (0.035, 0.0387), (-0.035, 0.0387)], 0.012),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from engines.mujoco.looks.fingers import finger_frame
 from engines.mujoco.looks.part import STEEL, Looks
-from engines.mujoco.looks.solids import block, part, placed, rod, union
+from engines.mujoco.looks.solids import block, part, place_solid, rod, union
 from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.end_effectors.end_effector import Mount
 
@@ -19,5 +19,5 @@ def parts(_electrode: Electrode, _instrument: str, mount: Mount) -> Looks:
     pose = finger_frame(mount)
     stem = rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.0130), 0.0008)
     hook = block((-0.0006, -0.0018, 0.0125), (0.0006, 0.0008, _LENGTH))
-    solid = placed(union(stem, hook), pose[:3, :3], pose[:3, 3])
+    solid = place_solid(union(stem, hook), pose[:3, :3], pose[:3, 3])
     return {mount.link: (part("electrode", solid, STEEL),)}

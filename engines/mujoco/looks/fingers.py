@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from engines.mujoco.looks.part import DARK, STEEL, Collisions, Looks, Part, Primitive
-from engines.mujoco.looks.solids import block, outline, part, placed, plate, rod, union
+from engines.mujoco.looks.solids import block, outline, part, place_solid, plate, rod, union
 from robots.dvrk.end_effectors.end_effector import Mount
 from robots.dvrk.end_effectors.jaw import FINGERS, Jaw
 from schemas.vectors import Vector
@@ -136,7 +136,8 @@ def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
         for label, solid, material in finished
     ]
     return tuple(
-        part(label, placed(solid, pose[:3, :3], pose[:3, 3]), material) for label, solid, material in solids
+        part(label, place_solid(solid, pose[:3, :3], pose[:3, 3]), material)
+        for label, solid, material in solids
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from engines.mujoco.looks import end_effectors
 from engines.mujoco.looks.part import BLACK, BLUE, SLATE, STEEL, Looks, Part
-from engines.mujoco.looks.solids import block, outline, part, placed, plate, rod, union
+from engines.mujoco.looks.solids import block, outline, part, place_solid, plate, rod, union
 from robots.dvrk import psm
 from robots.dvrk.end_effectors.end_effector import Mount
 from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS, Instrument
@@ -61,7 +61,7 @@ def _shaft(pitch: Vector) -> tuple[Part, ...]:
     height = pitch[2, 3]
     tube = rod((0.0, 0.0, height + 0.0091), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS, segments=12)
     core = rod((0.0, 0.0, height - 0.0019), (0.0, 0.0, height + 0.0091), SHAFT_RADIUS - 4e-5, segments=12)
-    slot = placed(
+    slot = place_solid(
         block((-0.01, -0.01, -0.01), (0.01, 0.01, 0.0028)) ^ block((-0.0021, -1.0, -1.0), (0.0021, 1.0, 1.0)),
         _drawing(pitch),
         pitch[:3, 3],
@@ -70,7 +70,7 @@ def _shaft(pitch: Vector) -> tuple[Part, ...]:
         block((-0.01, side * 0.0066 - 0.004, -0.0030), (0.01, side * 0.0066 + 0.004, 0.0))
         for side in (-1.0, 1.0)
     ]
-    ears = core - slot - placed(union(*flats), _drawing(pitch), pitch[:3, 3])
+    ears = core - slot - place_solid(union(*flats), _drawing(pitch), pitch[:3, 3])
     return part("shaft", tube, BLACK), part("clevis", ears, STEEL)
 
 
@@ -102,4 +102,4 @@ def _affine(rotation: Vector, frame: Vector) -> Vector:
 def _pin(name: str, frame: Vector) -> Part:
     """Pin of the wrist yaw."""
     pin = rod((0.0, 0.0, -0.0034), (0.0, 0.0, 0.0034), 0.0011)
-    return part(name, placed(pin, frame[:3, :3], frame[:3, 3]), STEEL)
+    return part(name, place_solid(pin, frame[:3, :3], frame[:3, 3]), STEEL)

@@ -11,7 +11,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from engines.mujoco.looks.part import BLACK, DARK, STEEL, Collisions, Looks, Part, Primitive
-from engines.mujoco.looks.solids import block, part, placed, rod, turned, union
+from engines.mujoco.looks.solids import block, part, place_solid, revolve, rod, union
 from robots.dvrk.end_effectors.end_effector import Mount
 from robots.dvrk.end_effectors.hand import Hand, HandLink
 from robots.dvrk.end_effectors.musha import TROCAR_RADIUS
@@ -52,12 +52,12 @@ def collision(hand: Hand, _instrument: str, mount: Mount) -> Collisions:
 def _palm(hand: Hand, shaft: Vector) -> Part:
     """A disc wider than the shaft, with a pair of ears for each finger."""
     radius, top = TROCAR_RADIUS - 1e-4, hand.palm - hand.radius
-    body = turned(
+    body = revolve(
         [(0.0, -0.004), (SHAFT_RADIUS, -0.004), (radius, 0.0), (radius, top), (0.0, top)], segments=14
     )
     first = [link for link in hand.bones if link.parent == "roll"]
-    ears = [placed(_ears(0.0, top - hand.palm), link.pose[:3, :3], link.pose[:3, 3]) for link in first]
-    return part("palm", placed(union(body, *ears), shaft[:3, :3], shaft[:3, 3]), STEEL)
+    ears = [place_solid(_ears(0.0, top - hand.palm), link.pose[:3, :3], link.pose[:3, 3]) for link in first]
+    return part("palm", place_solid(union(body, *ears), shaft[:3, :3], shaft[:3, 3]), STEEL)
 
 
 def _ears(end: float, start: float) -> Manifold:
@@ -83,12 +83,13 @@ def _phalanx(hand: Hand, link: HandLink, pose: Vector) -> tuple[Part, ...]:
         ] + [(0.0, end + radius)]
     else:
         profile += [(radius, end - 0.0006), (0.85 * radius, end), (0.0, end)]
-    barrel = turned(profile, axis=(1.0, 0.0, 0.0), segments=_SEGMENTS)
+    barrel = revolve(profile, axis=(1.0, 0.0, 0.0), segments=_SEGMENTS)
     pad = barrel ^ block((gap + 0.0012, 0.55 * radius, -1.0), (1.0 if is_last else end - 0.0010, 1.0, 1.0))
     solids = [hub, neck, barrel - pad]
     if not is_last:
         solids.append(_ears(length, end - 0.0004))
     finished = ((link.name, union(*solids), STEEL), (f"{link.name}_pad", pad, DARK if not is_last else BLACK))
     return tuple(
-        part(name, placed(solid, pose[:3, :3], pose[:3, 3]), material) for name, solid, material in finished
+        part(name, place_solid(solid, pose[:3, :3], pose[:3, 3]), material)
+        for name, solid, material in finished
     )

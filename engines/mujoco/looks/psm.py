@@ -24,9 +24,9 @@ from engines.mujoco.looks.solids import (
     outline,
     part,
     plate,
+    revolve,
     rod,
     taper,
-    turned,
     union,
 )
 from robots.dvrk.linkage import PSM
@@ -90,7 +90,7 @@ def _base() -> tuple[Part, ...]:
         0.058,
         0.008,
     )
-    drum = turned(
+    drum = revolve(
         [(0.0, 0.0), (0.055, 0.0), (0.067, 0.012), (0.067, 0.096), (0.0, 0.096)],
         (0.0, -0.776, 0.0),
         (0.0, 1.0, 0.0),

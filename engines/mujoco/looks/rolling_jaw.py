@@ -11,7 +11,7 @@ import numpy as np
 
 from engines.mujoco.looks.fingers import Shape, finger_frame, fingers, grips, shape
 from engines.mujoco.looks.part import DARK, Collisions, Looks, Primitive
-from engines.mujoco.looks.solids import block, part, placed
+from engines.mujoco.looks.solids import block, part, place_solid
 from robots.dvrk.end_effectors.end_effector import Mount
 from robots.dvrk.end_effectors.rolling_jaw import PADS, RollingJaw
 from schemas.vectors import Vector
@@ -25,7 +25,7 @@ def parts(jaw: RollingJaw, instrument: str, mount: Mount) -> Looks:
     looks = dict(fingers(_shape(instrument, jaw), pose))
     for name, centre, half in _pads(jaw):
         solid = block(tuple((centre - half).tolist()), tuple((centre + half).tolist()))
-        looks[name] = (part(name, placed(solid, pose[:3, :3], pose[:3, 3]), DARK),)
+        looks[name] = (part(name, place_solid(solid, pose[:3, :3], pose[:3, 3]), DARK),)
     return looks
 
 

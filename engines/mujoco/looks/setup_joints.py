@@ -13,7 +13,18 @@ import numpy as np
 from manifold3d import Manifold
 
 from engines.mujoco.looks.part import DARK, GREY, IVORY, Looks, Material
-from engines.mujoco.looks.solids import block, circle, outline, part, placed, plate, rod, taper, turned, union
+from engines.mujoco.looks.solids import (
+    block,
+    circle,
+    outline,
+    part,
+    place_solid,
+    plate,
+    revolve,
+    rod,
+    taper,
+    union,
+)
 from robots.dvrk.setup_joints import JOINT_NAMES, CartArm, chain
 
 __all__ = ["parts"]
@@ -45,7 +56,7 @@ def parts(arm: CartArm) -> Looks:
     }
     return {
         joint: tuple(
-            part(f"{joint}_{i}", placed(solid, frame[:3, :3], frame[:3, 3]), material)
+            part(f"{joint}_{i}", place_solid(solid, frame[:3, :3], frame[:3, 3]), material)
             for i, (solid, material) in enumerate(drawn[joint])
         )
         for joint, frame in zip(JOINT_NAMES, frames[:-1], strict=True)
@@ -54,7 +65,7 @@ def parts(arm: CartArm) -> Looks:
 
 def _lift(height: float) -> tuple[tuple[Manifold, Material], ...]:
     """Sledge on the column's rail, and the shoulder's bearing before it."""
-    post = turned([(0.0, 0.0), (_HUB - 0.012, 0.0), (_HUB, 0.012), (_HUB, height), (0.0, height)])
+    post = revolve([(0.0, 0.0), (_HUB - 0.012, 0.0), (_HUB, 0.012), (_HUB, height), (0.0, height)])
     neck = block((-0.095, -0.060, 0.02), (0.0, 0.060, height - 0.02))
     sledge = block((-0.1137, -0.0724, 0.0), (-0.092, 0.0724, height), 0.004)
     return (union(post, neck), IVORY), (sledge, DARK)
@@ -64,7 +75,7 @@ def _shoulder(length: float, top: float) -> tuple[tuple[Manifold, Material], ...
     """Upper arm from the shoulder to the elbow."""
     low, high = _UPPER_ARM
     beam = plate("z", taper(((0.0, 0.0), _HUB), ((length, 0.0), 0.0668)), low + 0.004, high)
-    cap = turned([(0.0, high - 0.01), (0.062, high - 0.01), (0.062, top - 0.014), (0.048, top), (0.0, top)])
+    cap = revolve([(0.0, high - 0.01), (0.062, high - 0.01), (0.062, top - 0.014), (0.048, top), (0.0, top)])
     return (union(beam, cap), IVORY), (rod((0.0, 0.0, low), (0.0, 0.0, low + 0.010), 0.066), DARK)
 
 
@@ -75,7 +86,7 @@ def _elbow(length: float, *, upside_down: bool) -> tuple[tuple[Manifold, Materia
     """
     low, high = _FOREARM
     beam = plate("z", taper(((0.0, 0.0), _ELBOW), ((length, 0.0), _WRIST)), low + 0.004, high)
-    cap = turned([(0.0, high - 0.01), (0.044, high - 0.01), (0.044, 0.154), (0.032, 0.1677), (0.0, 0.1677)])
+    cap = revolve([(0.0, high - 0.01), (0.044, high - 0.01), (0.044, 0.154), (0.032, 0.1677), (0.0, 0.1677)])
     bearings = [rod((0.0, 0.0, low), (0.0, 0.0, low + 0.010), 0.054)]
     if upside_down:
         return (union(beam, cap.mirror((0.0, 0.0, 1.0)).translate((length, 0.0, 0.0))), IVORY), (
@@ -90,7 +101,7 @@ def _wrist(*, above: bool) -> tuple[tuple[Manifold, Material], ...]:
     """Bearing of the tilt axis, which runs along -y, under the forearm or, for PSM3, on a post above it."""
     low, high = (-0.1999, 0.0478) if above else (-0.0477, 0.0731)
     post = rod((0.0, 0.0, low), (0.0, 0.0, high if not above else 0.0), _WRIST - 0.002)
-    tube = turned(
+    tube = revolve(
         [(0.0, 0.0), (0.036, 0.0), (0.0475, 0.012), (0.0475, 0.212), (0.0, 0.212)],
         (0.0, 0.162, 0.0),
         (0.0, -1.0, 0.0),
@@ -104,7 +115,7 @@ def _ecm_wrist() -> tuple[tuple[Manifold, Material], ...]:
     turn, origin = frames[3][:3, :3], frames[3][:3, 3]
     mount = turn.T @ (frames[5][:3, 3] - origin)
     normal = turn.T @ frames[5][:3, 2]
-    post = turned([(0.0, 0.0), (0.030, 0.0), (_WRIST, 0.03), (_WRIST, 0.2888), (0.0, 0.2888)])
+    post = revolve([(0.0, 0.0), (0.030, 0.0), (_WRIST, 0.03), (_WRIST, 0.2888), (0.0, 0.2888)])
     start, end = mount - 0.080 * normal, mount - 0.012 * normal
     pad = rod((start[0], start[1], start[2]), (end[0], end[1], end[2]), 0.050)
     foot = plate("z", circle((0.0, 0.0), 0.050), 0.02, 0.16)

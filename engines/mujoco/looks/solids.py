@@ -23,12 +23,12 @@ __all__ = [
     "hull",
     "outline",
     "part",
-    "placed",
+    "place_solid",
     "plate",
+    "revolve",
     "rod",
     "symmetric",
     "taper",
-    "turned",
     "union",
 ]
 
@@ -95,7 +95,7 @@ def plate(axis: Axis, shape: CrossSection, low: float, high: float, bevel: float
     if bevel > 0.0:
         inner = shape.offset(-bevel, JoinType.Round, circular_segments=_CORNER)
         solid = Manifold.batch_hull([solid, Manifold.extrude(inner, high - low).translate((0.0, 0.0, low))])
-    return placed(solid, _TURNS[axis])
+    return place_solid(solid, _TURNS[axis])
 
 
 def cheeks(shape: CrossSection, inner: float, outer: float, bevel: float = 0.0) -> Manifold:
@@ -124,10 +124,10 @@ def rod(
     solid = Manifold.cylinder(
         length, radius, -1.0 if end_radius is None else end_radius, segments or _segments(radius)
     )
-    return placed(solid, _turn_to(axis / length), start)
+    return place_solid(solid, _turn_to(axis / length), start)
 
 
-def turned(
+def revolve(
     profile: Sequence[Point2],
     origin: Point3 = (0.0, 0.0, 0.0),
     axis: Point3 = (0.0, 0.0, 1.0),
@@ -135,7 +135,7 @@ def turned(
 ) -> Manifold:
     """Turn a profile of (radius, height above `origin`), counter-clockwise, about `axis`."""
     direction = np.array(axis) / np.linalg.norm(axis)
-    return placed(
+    return place_solid(
         Manifold.revolve(
             CrossSection([np.array(profile)]), segments or _segments(max(r for r, _ in profile))
         ),
@@ -157,7 +157,7 @@ def cannula(radius: float, bowl: float, low: float, high: float) -> Manifold:
         (1.12 * radius, 0.004),
         (radius, 0.004),
     ]
-    return turned([*profile, (radius, 0.040), (bowl, 0.048), (bowl, high), (0.0, high)])
+    return revolve([*profile, (radius, 0.040), (bowl, 0.048), (bowl, high), (0.0, high)])
 
 
 def union(*solids: Manifold) -> Manifold:
@@ -173,7 +173,7 @@ def hull(name: str, points: Vector, material: Material) -> Part:
     )
 
 
-def placed(
+def place_solid(
     solid: Manifold, rotation: Vector, translation: Sequence[float] | Vector = (0.0, 0.0, 0.0)
 ) -> Manifold:
     """Return `solid` turned by `rotation`, shape (3, 3), then moved by `translation`."""

@@ -30,10 +30,10 @@ def frame_names(scene: SceneParams, cameras: Sequence[str]) -> tuple[str, ...]:
     `world` and, on a cart, `Cart`, which is the same; `<arm>_base`, an arm's remote centre of motion;
     fixtures; `<arm>`, its tip; `<camera>_left_optical` of each of `cameras`, if there is an ECM; objects.
     """
-    return (*_fixed(scene), *scene.arms, *_optical(scene, cameras), *scene.objects)
+    return (*_fixed_frames(scene), *scene.arms, *_optical(scene, cameras), *scene.objects)
 
 
-def _fixed(scene: SceneParams) -> tuple[str, ...]:
+def _fixed_frames(scene: SceneParams) -> tuple[str, ...]:
     roots = (WORLD_FRAME, CART_FRAME) if scene.mounting == "cart" else (WORLD_FRAME,)
     return (*roots, *(f"{arm}_base" for arm in scene.arms), *scene.fixtures)
 
@@ -47,7 +47,7 @@ class SceneFrames:
 
     def __init__(self, scene: SceneParams, model: mujoco.MjModel) -> None:
         """`model`: made of `scene`."""
-        self.fixed = frozenset(_fixed(scene))
+        self.fixed = frozenset(_fixed_frames(scene))
         """Those that never move."""
         self._site = {f"{arm}_base": model.site(f"{arm}/base").id for arm in scene.arms}
         self._site |= {arm: model.site(f"{arm}/tip").id for arm in scene.arms}

@@ -81,7 +81,7 @@ class MarkerStore:
     def shown(self) -> ShownMarkers:
         """All markers now; the same message until something changes."""
         if self._shown is None:
-            self._shown = _packed(self._markers, Time.from_ns(self._changed_ns))
+            self._shown = _pack_markers(self._markers, Time.from_ns(self._changed_ns))
         return self._shown
 
     def apply(self, message: MarkerArray, t_ns: int, pose_of: PoseOf) -> list[str]:
@@ -92,14 +92,14 @@ class MarkerStore:
         reasons: list[str] = []
         for marker in message.markers:
             try:
-                self._take(marker, t_ns, pose_of)
+                self._apply_action(marker, t_ns, pose_of)
             except MessageError as error:
                 reasons.append(f"marker '{marker.ns[:_SHOWN_LETTERS]}' {marker.id}: {error}")
         if len(reasons) < len(message.markers):
-            self._changed(t_ns)
+            self._note_change(t_ns)
         return reasons
 
-    def _take(self, marker: Marker, t_ns: int, pose_of: PoseOf) -> None:
+    def _apply_action(self, marker: Marker, t_ns: int, pose_of: PoseOf) -> None:
         if marker.action == MarkerAction.DELETEALL:
             for key in [key for key in self._markers if marker.ns in ("", key[0])]:
                 self._remove(key)
@@ -107,7 +107,7 @@ class MarkerStore:
             if (marker.ns, marker.id) in self._markers:
                 self._remove((marker.ns, marker.id))
         elif marker.action == MarkerAction.ADD:
-            self._add((marker.ns, marker.id), self._made(marker, t_ns, pose_of))
+            self._add((marker.ns, marker.id), self._shown_marker(marker, t_ns, pose_of))
         else:
             raise MessageError(
                 f"action {marker.action}; allowed are 0 (add or modify), 2 (delete), 3 (delete all)"
@@ -130,7 +130,7 @@ class MarkerStore:
     def _remove(self, key: tuple[str, int]) -> None:
         self._weight -= self._markers.pop(key).weight
 
-    def _made(self, marker: Marker, t_ns: int, pose_of: PoseOf) -> ShownMarker:
+    def _shown_marker(self, marker: Marker, t_ns: int, pose_of: PoseOf) -> ShownMarker:
         kind, points = marker.type, _points(marker)
         check(marker, points, self._frames, self._objects)
         if kind == MarkerType.MESH_RESOURCE and len(points):
@@ -138,7 +138,7 @@ class MarkerStore:
         frame, position = marker.header.frame_id, marker.pose.position
         pose = np.array([position.x, position.y, position.z, *orientation(marker.pose.orientation)])
         if not marker.frame_locked and frame not in self._fixed:
-            frame, pose = _WORLD, _moved(pose_of(frame), pose)
+            frame, pose = _WORLD, _pose_in_world(pose_of(frame), pose)
         lifetime = marker.lifetime.ns
         is_text = kind == MarkerType.TEXT_VIEW_FACING
         return ShownMarker(
@@ -158,9 +158,9 @@ class MarkerStore:
         if self._next_ns and t_ns >= self._next_ns:
             for key in [key for key, one in self._markers.items() if 0 < one.expires_ns <= t_ns]:
                 self._remove(key)
-            self._changed(t_ns)
+            self._note_change(t_ns)
 
-    def _changed(self, t_ns: int) -> None:
+    def _note_change(self, t_ns: int) -> None:
         self._next_ns = min((one.expires_ns for one in self._markers.values() if one.expires_ns), default=0)
         self._changed_ns, self._shown = t_ns, None
 
@@ -169,7 +169,7 @@ class MarkerStore:
         keys = zip(shown.namespaces, shown.ids.tolist(), strict=True)
         self._markers = dict(zip(keys, shown_markers(shown), strict=True))
         self._weight = sum(one.weight for one in self._markers.values())
-        self._changed(shown.header.stamp.ns)
+        self._note_change(shown.header.stamp.ns)
 
 
 def _points(marker: Marker) -> Vector:
@@ -182,13 +182,13 @@ def _rgba(colors: list[ColorRGBA]) -> NDArray[np.float32]:
     return np.array([[c.r, c.g, c.b, c.a] for c in colors], np.float32).reshape(-1, 4)
 
 
-def _moved(frame: Vector, pose: Vector) -> Vector:
+def _pose_in_world(frame: Vector, pose: Vector) -> Vector:
     """Return a pose in `frame`, shape (7,), in the world, where `frame` has a pose of shape (4, 4)."""
     turned = rotation.product(rotation.from_matrix(frame), pose[3:])
     return np.concatenate([frame[:3, :3] @ pose[:3] + frame[:3, 3], turned / np.linalg.norm(turned)])
 
 
-def _packed(markers: dict[tuple[str, int], ShownMarker], stamp: Time) -> ShownMarkers:
+def _pack_markers(markers: dict[tuple[str, int], ShownMarker], stamp: Time) -> ShownMarkers:
     each = list(markers.values())
 
     def joined(name: str, dtype: type[S]) -> NDArray[S]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from engines.mujoco.model import end_effector as end_effectors
 from engines.mujoco.model.names import sphere_site
-from engines.mujoco.model.poses import placed
+from engines.mujoco.model.poses import pose_attributes
 from engines.mujoco.model.rigid import tie
 from engines.mujoco.model.sensors import add_arm_sensors, add_sphere_sensors
 from engines.mujoco.model.servo import add_joint_drive
@@ -34,13 +34,15 @@ def add(spec: mujoco.MjSpec, name: CartArm, params: MountedArm, base_pose: Vecto
 
     `base_pose`: pose of the base frame in the world, shape (4, 4).
     """
-    base = spec.worldbody.add_body(name=f"{name}/{BASE}", **placed(base_pose))
+    base = spec.worldbody.add_body(name=f"{name}/{BASE}", **pose_attributes(base_pose))
     base.add_site(name=f"{name}/base", group=_HIDDEN)
     bodies = {BASE: (base, np.eye(4))}
     for link in links(name, params):
         above, above_pose = bodies[link.parent]
         body = above.add_body(
-            name=f"{name}/{link.name}", gravcomp=1.0, **placed(inverse_transform(above_pose) @ link.pose)
+            name=f"{name}/{link.name}",
+            gravcomp=1.0,
+            **pose_attributes(inverse_transform(above_pose) @ link.pose),
         )
         bodies[link.name] = body, link.pose
         _add_joint(spec, body, name, link)
@@ -50,7 +52,7 @@ def add(spec: mujoco.MjSpec, name: CartArm, params: MountedArm, base_pose: Vecto
     end_effectors.add_motors(spec, name, effector, moved, params.drives)
     _add_discs(spec, name, params.discs)
     _set_inertias(bodies, params)
-    bodies[chain.joints[-1].name][0].add_site(name=f"{name}/tip", group=_HIDDEN, **placed(chain.tip))
+    bodies[chain.joints[-1].name][0].add_site(name=f"{name}/tip", group=_HIDDEN, **pose_attributes(chain.tip))
     add_arm_sensors(spec, name, [joint.name for joint in chain.joints])
     end_effectors.add_sensors(spec, name, effector, moved)
     _add_spheres(spec, name, params.spheres, bodies)

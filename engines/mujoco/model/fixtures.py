@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model.objects import LEVEL
-from engines.mujoco.model.poses import placed
+from engines.mujoco.model.poses import pose_attributes
 from robots.training.dishes import DISH
 from robots.training.fixtures import BoardParams, DiscBoxParams, DishParams, FixtureParams, PhantomParams
 from robots.training.targets import BOX, DISC_HEIGHT, DISC_RADIUS, DISCS
@@ -126,4 +126,4 @@ def _at(
     """Add a body at `offset` (m) in the frame of the fixture at `pose`, shape (4, 4)."""
     there = pose.copy()
     there[:3, 3] += pose[:3, :3] @ offset
-    return spec.worldbody.add_body(name=name, **placed(there))
+    return spec.worldbody.add_body(name=name, **pose_attributes(there))

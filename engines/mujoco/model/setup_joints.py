@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import shapes
-from engines.mujoco.model.poses import placed
+from engines.mujoco.model.poses import pose_attributes
 from engines.mujoco.params import SceneParams
 from robots.dvrk import setup_joints
 from robots.dvrk.setup_joints import CartArm
@@ -37,7 +37,9 @@ def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
         drawn = chain.frames(np.zeros(len(setup_joints.JOINT_NAMES)))
         body, above, bodies = cart, np.eye(4), dict[str, tuple[mujoco.MjsBody, Vector]]()
         for joint, pose, zero in zip(setup_joints.JOINT_NAMES, poses, drawn[:-1], strict=True):
-            body = body.add_body(name=f"SUJ/{arm}/{joint}", **placed(inverse_transform(above) @ pose))
+            body = body.add_body(
+                name=f"SUJ/{arm}/{joint}", **pose_attributes(inverse_transform(above) @ pose)
+            )
             bodies[joint], above = (body, zero), pose
         shapes.add(spec, f"suj/{arm}", f"SUJ/{arm}", bodies, seen=scene.looks)
         for joint, mass in zip(setup_joints.JOINT_NAMES, setup_joints.MASSES[arm], strict=True):

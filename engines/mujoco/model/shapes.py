@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco import looks
-from engines.mujoco.model.poses import placed
+from engines.mujoco.model.poses import pose_attributes
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
@@ -96,7 +96,7 @@ def _add_collision(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *
                     type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, contype=0, conaffinity=_THINGS, **common
                 )
             else:
-                place = placed(inverse_transform(pose) @ shape.pose)
+                place = pose_attributes(inverse_transform(pose) @ shape.pose)
                 body.add_geom(
                     type=_KINDS[shape.kind],
                     size=[*shape.size, 0.0, 0.0][:3],

@@ -119,7 +119,7 @@ class Endoscope(Stepped):
         """
         self._positions[:] = inputs["qpos"]
         for organ, body in self._bodies.items():
-            body.take(inputs.message(f"{organ}/nodes"))
+            body.accept(inputs.message(f"{organ}/nodes"))
         if self.params.markers:
             self._shown = cast("ShownMarkers | None", inputs.message("markers"))
         if not self._gl:
@@ -154,13 +154,13 @@ class Endoscope(Stepped):
         if params.images != "raw":
             yield (
                 "image_raw/compressed",
-                CompressedImage(header=header, format=params.format, data=self._compressed(pixels)),
+                CompressedImage(header=header, format=params.format, data=self._compress(pixels)),
             )
 
     def _outputs(self, messages: Mapping[str, Message]) -> Outputs:
         return {port.name: (messages[port.name],) if messages else () for port in self._pictures}
 
-    def _compressed(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _compress(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         from PIL import Image as Picture
 
         file = BytesIO()

@@ -160,7 +160,7 @@ class RecordedScene:
             for time_ns in times_ns:
                 for name, newest in nodes.items():
                     if (message := newest.at(time_ns)) is not None:
-                        bodies[name].take(self._decoded(SoftBodyState, message))
+                        bodies[name].accept(self._decoded(SoftBodyState, message))
                 yield scene.draw(
                     self._positions(positions.at(time_ns), time_ns), self._shown(markers, time_ns)
                 )
@@ -186,7 +186,7 @@ class RecordedScene:
             first = next(self._recording.messages(topic), None)
             if first is not None and first.time_ns <= time_ns:
                 bodies[name] = SoftBody(topic)
-                bodies[name].take(self._decoded(SoftBodyState, first))
+                bodies[name].accept(self._decoded(SoftBodyState, first))
         return bodies
 
     def _decoded(self, model: type[M], message: BagMessage) -> M:

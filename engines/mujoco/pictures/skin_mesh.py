@@ -58,7 +58,7 @@ class SkinMesh:
         """Return the vertices, shape (v, 3), m, for `nodes`, shape (n, 3), m: those at nodes come first."""
         points = nodes[self._node]
         for division in self._divisions:
-            points = division.refined(points)
+            points = division.refine(points)
         return points
 
 
@@ -82,7 +82,7 @@ class _Division:
         self.faces: Indices = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, ab, bc, ca], axis=1).reshape(-1, 3)
         """Shape (4 f, 3): the old vertices, then one for each edge."""
 
-    def refined(self, points: Vector) -> Vector:
+    def refine(self, points: Vector) -> Vector:
         """Return `points`, shape (v, 3), m, and after them the middles of the curved edges."""
         a, b, c = (points[self._corners[:, i]] for i in range(3))
         areas = np.cross(b - a, c - a)

@@ -46,7 +46,7 @@ class SoftBody:
         self.triangles: NDArray[np.uint32] = np.zeros((0, 3), np.uint32)
         """Node indices, shape (f, 3), counter-clockwise from outside."""
 
-    def take(self, message: Message | None) -> None:
+    def accept(self, message: Message | None) -> None:
         """Take the newest message.
 
         Raises SessionError if the surface is unknown, or the message does not fit it.

@@ -43,10 +43,10 @@ class ViewScene:
     def parts(self) -> tuple[Part, ...]:
         """The visible meshes, those of one body and one colour as one."""
         pieces: dict[tuple[int, tuple[float, ...]], list[Triangles]] = {}
-        for geom in self._shown():
+        for geom in self._visible_geoms():
             body = int(self._model.geom_bodyid[geom])
             pieces.setdefault((body, self._colour(geom)), []).append(self._triangles(geom))
-        return tuple(_merged(body, colour, found) for (body, colour), found in pieces.items())
+        return tuple(_merge_triangles(body, colour, found) for (body, colour), found in pieces.items())
 
     @property
     def frames(self) -> tuple[Frame, ...]:
@@ -84,7 +84,7 @@ class ViewScene:
         mujoco.mj_kinematics(self._model, data)
         return np.hstack([data.xpos, data.xquat[:, 1:], data.xquat[:, :1]]).astype(np.float32)
 
-    def _shown(self) -> Iterator[int]:
+    def _visible_geoms(self) -> Iterator[int]:
         for geom in range(self._model.ngeom):
             if self._model.geom_group[geom] < _SHOWN_GROUPS and self._colour(geom)[3] > 0.0:
                 yield geom
@@ -112,7 +112,7 @@ class ViewScene:
         return Triangles(found.vertices @ turn.T + model_.geom_pos[geom], found.faces)
 
 
-def _merged(body: int, colour: tuple[float, ...], pieces: list[Triangles]) -> Part:
+def _merge_triangles(body: int, colour: tuple[float, ...], pieces: list[Triangles]) -> Part:
     starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
     faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=False)]
     red, green, blue, opacity = colour

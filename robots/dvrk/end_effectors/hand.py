@@ -203,7 +203,11 @@ class Hand(EndEffector):
     def positions(self, command: Vector) -> Mapping[str, float]:
         """Return the positions of the phalanges at rest, free of contact."""
         return dict(
-            zip((bone.name for bone in self.bones), self.unloaded(command).ravel().tolist(), strict=True)
+            zip(
+                (bone.name for bone in self.bones),
+                self.unloaded_positions(command).ravel().tolist(),
+                strict=True,
+            )
         )
 
     def bodies(self, mount: Mount, /) -> Mapping[str, Inertia]:
@@ -265,7 +269,7 @@ class Hand(EndEffector):
         start, end = np.array(pattern.open), np.array(pattern.closed)
         return start + closing * (end - start)
 
-    def unloaded(self, command: Vector) -> Vector:
+    def unloaded_positions(self, command: Vector) -> Vector:
         """Return the joint positions (rad), shape (fingers, phalanges), of fingers that touch nothing.
 
         The command has shape (2 fingers,).

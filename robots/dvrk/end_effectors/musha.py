@@ -48,7 +48,7 @@ _OUT = radians(-85.0)
 """A finger at right angles to the shaft, all but 5 degrees."""
 
 
-def _bent(spread: float, bend: float) -> tuple[float, float]:
+def _bend_finger(spread: float, bend: float) -> tuple[float, float]:
     """Return closing and spread of a bent finger.
 
     Its first joint is at `spread`, and the others are both at `bend` > 0 (rad).
@@ -66,8 +66,8 @@ def _mode(*fingers: tuple[tuple[float, float], tuple[float, float]]) -> Mode:
 
 
 _STRAIGHT, _FAN = (0.0, 0.0), (_OUT, _OUT)
-_PARALLEL = _bent(radians(-70.0), radians(35.0)), _bent(0.0, 1e-9)
-_CURL = _bent(radians(-60.0), radians(1e-9)), _bent(radians(-15.0), radians(80.0))
+_PARALLEL = _bend_finger(radians(-70.0), radians(35.0)), _bend_finger(0.0, 1e-9)
+_CURL = _bend_finger(radians(-60.0), radians(1e-9)), _bend_finger(radians(-15.0), radians(80.0))
 
 _MODES = {
     "folded": _mode(*[(_STRAIGHT, _STRAIGHT)] * 3),

@@ -65,13 +65,13 @@ def test_unloaded_fingers_come_to_rest_where_their_springs_say(mode, closing):
     goal = HAND.command(mode, closing)
     run = Run().go(goal)
     assert np.allclose(run.closings, goal[:3], atol=2e-3)
-    assert np.allclose(run.positions, HAND.unloaded(goal), atol=np.radians(0.1))
+    assert np.allclose(run.positions, HAND.unloaded_positions(goal), atol=np.radians(0.1))
     assert np.abs(run.outputs["PSM1/hand/phalanges/measured_js"][9:18]).max() < 1e-3
 
 
 def test_a_hand_starts_where_it_is_told():
     closings = HAND.command("caliper", 0.2)
-    assert np.allclose(Run(hand=closings.tolist()).positions, HAND.unloaded(closings), atol=1e-12)
+    assert np.allclose(Run(hand=closings.tolist()).positions, HAND.unloaded_positions(closings), atol=1e-12)
 
 
 def test_spheres_are_where_the_robots_kinematics_have_them():
@@ -92,7 +92,7 @@ def test_a_blocked_phalanx_lets_the_others_go_on():
     run.go(command, 600)
     assert run.positions[0, 1] == pytest.approx(start[0, 1], abs=np.radians(1.0))
     # the distal joint takes up what is wound up
-    assert run.positions[0, 2] > HAND.unloaded(command)[0, 2] + np.radians(10.0)
+    assert run.positions[0, 2] > HAND.unloaded_positions(command)[0, 2] + np.radians(10.0)
 
 
 def test_opening_pushes_no_harder_than_springs_and_rotor():
@@ -155,9 +155,15 @@ def test_an_exported_hand_reads_back(tmp_path):
     robot = yourdfpy.URDF.load(str(tmp_path / "hand.urdf"), load_meshes=False)
     q = {**dict.fromkeys(robot.actuated_joint_names, 0.0), "PSM1_insertion": 0.12}
     command = HAND.command("caliper", 0.3)
-    q |= dict(zip((f"PSM1_{link.name}" for link in HAND.bones), HAND.unloaded(command).ravel(), strict=True))
+    q |= dict(
+        zip(
+            (f"PSM1_{link.name}" for link in HAND.bones),
+            HAND.unloaded_positions(command).ravel(),
+            strict=True,
+        )
+    )
     robot.update_cfg(q)
     shaft = arms.chain("PSM1", "MUSHA_HAND").frames(np.array([0.0, 0.0, 0.12, 0.0]))[3]
-    expected = (shaft @ [*HAND.contacts(HAND.unloaded(command))[0, 2], 1.0])[:3]
+    expected = (shaft @ [*HAND.contacts(HAND.unloaded_positions(command))[0, 2], 1.0])[:3]
     distal = robot.get_transform("PSM1_finger1_distal_link", "PSM1_base")
     assert np.allclose((distal @ [HAND.phalanges[-1].length, 0.0, 0.0, 1.0])[:3], expected, atol=1e-9)

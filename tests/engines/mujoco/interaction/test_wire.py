@@ -6,7 +6,7 @@ import pytest
 
 from engines.mujoco import model
 from engines.mujoco.interaction.rigid_contact import RigidContact
-from engines.mujoco.interaction.wire import Wire
+from engines.mujoco.interaction.wire_bond import WireBond
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.ports import bond_sides
 from hub.participant import BondPlan, Inputs, MotionSide
@@ -33,7 +33,7 @@ def scene():
 def wire(scene):
     params, built, data = scene
     side = next(one for one in bond_sides(params) if one.name == "needle/wire")
-    return Wire("needle", params.objects["needle"], MotionSide(side, PLAN), built, data)
+    return WireBond("needle", params.objects["needle"], MotionSide(side, PLAN), built, data)
 
 
 def test_its_points_are_base_middle_and_tip_and_move_as_the_needle_does(scene):
@@ -68,9 +68,9 @@ def test_forces_on_its_points_are_one_load_and_the_drag_lasts_as_long_as_they_do
 
 def test_the_drag_stands_for_mass_behind_its_points(scene):
     params, built, data = scene
-    least = Wire.least_mass("needle", params.objects["needle"], built, data)
+    least = WireBond.least_mass("needle", params.objects["needle"], built, data)
     free = params.objects["needle"].model_copy(update={"drag": 0.0})
-    assert 0.0 < Wire.least_mass("needle", free, built, data) < 0.1 * least
+    assert 0.0 < WireBond.least_mass("needle", free, built, data) < 0.1 * least
 
 
 def test_the_holder_has_it_as_tip_wrench_and_no_more_as_rigid_wrench(scene):

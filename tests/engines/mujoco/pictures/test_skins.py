@@ -107,10 +107,10 @@ def skin_of(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Vertices and normals of the scene that MuJoCo makes of a skin, as any of its renderers draws it."""
     body, scene = SoftBody("organ/nodes"), mujoco.MjSpec()
-    body.take(message(nodes, triangles))
+    body.accept(message(nodes, triangles))
     skins = Skins(scene, {"organ": body}, {"organ": SkinParams()})
     model = scene.compile()
-    body.take(message(moved))
+    body.accept(message(moved))
     skins.show(model)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

@@ -11,13 +11,13 @@ from engines.mujoco.model.poses import ROS_ORDER
 from hub.participant import Inputs, MotionSide
 from schemas.vectors import Vector
 
-__all__ = ["Probe"]
+__all__ = ["ProbeBond"]
 
 _W_FIRST = [6, 3, 4, 5]
 """MuJoCo's quaternion in a ROS pose."""
 
 
-class Probe:
+class ProbeBond:
     """Views of the model's data for a probe; nothing is allocated in a step."""
 
     acts_off_centre = False

@@ -17,7 +17,7 @@ import numpy as np
 from robots.dvrk.end_effectors.jaw import FINGERS
 from schemas.vectors import Vector
 
-__all__ = ["Rays"]
+__all__ = ["ProximityRays"]
 
 _START, _RANGE = 5e-3, 8e-3
 """m, along the fingers of a needle driver from the wrist yaw axis."""
@@ -25,7 +25,7 @@ _DRIVER = 10.2e-3
 """Length of these fingers, m (robots.dvrk.instruments)."""
 
 
-class Rays:
+class ProximityRays:
     """The rays of some arms, and the objects in reach."""
 
     def __init__(

@@ -17,10 +17,10 @@ from robots.training.needles import NeedleShape
 from robots.vector3 import cross
 from schemas.vectors import Vector
 
-__all__ = ["Wire"]
+__all__ = ["WireBond"]
 
 
-class Wire:
+class WireBond:
     """Views of the model's data for a needle."""
 
     acts_off_centre = False

@@ -10,10 +10,10 @@ from engines.mujoco.model import CONTACT
 from hub.participant import Inputs, MotionSide
 from schemas.vectors import Vector
 
-__all__ = ["Spheres"]
+__all__ = ["ContactSpheresBond"]
 
 
-class Spheres:
+class ContactSpheresBond:
     """Views of the model's data for the spheres of an instrument.
 
     A force stays with the sphere's centre; the centre moves against the link's centre of mass.
