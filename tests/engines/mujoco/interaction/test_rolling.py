@@ -40,7 +40,7 @@ def scene(hold=0.5, **more):
     touching = 2.0 * np.arcsin(TOOL.jaw.wire_radius / TOOL.jaw.distance)
     needle = {
         "kind": "needle",
-        "position": pose[:3, 3].tolist(),
+        "position": pose[:3, 3].round(12).tolist(),  # a length below 1 nm is refused
         "orientation": rotation.from_matrix(pose).tolist(),
     }
     arm = {"instrument": TOOL.name, "start": START.tolist(), "jaw": float(touching) - 1e-3}
