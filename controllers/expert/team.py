@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from controllers.expert.chore import Chore
-from controllers.expert.hand import HandPhase, HandRole
+from controllers.expert.hand import HandPhase, HandRole, HandState, RobotHand
 from controllers.expert.progress import ObservedObjects, Progress, Verdict
 from hub.participant import Record, array
 
-if TYPE_CHECKING:
-    from controllers.expert.errand import Errand
-
-__all__ = ["Refusals", "Team"]
+__all__ = ["Refusals", "Team", "TeamMember"]
 
 _TRIES = 8
 """Grasps of an object per leg before the object is left; a hand-over of a fallen ring needs three."""
@@ -35,6 +32,14 @@ class Refusals(Record):
     """1 for each object out of the hand's reach at the object's present place."""
 
 
+class TeamMember(Protocol):
+    """One hand with its task, as a team sees it."""
+
+    hand: RobotHand
+    state: HandState
+    refusals: Refusals
+
+
 class Team:
     """One hand, two hands side by side, or two hands with hand-over.
 
@@ -46,14 +51,14 @@ class Team:
     def __init__(self, chore: Chore, seen: ObservedObjects, progress: Progress, *, hand_over: bool) -> None:
         """`seen` and `progress` are shared by all hands; `hand_over`: two hands pass objects on."""
         self.chore, self.seen, self.progress, self._hand_over = chore, seen, progress, hand_over
-        self.hands: list[Errand] = []
+        self.hands: list[TeamMember] = []
         self._sides: dict[str, int] = {}
 
-    def add(self, hand: Errand) -> None:
+    def add(self, hand: TeamMember) -> None:
         """Add a hand; the surgeon's right hand first."""
         self.hands.append(hand)
 
-    def other(self, hand: Errand) -> Errand | None:
+    def other(self, hand: TeamMember) -> TeamMember | None:
         """Return the second hand of a team, seen from `hand`; None: `hand` works alone."""
         return next((each for each in self.hands if each is not hand), None)
 
@@ -62,7 +67,7 @@ class Team:
         """Target side of this leg."""
         return 1 - self.progress.leg % 2
 
-    def side_of(self, hand: Errand) -> int:
+    def side_of(self, hand: TeamMember) -> int:
         """Return the side nearest to a hand, relative to the other hand."""
         arm = hand.hand.arm
         if arm not in self._sides:
@@ -72,10 +77,10 @@ class Team:
             self._sides[arm] = int(nearer[1] - others[1] < nearer[0] - others[0])
         return self._sides[arm]
 
-    def _distance(self, hand: Errand, side: int) -> float:
+    def _distance(self, hand: TeamMember, side: int) -> float:
         return float(np.linalg.norm((hand.hand.base[:3, 3] - self.chore.middle_of(side))[:2]))
 
-    def destination(self, hand: Errand) -> int:
+    def destination(self, hand: TeamMember) -> int:
         """Return the side on which `hand` puts down its object."""
         return self.side_of(hand) if hand.state.role is HandRole.TAKER else self.goal
 
@@ -83,11 +88,11 @@ class Team:
         """Return whether an object is at its target of this leg."""
         return self.chore.is_done(index, self.seen.poses, self.goal)
 
-    def choice(self, hand: Errand) -> tuple[int, HandRole]:
+    def choice(self, hand: TeamMember) -> tuple[int, HandRole]:
         """Return index and role of the next object of `hand`; -1: none."""
         return self._exchange(hand) if self._hand_over else (self._next(hand), HandRole.ALONE)
 
-    def _exchange(self, hand: Errand) -> tuple[int, HandRole]:
+    def _exchange(self, hand: TeamMember) -> tuple[int, HandRole]:
         other = self.other(hand)
         if other is None:
             return -1, HandRole.ALONE
@@ -101,7 +106,7 @@ class Team:
                 return index, HandRole.GIVER
         return -1, HandRole.ALONE
 
-    def _next(self, hand: Errand) -> int:
+    def _next(self, hand: TeamMember) -> int:
         other = self.other(hand)
         if other is not None and other.state.phase in _PICKING:
             return -1  # the hands would collide
@@ -110,7 +115,7 @@ class Team:
                 return index
         return -1
 
-    def _open(self, hand: Errand) -> list[int]:
+    def _open(self, hand: TeamMember) -> list[int]:
         """Return the objects open to `hand`."""
         seen, other = self.seen, self.other(hand)
         taken = -1 if other is None else other.state.object_index
@@ -123,7 +128,7 @@ class Team:
             and not self.is_done(index)
         ]
 
-    def _is_nearer(self, index: int, hand: Errand, other: Errand) -> bool:
+    def _is_nearer(self, index: int, hand: TeamMember, other: TeamMember) -> bool:
         """Return whether an object's target is nearer to the arm of `hand` than to the arm of `other`."""
         place = self.chore.place(index, self.seen.poses, self.goal)[:2]
         mine, others = (np.linalg.norm(each.hand.base[:2, 3] - place) for each in (hand, other))
@@ -141,7 +146,7 @@ class Team:
                 elif all(hand.refusals.objects[index] for hand in self._eligible(index)):
                     seen.verdicts[index] = Verdict.NOT_REACHABLE
 
-    def _eligible(self, index: int) -> list[Errand]:
+    def _eligible(self, index: int) -> list[TeamMember]:
         """Return the hands allowed to pick an object up."""
         if not self._hand_over:
             return self.hands

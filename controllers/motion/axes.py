@@ -6,7 +6,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from controllers.motion.setpoint import Activity, Setpoint
+from controllers.motion.setpoint import Setpoint
+from controllers.motion.setpoint_state import Activity
 from hub.participant import Record, array, choice, flag
 from robots.serial_chain import SerialChain
 from schemas.vectors import Vector

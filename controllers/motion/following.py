@@ -6,14 +6,12 @@ All following setpoints of a step are computed together, at the number of numpy 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
+from controllers.motion.setpoint_state import SetpointState
 from schemas.vectors import Vector
-
-if TYPE_CHECKING:
-    from controllers.motion.setpoint import Setpoint
 
 __all__ = ["Followers", "clip", "fastest", "steer"]
 
@@ -23,10 +21,20 @@ def clip(value: Vector, lower: Vector, upper: Vector) -> Vector:
     return np.minimum(np.maximum(value, lower), upper)  # a third of the cost of np.clip
 
 
+class Follower(Protocol):
+    """A setpoint of n joints, as `Followers` use it."""
+
+    limits: Vector
+    """Position to either side, velocity and acceleration, shape (4, n)."""
+    course: Vector
+    """Position, velocity, acceleration, goal and velocity at the goal, shape (5, n)."""
+    state: SetpointState
+
+
 class Followers:
     """Setpoints following together, of N joints in all, with their constants."""
 
-    def __init__(self, setpoints: Sequence[Setpoint], h: float) -> None:
+    def __init__(self, setpoints: Sequence[Follower], h: float) -> None:
         """`h`: the step, s."""
         self.setpoints, self._h = list(setpoints), h
         self._courses = [setpoint.course for setpoint in setpoints]

@@ -9,17 +9,15 @@ a hand or a visual servo.
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from controllers.motion.following import Followers, clip, fastest, steer
-from hub.participant import Record, array, choice, flag, number
+from controllers.motion.setpoint_state import Activity, SetpointState
 from robots.serial_chain import Joint
 from schemas.vectors import Vector
 
-__all__ = ["FOLLOWING_ACCELERATION", "STREAM_GAP", "Activity", "Setpoint"]
+__all__ = ["FOLLOWING_ACCELERATION", "STREAM_GAP", "Setpoint"]
 
 FOLLOWING_ACCELERATION = 10.0
 """Acceleration of `servo_*` and of braking by `hold`, relative to the acceleration of trajectories.
@@ -44,42 +42,6 @@ _PASSING = 1e-9
 
 Excess between two points of comparison is clipped in the step.
 """
-
-
-class Activity(IntEnum):
-    """Activity of a setpoint."""
-
-    HOLD = 0
-    FOLLOW = 1
-    MOVE = 2
-    BRAKE = 3
-    DRIFT = 4
-
-
-class SetpointState(Record):
-    """State of the setpoint of n joints."""
-
-    position = array("n")
-    velocity = array("n")
-    acceleration = array("n")
-    goal = array("n")
-    arrival = array("n")
-    """Velocity at the goal of a stream, or velocity of a drift."""
-    origin = array(3, "n")
-    """Position, velocity and acceleration where the trajectory starts."""
-    activity = choice(Activity.HOLD)
-    elapsed = number()
-    """s since the start of the trajectory."""
-    since = number()
-    """s since the last command of a stream."""
-    waiting = number()
-    """s until the next command of a stream is due."""
-    pending = flag()
-    """Whether a move starts once the setpoint is at rest."""
-    stated = flag()
-    """Whether the sender states the velocity at the goal."""
-    ratio = array(2)
-    """Fractions of velocity, and of acceleration and jerk, for the trajectory."""
 
 
 class Setpoint:

@@ -12,8 +12,9 @@ from engines.bullet.elasticity.stable_step import ACCURATE_PHASE, face_loss, lon
 from engines.bullet.organs.anchors import add_rigid
 from engines.bullet.organs.organ import Organ
 from engines.bullet.params import BulletParams
-from engines.bullet.probes.contact_gain import CONTACT_PERIOD_NS, Contacts, Tissue
+from engines.bullet.probes.contact_gain import Contacts, Tissue
 from engines.bullet.probes.grasp import Grasp, grasp_ports, nothing_held
+from engines.bullet.probes.near_faces import CONTACT_PERIOD_NS
 from engines.bullet.probes.params import Coupling, ProbeParams
 from engines.bullet.probes.probe import Probe
 from engines.bullet.probes.sub_grid import SubGrid, Surface

@@ -20,17 +20,11 @@ from engines.bullet.elasticity.forces import Elasticity
 from engines.bullet.elasticity.material import Material
 from engines.bullet.meshing.tet_mesh import Indices
 from engines.bullet.organs.organ import Organ
-from engines.bullet.probes.near_faces import NearFaces, near_faces
+from engines.bullet.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, near_faces
 from engines.bullet.probes.probe import Probe
 from schemas.vectors import Vector
 
-__all__ = ["BAND_M", "CONTACT_PERIOD_NS", "Contacts", "Tissue"]
-
-CONTACT_PERIOD_NS = 8_000_000
-"""Period of readings of the nodes, for the places of contact and the received forces."""
-
-BAND_M = 6e-4
-"""Largest distance of faces sharing the force of a sphere; in the first guess the nearest face bears most."""
+__all__ = ["Contacts", "Tissue"]
 
 _LARGEST_GAIN = 4.0 / 3.0
 

@@ -10,7 +10,13 @@ from engines.bullet.meshing.tet_mesh import Indices
 from robots.vector3 import cross
 from schemas.vectors import Vector
 
-__all__ = ["NearFaces", "closest_points", "near_faces"]
+__all__ = ["BAND_M", "CONTACT_PERIOD_NS", "NearFaces", "closest_points", "near_faces"]
+
+CONTACT_PERIOD_NS = 8_000_000
+"""Period of readings of the nodes, for the places of contact and the received forces."""
+
+BAND_M = 6e-4
+"""Largest distance of faces sharing the force of a sphere; in the first guess the nearest face bears most."""
 
 _NEXT = (1, 2, 0)
 """Corner of a triangle after each."""

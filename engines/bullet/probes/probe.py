@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engines.bullet.probes.held_patch import HeldPatch
+from engines.bullet.probes.near_faces import NearFaces
 from engines.bullet.probes.params import Coupling, ProbeParams
+from engines.bullet.probes.sub_grid import SubGrid
 from engines.bullet.world import COLLISION_MARGIN_M
 from hub.participant import BondPlan, ForceSide, Inputs
 from schemas.errors import SessionError
 from schemas.ports import BondSide
 from schemas.vectors import Vector
-
-if TYPE_CHECKING:
-    from engines.bullet.probes.held_patch import HeldPatch
-    from engines.bullet.probes.near_faces import NearFaces
-    from engines.bullet.probes.sub_grid import SubGrid
 
 __all__ = ["Probe"]
 

@@ -21,8 +21,7 @@ from engines.bullet.elasticity.material import Material
 from engines.bullet.elasticity.rims import rim_share
 from engines.bullet.meshing.tet_mesh import Indices
 from engines.bullet.organs.organ import Organ
-from engines.bullet.probes.contact_gain import BAND_M, CONTACT_PERIOD_NS
-from engines.bullet.probes.near_faces import NearFaces, closest_points
+from engines.bullet.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, closest_points
 from engines.bullet.probes.params import Coupling
 from schemas.vectors import Vector
 

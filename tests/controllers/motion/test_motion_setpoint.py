@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.motion.following import Followers
-from controllers.motion.setpoint import FOLLOWING_ACCELERATION, Activity, Setpoint
+from controllers.motion.setpoint import FOLLOWING_ACCELERATION, Setpoint
+from controllers.motion.setpoint_state import Activity
 from robots.dvrk import arms
 
 H = 1e-3
