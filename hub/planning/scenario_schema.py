@@ -16,14 +16,20 @@ _TEXT_FORMS = {"PortReference": rf"^{_PORT}$", "Connection": rf"^{_PORT}->{_PORT
 
 
 def scenario_schema() -> str:
-    """Return the schema as JSON text. A kind that cannot be loaded is left out."""
+    """Return the schema as JSON text, a definition in a line. A kind that cannot be loaded is left out."""
     schema = Scenario.model_json_schema()
     definitions: dict[str, Any] = schema["$defs"]
     for name, pattern in _TEXT_FORMS.items():
         definitions[name] = {"anyOf": [{"type": "string", "pattern": pattern}, definitions[name]]}
     common = definitions["ParticipantSpec"]["properties"]
     definitions["ParticipantSpec"] = _participant(common, definitions)
-    return json.dumps({"$schema": "http://json-schema.org/draft-07/schema#", **schema}, indent=2) + "\n"
+    parts = {"$schema": "http://json-schema.org/draft-07/schema#", **schema, "$defs": "@"}
+    rows = (f'"{name}":{_compact(definition)}' for name, definition in definitions.items())
+    return _compact(parts).replace('"@"', "{\n" + ",\n".join(rows) + "\n}") + "\n"
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"))
 
 
 def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
