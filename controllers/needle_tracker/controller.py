@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.motion.frames import base_in_world
-from controllers.motion.params import EcmParams, MotionParams
+from controllers.motion.params import EcmParams
 from controllers.needle_tracker.arc_fit import Arc
 from controllers.needle_tracker.filter import Estimate, View
 from controllers.needle_tracker.noise import Noise
@@ -115,9 +115,8 @@ class NeedleTracker(PictureController):
         super().__init__(name, params)
         self._arc = Arc(NEEDLES[params.needle], _TIP_AHEAD)
         self._eyes: tuple[Eye, ...] = EYES if params.eyes == "both" else EYES[:1]
-        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        self._base = base_in_world(params.arm, stands)
-        self._camera_base = base_in_world("ECM", stands)
+        self._base = base_in_world(params.arm, params.frames)
+        self._camera_base = base_in_world("ECM", params.frames)
         self._chain = params.holder.chain
         self._camera = left_camera(cast("EcmParams", params.arms.driven["ECM"]).endoscope, params.baseline)
         self._middle = np.array(params.grasp.position)

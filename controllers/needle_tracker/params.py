@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from controllers.motion.params import Arms, PsmParams, SetupJoints
+from controllers.motion.params import Arms, MotionParams, PsmParams, SetupJoints
 from hub.participant import Params
 from robots.dvrk import endoscope
 from robots.dvrk.crtk import Mounting
@@ -14,7 +14,7 @@ from robots.dvrk.parameters import ArmName, UnitQuaternion
 from robots.training.needles import DEFAULT, NeedleName
 from schemas.quantity import Angle, Duration, Length
 
-__all__ = ["TrackerParams"]
+__all__ = ["HeldNeedleParams", "TrackerParams"]
 
 _BASELINE = endoscope.BASELINE
 
@@ -44,8 +44,8 @@ class SlipParams(Params):
     angle: Angle = Field(default=0.35, gt=0.0, description="about the point where it is held")
 
 
-class TrackerParams(Params):
-    """Which needle, in which gripper, and what is known of both."""
+class HeldNeedleParams(Params):
+    """Base frames of the arms, and the needle in a gripper."""
 
     open_to_pages: ClassVar[bool] = True
 
@@ -54,6 +54,16 @@ class TrackerParams(Params):
     setup_joints: SetupJoints = SetupJoints()
     arm: ArmName = Field(default="PSM1", description="the one that holds the needle")
     needle: NeedleName = Field(default=DEFAULT, description="its size")
+
+    @property
+    def frames(self) -> MotionParams:
+        """Base frames of the arms, as a motion controller has them."""
+        return MotionParams(arms=self.arms, mounting=self.mounting, setup_joints=self.setup_joints)
+
+
+class TrackerParams(HeldNeedleParams):
+    """Which needle, in which gripper, and what is known of both."""
+
     grasp: GraspParams
     drift: DriftParams = DriftParams()
     slip: SlipParams = SlipParams()

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
 
 from controllers.motion.frames import base_in_world
-from controllers.motion.params import Arms, MotionParams, SetupJoints
+from controllers.needle_tracker.params import HeldNeedleParams
 from controllers.needle_tracker.pose import difference
 from hub.participant import (
     Controller,
@@ -23,9 +22,7 @@ from hub.participant import (
     signal_out,
 )
 from robots.dvrk import crtk
-from robots.dvrk.crtk import Mounting
-from robots.dvrk.parameters import ArmName
-from robots.training.needles import DEFAULT, NEEDLES, NeedleName
+from robots.training.needles import NEEDLES
 from robots.transform import pose_to_matrix
 from schemas.ports import Port
 from schemas.ros import Float64Message, PoseStamped
@@ -42,16 +39,8 @@ _NUMBERS = {
 }
 
 
-class TrackingErrorParams(Params):
+class TrackingErrorParams(HeldNeedleParams):
     """Which arm holds which needle, and where the arm stands."""
-
-    open_to_pages: ClassVar[bool] = True
-
-    arms: Arms
-    mounting: Mounting = "free"
-    setup_joints: SetupJoints = SetupJoints()
-    arm: ArmName = Field(default="PSM1", description="the one that holds the needle")
-    needle: NeedleName = Field(default=DEFAULT, description="its size")
 
 
 class TrackingErrorState(Record):
@@ -70,8 +59,7 @@ class TrackingError(Controller):
 
     def __init__(self, name: str, params: TrackingErrorParams) -> None:
         super().__init__(name, params)
-        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        self._base = base_in_world(params.arm, stands)
+        self._base = base_in_world(params.arm, params.frames)
         self._marks = NEEDLES[params.needle].marks
         self._now = TrackingErrorState()
         self.keep(self._now)
