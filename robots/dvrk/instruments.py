@@ -67,9 +67,12 @@ ROLLING = "ROLLING_NEEDLE_DRIVER"
 """A large needle driver 400006 with a rolling jaw."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # arrays have no single truth value, as the equality of Python 3.13 needs
 class Instrument:
-    """A tool of the arm: joints from the shaft to the wrist, a tip, and an end effector."""
+    """A tool of the arm: joints from the shaft to the wrist, a tip, and an end effector.
+
+    `instrument` returns one object for each name, so instruments are compared by identity.
+    """
 
     name: str
     number: str
