@@ -17,6 +17,7 @@ from hub.testing import check_device
 from schemas.codec import encode
 from schemas.crtk import ForwardKinematicsRequest, OperatingState, StringStamped
 from schemas.errors import DeviceError, MessageError
+from schemas.files import Files
 from schemas.message import Message
 from schemas.ros import (
     BoolMessage,
@@ -48,7 +49,7 @@ SMALL: dict[str, Any] = {
 
 
 def make(params: dict[str, Any] = SMALL) -> MemoryGateway:
-    return MemoryGateway("ros", GatewayParams.model_validate(params))
+    return MemoryGateway("ros", GatewayParams.model_validate(params, context=Files(Path()).context))
 
 
 @pytest.fixture

@@ -163,7 +163,7 @@ class Peer:
         """Return (node, kind, topic, type, hash, quality) of all that is there."""
         found = []
         for reply in self.session.liveliness().get(
-            f"@ros2_lv/{self.domain}/**", FifoChannel(10_000), timeout=5
+            f"@ros2_lv/{self.domain}/**", FifoChannel(10_000), timeout=60
         ):
             parts = str(reply.ok.key_expr).split("/")
             found.append(
