@@ -1,5 +1,6 @@
 """A recording with a robot that moves and an organ that gives, made of formulas: no engine has stepped."""
 
+import json
 from io import BytesIO
 from pathlib import Path
 
@@ -61,6 +62,7 @@ def write_scene(directory: Path, steps: int = 60, *, pictures: bool = True) -> N
     connections = [*file.scenario.connections, Connection.model_validate("hand.pose -> teleop.master")]
     scenario = file.scenario.model_copy(update={"participants": led, "connections": connections})
     attachments = {
+        "origin.json": json.dumps({"directory": str(directory.parent)}).encode(),
         "scenario.json": scenario.model_dump_json().encode(),
         "plan.json": plan.model_dump_json().encode(),
     }
