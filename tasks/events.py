@@ -1,4 +1,4 @@
-"""What happens in a task."""
+"""Events of a task."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ EventKind = Literal[
 
 
 class Event(NamedTuple):
-    """One event; `thing`, `arm` and `place` are indices into those of the task, -1: none."""
+    """An event; `thing`, `arm` and `place` are indices into the task's objects, arms and places, -1: none."""
 
     kind: EventKind
     thing: int = -1
     arm: int = -1
-    """That did it; of a hand-over the one that has the object now."""
+    """Acting arm; after a hand-over the receiving arm."""
     place: int = -1
     """Where the object was placed."""
     value: float = 0.0

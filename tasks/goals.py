@@ -1,4 +1,4 @@
-"""Where the objects of a task begin and where they belong, and the counting of those that got there."""
+"""Start and target places of the objects of a task, and the count of objects at their targets."""
 
 from __future__ import annotations
 
@@ -15,44 +15,44 @@ __all__ = ["Goals", "Legs"]
 
 @dataclass(frozen=True)
 class Goals:
-    """The places of a task; without any, an object has no place where it belongs."""
+    """The places of a task; without places, objects have no targets."""
 
     places: tuple[str, ...] = ()
     """Their names."""
     positions: Vector | None = None
-    """Where an object is once it lies there, m, in the world, shape (places, 3)."""
+    """Position of an object at each place, m, in the world, shape (places, 3)."""
     starts: tuple[frozenset[int], ...] = ()
-    """Of each object: the places where it may begin, and has to go back to; none: it does not go back."""
+    """Start places of each object, and targets of the way back; empty: no way back."""
     targets: tuple[frozenset[int], ...] = ()
-    """Of each object: the places where it belongs."""
+    """Target places of each object."""
     hand_over: bool = False
-    """On its way, each object has to be handed over."""
+    """Whether each object must be handed over on the way."""
 
 
 class LegsState(Record):
     """Progress of the transfers."""
 
     leg = integer()
-    """From 0; even: to the targets, odd: back."""
+    """Number of the leg, from 0; even: to the targets, odd: back."""
     counted = array("objects")
-    """1 for each object that has been placed in this leg."""
+    """1 for each object placed in this leg."""
     handed = array("objects")
-    """1 for each object that has been handed over since it was grasped."""
+    """1 for each object handed over since its grasp."""
     total = integer()
-    """Objects that were placed, in all legs."""
+    """Number of placed objects, in all legs."""
 
 
 class Legs:
-    """Counts the objects that are brought where they belong; once all are, they have to go back."""
+    """Counts the objects brought to their targets; after the last object all have to go back."""
 
     def __init__(self, goals: Goals, *, hand_over: bool) -> None:
-        """Count what reaches its target; with `hand_over` only what was handed over on its way."""
+        """`hand_over`: count only objects handed over on the way."""
         self.state = LegsState(objects=len(goals.targets))
         self._ways = (goals.targets, goals.starts or (frozenset[int](),) * len(goals.targets))
         self._hand_over = hand_over
 
-    def take(self, event: Event) -> bool:
-        """Take an event; return whether an object has been brought where it belongs by it."""
+    def count(self, event: Event) -> bool:
+        """Observe an event; return whether the event brings an object to its target."""
         now, thing = self.state, event.thing
         if event.kind in ("grasped", "handed over"):
             now.handed[thing] = float(event.kind == "handed over")

@@ -1,4 +1,4 @@
-"""Handing things from one arm to another."""
+"""Hand-over of objects between two arms."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["HandOverTask"]
 
 
 class HandOverTask(Task):
-    """Every object is to be picked up by one arm and handed over to another."""
+    """Every object is to be picked up by an arm and handed over to another arm."""
 
     name_of_kind: ClassVar[str] = "hand-over-task"
 

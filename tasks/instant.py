@@ -1,4 +1,4 @@
-"""What a task sees at one instant, read from its inputs."""
+"""The world of a task at an instant, read from the task's inputs."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ __all__ = ["Instant", "Reader", "Watched", "base_pose"]
 
 @dataclass(frozen=True)
 class Watched:
-    """What a task watches, and which of it is connected; arms are those with instruments."""
+    """Watched arms (with instruments) and objects of a task, and their connected inputs."""
 
     arms: tuple[str, ...]
     things: tuple[str, ...]
     forces: tuple[bool, ...]
-    """Of each arm, whether the force on its instrument is."""
+    """Whether the force on each arm's instrument is connected."""
     hands: tuple[bool, ...]
-    """Of each arm, whether its teleoperation is."""
+    """Whether each arm's teleoperation is connected."""
     tools: bool
     """Whether the impulse between instruments is."""
     fixtures: bool | None
-    """Whether that between instruments and fixtures is; None: the scene has no fixtures."""
+    """Whether the impulse between instruments and fixtures is connected; None: no fixtures in the scene."""
     camera: bool
-    """Whether there is an endoscope, and its pose is connected."""
+    """Whether there is an endoscope with a connected pose."""
 
 
 @dataclass
 class Instant:
-    """The world at one instant: m arms with instruments, n objects, all in the world's frame.
+    """The world at an instant: m arms with instruments, n objects, all in the world's frame.
 
     The arrays are written anew at each instant.
     """
@@ -58,33 +58,33 @@ class Instant:
     turns: Vector = field(init=False)
     """Orientations in the arms' own bases: quaternions (x, y, z, w), shape (m, 4)."""
     velocities: Vector = field(init=False)
-    """Of the tips, m/s, shape (m, 3): see `tasks.metrics.smoothing`."""
+    """Velocities of the tips, m/s, shape (m, 3): see `tasks.metrics.smoothing`."""
     jerks: Vector = field(init=False)
-    """Of the tips, m/s^3, shape (m, 3)."""
+    """Jerks of the tips, m/s^3, shape (m, 3)."""
     speeds: list[float] = field(init=False)
-    """Of the tips, m/s."""
+    """Speeds of the tips, m/s."""
     is_smooth: bool = False
     """Whether there are velocities and jerks already."""
     forces: list[float] = field(init=False)
     """On the instruments, N."""
     hands: list[tuple[bool, ...]] = field(init=False)
-    """What was said since the last instant of whether a hand leads each arm, oldest first."""
+    """Reports since the last instant about a hand leading each arm, oldest first."""
     poses: Vector = field(init=False)
-    """Of the objects: position, m, and quaternion, shape (n, 7)."""
+    """Poses of the objects: position, m, and quaternion, shape (n, 7)."""
     holders: list[int] = field(init=False)
-    """Index of the arm that holds each object, -1: none."""
+    """Index of the arm holding each object, -1: none."""
     impulse: float = 0.0
-    """Of all contacts between instruments since the start, N s."""
+    """Impulse of all contacts between instruments since the start, N s."""
     fixture_impulse: float = 0.0
-    """Of all contacts between instruments and fixtures since the start, N s."""
+    """Impulse of all contacts between instruments and fixtures since the start, N s."""
     estimate: Vector = field(init=False)
-    """Of a needle's pose, by a tracker: position, m, and quaternion, shape (7,)."""
+    """A tracker's estimate of a needle's pose: position, m, and quaternion, shape (7,)."""
     reported: bool = False
     """Whether something has been reported as done since the last instant."""
     tips_seen: NDArray[np.bool_] = field(init=False)
-    """By the endoscope, shape (m,)."""
+    """Whether each tip is in the endoscope's view, shape (m,)."""
     things_seen: NDArray[np.bool_] = field(init=False)
-    """By the endoscope, shape (n,)."""
+    """Whether each object is in the endoscope's view, shape (n,)."""
 
     def __post_init__(self) -> None:
         m, n = self.arms, self.things
@@ -99,7 +99,7 @@ class Reader:
     """Reads the inputs of a task."""
 
     def __init__(self, params: TaskParams, connected: Set[str]) -> None:
-        """Read the inputs that `params` ask for, of which those in `connected` have a source."""
+        """`connected`: inputs with a source."""
         arms, things = params.psms, tuple(params.objects)
         ecm: CartArm | None = next(
             (name for name, arm in params.arms.items() if isinstance(arm, MountedEcm)), None
@@ -122,7 +122,7 @@ class Reader:
             self._frustum = Frustum(params.camera, params.near, params.far)
 
     def read(self, inputs: Inputs, now: Instant) -> None:
-        """Write what the inputs say into `now`."""
+        """Write the inputs into `now`."""
         watched = self.watched
         for i, arm in enumerate(watched.arms):
             pose, base = inputs[f"{arm}/measured_cp"], self._bases[i]

@@ -1,4 +1,4 @@
-"""What happens to the objects of a task: who holds them, where they are put, whether they fall."""
+"""Events of the objects of a task: grasps, places, falls."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from tasks.events import Event
 from tasks.instant import Instant
 from tasks.params import TaskParams
 
-__all__ = ["CONTACT_GAP", "Things"]
+__all__ = ["CONTACT_GAP", "ObjectWatch"]
 
 _REST_SPEED = 5e-3
-"""m/s; a released object that is slower lies still."""
+"""Largest speed of a released object at rest, m/s."""
 _REST_TIME = 0.1
-"""s; for so long, or it has only turned round."""
+"""Time at rest of a released object, s; shorter rests are reversals of motion."""
 _FALL_TIME = 1.0
-"""s after its release an object that rolls on has been dropped all the same."""
+"""Time after the release until a rolling object counts as dropped, s."""
 CONTACT_GAP = 0.1
-"""s; instruments that touch again within this time have not parted."""
+"""Longest gap within a contact of instruments, s."""
 
 
-class ThingsState(Record):
-    """What was the case at the last instant, for each object."""
+class ObjectsState(Record):
+    """State of each object at the last instant."""
 
     holder = array("objects")
     """Index of an arm, -1: none."""
@@ -33,9 +33,9 @@ class ThingsState(Record):
     """Height at the grasp, m."""
     lifted = array("objects")
     free = array("objects")
-    """Time since it was released, s; -1: it is held, or lies where it was put."""
+    """Time since the release, s; -1: held, or at rest at its place."""
     rest = array("objects")
-    """Time for which a released object has been still, s."""
+    """Time at rest of a released object, s."""
     release = array("objects")
     """Height at the release, m."""
     releaser = array("objects")
@@ -44,13 +44,13 @@ class ThingsState(Record):
     outside = array("objects")
     unseen = array("objects")
     impulse = number()
-    """Between instruments, N s."""
+    """Impulse between instruments, N s."""
     contact_gap = number(CONTACT_GAP)
     """Time since instruments touched, s."""
 
 
-class Things:
-    """Makes events of what the objects and instruments do."""
+class ObjectWatch:
+    """Makes events from the motion of objects and instruments."""
 
     def __init__(
         self,
@@ -61,19 +61,19 @@ class Things:
     ) -> None:
         """Watch `count` objects.
 
-        `workspace` are its least and greatest coordinates, m, shape (2, 3); `place_of` returns the place at
-        which an object lies at a pose, shape (7,), or -1.
+        `workspace`: least and greatest coordinates, m, shape (2, 3); `place_of`: returns the place of an
+        object at a pose, shape (7,), or -1.
         """
-        self.state = ThingsState(objects=count)
+        self.state = ObjectsState(objects=count)
         self.state.holder[:] = self.state.free[:] = self.state.releaser[:] = -1.0
         self._params, self._workspace, self._place_of = params, workspace, place_of
 
     def start(self, now: Instant) -> None:
-        """Take where the objects are at the first instant for where they were before it."""
+        """Begin with the objects at rest at the first instant."""
         self.state.before[:] = now.poses[:, :3]
 
-    def take(self, now: Instant) -> Iterator[Event]:
-        """Yield the events of one instant."""
+    def observe(self, now: Instant) -> Iterator[Event]:
+        """Yield the events of an instant."""
         state = self.state
         for i, (was, holder) in enumerate(zip(state.holder.astype(int), now.holders, strict=True)):
             height = float(now.poses[i, 2])
@@ -120,7 +120,7 @@ class Things:
             yield Event("dropped", i, arm, value=fallen, unit="m")
 
     def _leave(self, i: int, now: Instant) -> Iterator[Event]:
-        """See whether an object has left the workspace, or what the endoscope sees."""
+        """Check whether an object has left the workspace, or the endoscope's view."""
         state, position = self.state, now.poses[i, :3]
         if self._workspace is not None:
             low, high = self._workspace
@@ -134,7 +134,7 @@ class Things:
         state.unseen[i] = unseen
 
     def _touch(self, now: Instant) -> Iterator[Event]:
-        """See whether instruments touch one another."""
+        """Check for contact between instruments."""
         state, more = self.state, now.impulse - self.state.impulse
         state.contact_gap += now.period_s
         if more > 0.0:

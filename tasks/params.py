@@ -1,6 +1,6 @@
-"""Parameters that all tasks have.
+"""Common parameters of all tasks.
 
-Arms, mounting and objects are those of the scenario's `scene`. Poses are in the world.
+Arms, mounting and objects come from the scenario's `scene`. Poses are in the world.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _Point = tuple[Length, Length, Length]
 
 
 class TaskParams(Params):
-    """What the task watches, and from which value on something counts."""
+    """Watched objects and arms of the task, and thresholds of events."""
 
     open_to_pages: ClassVar[bool] = True
 
@@ -75,7 +75,7 @@ class TaskParams(Params):
 
     @property
     def psms(self) -> tuple[CartArm, ...]:
-        """The arms with instruments, in the order in which they are stated."""
+        """The arms with instruments, in the scenario's order."""
         return tuple(name for name, arm in self.arms.items() if isinstance(arm, MountedPsm))
 
     @property

@@ -18,13 +18,13 @@ from tasks.task import Task
 __all__ = ["PegBoardParams", "PegBoardTask"]
 
 _MARGIN, _BELOW, _ABOVE = 0.02, 0.01, 0.15
-"""m beside, below and above the top of the board: the workspace. No source states one."""
+"""Workspace: m beside, below and above the top of the board. Without a source."""
 _UPRIGHT = 0.7
-"""Cosine of the angle between ring and post, above which a ring lies on its post: some 45 degrees."""
+"""Least cosine of the angle between ring and post for a ring on its post: some 45 degrees."""
 
 
 class PegBoardParams(TaskParams):
-    """Which board, and what of its rules the task itself asks for."""
+    """The board, and rules of the board for the task itself."""
 
     open_to_pages: ClassVar[bool] = True
 
@@ -53,14 +53,14 @@ class PegBoardParams(TaskParams):
 
     @property
     def board(self) -> BoardParams:
-        """The board, and where it stands."""
+        """The board with its pose."""
         return next(one for one in self.fixtures.values() if isinstance(one, BoardParams))
 
 
 class PegBoardTask(Task):
-    """All rings to the posts where they belong.
+    """All rings to their target posts.
 
-    A ring lies on a post if the post is in its hole, the ring is lower than the post's top, and stands
+    A ring lies on a post if the post is in the ring's hole, the ring is lower than the post's top, and
     upright within 45 degrees.
     """
 
@@ -77,7 +77,7 @@ class PegBoardTask(Task):
 
     @property
     def goals(self) -> Goals:
-        """The posts; a ring may start on any post of the side of the starting ones."""
+        """The posts; a ring may start on any post on the side of the start posts."""
         board, count = self._board, len(self.things)
         targets = frozenset(board.targets)
         starts = frozenset(range(len(board.posts))) - targets
@@ -92,7 +92,7 @@ class PegBoardTask(Task):
 
     @property
     def goal_count(self) -> int:
-        """One for each ring and leg; 0 if it goes on until the session ends."""
+        """Number of rings times legs; 0: until the session ends."""
         return len(self.things) * (self._leg_count or 0)
 
     @property
@@ -104,7 +104,7 @@ class PegBoardTask(Task):
         return np.stack([world.min(axis=0), world.max(axis=0)])
 
     def place_of(self, thing: int, pose: Vector) -> int:  # noqa: ARG002
-        """Return the index of the post on which a ring at `pose`, shape (7,), lies; -1: none."""
+        """Return the index of the post under a ring at `pose`, shape (7,); -1: none."""
         x, y, z = self._pose[:3, :3].T @ (pose[:3] - self._pose[:3, 3])
         axis = self._pose[:3, 2] @ rotation.matrix(pose[3:])[:, 2]
         away = np.hypot(self._board.posts[:, 0] - x, self._board.posts[:, 1] - y)

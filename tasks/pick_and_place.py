@@ -1,4 +1,4 @@
-"""Bringing pieces into the dishes where they belong."""
+"""Pieces into their dishes."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from tasks.task import Task
 __all__ = ["PickAndPlaceParams", "PickAndPlaceTask"]
 
 _MARGIN, _BELOW, _ABOVE = 0.05, 0.01, 0.15
-"""m beside, below and above the dishes: the workspace. No source states one."""
+"""Workspace: m beside, below and above the dishes. Without a source."""
 
 
 class PickAndPlaceParams(TaskParams):
-    """Which piece belongs in which dish."""
+    """The dish of each piece."""
 
     open_to_pages: ClassVar[bool] = True
 
@@ -49,7 +49,7 @@ class PickAndPlaceParams(TaskParams):
 class PickAndPlaceTask(Task):
     """Every piece with a goal to its dish.
 
-    A piece lies in a dish if its middle is inside the rim, and not above it.
+    A piece lies in a dish if the piece's middle is inside the rim, and not above.
     """
 
     params_model: ClassVar[type[Params]] = PickAndPlaceParams
@@ -72,7 +72,7 @@ class PickAndPlaceTask(Task):
 
     @property
     def goal_count(self) -> int:
-        """One for each piece that has a dish."""
+        """Number of pieces with a dish."""
         return len(self._belongs)
 
     @property
@@ -84,7 +84,7 @@ class PickAndPlaceTask(Task):
         return np.stack([middles.min(axis=0) - low, middles.max(axis=0) + high])
 
     def place_of(self, thing: int, pose: Vector) -> int:  # noqa: ARG002
-        """Return the index of the dish in which a piece at `pose`, shape (7,), lies; -1: none."""
+        """Return the index of the dish of a piece at `pose`, shape (7,); -1: none."""
         for i, dish in enumerate(self._dishes):
             x, y, z = dish[:3, :3].T @ (pose[:3] - dish[:3, 3])
             if np.hypot(x, y) < DISH.inner_radius and 0.0 <= z <= DISH.height:

@@ -10,7 +10,7 @@ __all__ = ["PracticeTask"]
 
 
 class PracticeTask(Task):
-    """No goals: what is done is measured, until the session ends."""
+    """No goals: skill is measured until the session ends."""
 
     name_of_kind: ClassVar[str] = "practice-task"
 

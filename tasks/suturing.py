@@ -34,7 +34,7 @@ _SIGNALS = (("depth", "m"), ("resistance", "N"), ("trauma", "m^2"))
 
 
 class SuturingParams(TaskParams):
-    """Which phantom and needle, and how many stitches."""
+    """Phantom, needle, and number of stitches."""
 
     open_to_pages: ClassVar[bool] = True
 
@@ -54,7 +54,7 @@ class SuturingParams(TaskParams):
 
     @property
     def phantom(self) -> PhantomParams:
-        """The phantom, and where it stands."""
+        """The phantom with its pose."""
         return next(one for one in self.fixtures.values() if isinstance(one, PhantomParams))
 
     @property
@@ -64,7 +64,7 @@ class SuturingParams(TaskParams):
 
 
 class SuturingTask(Task):
-    """A needle through all pairs of holes; a goal is a needle that has been pulled all through."""
+    """A needle through all pairs of holes; a goal is a needle pulled all through."""
 
     params_model: ClassVar[type[Params]] = SuturingParams
     name_of_kind: ClassVar[str] = "suturing-task"
@@ -98,7 +98,7 @@ class SuturingTask(Task):
 
     @property
     def suture(self) -> Suture:
-        """What the rules of the challenge know."""
+        """Setting for the rules of the challenge."""
         return Suture(
             holes=self._holes,
             needle=self._shape,
@@ -118,11 +118,11 @@ class SuturingTask(Task):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """What every task watches, the tissue, an estimate of the needle's pose, and a report."""
+        """Inputs of every task, the tissue, an estimate of the needle's pose, and a report."""
         return (*super().ports, *_tissue_ports())
 
     def configure(self, setup: Setup) -> Outputs:
-        """Prepare metrics and rules for the inputs that are connected."""
+        """Prepare metrics and rules for the connected inputs."""
         self._connected = setup.connected
         self._tissue.is_known = "tissue/trauma" in setup.connected
         return super().configure(setup)
@@ -140,7 +140,7 @@ class SuturingTask(Task):
         now.reported = any(message.data for message in said)
 
     def more_events(self, now: Instant) -> Iterator[Event]:
-        """Yield what the tissue has reported."""
+        """Yield the events of the tissue."""
         places = {name: i for i, name in enumerate(self._phantom.measures.names)}
         thing = self.things.index(self._thing)
         for event in self._entered:

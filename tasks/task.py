@@ -1,4 +1,4 @@
-"""The base of every training task: a controller that only watches, and keeps the score."""
+"""The base of every training task: a watching controller with a score."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tasks.instant import Instant, Reader
 from tasks.metrics import make_metrics
 from tasks.metrics.metric import AnyMetric
 from tasks.metrics.smoothing import Smoothing
-from tasks.objects import Things
+from tasks.objects import ObjectWatch
 from tasks.params import TaskParams
 from tasks.ports import task_ports
 from tasks.rules import GENERAL, RULES, Setting, Suture
@@ -39,7 +39,7 @@ class TaskState(Record):
 
 
 class Task(Controller):
-    """Watches objects, instruments and endoscope; makes events, metrics and scores of them.
+    """Watches objects, instruments and endoscope; makes events, metrics and scores.
 
         class LiftTask(Task):
             name_of_kind = "lift-task"
@@ -47,8 +47,8 @@ class Task(Controller):
             def reaches(self, event: Event) -> bool:
                 return event.kind == "lifted"
 
-    One goal for each object, unless `goal_count` says otherwise. A task with places has `goals` and
-    `place_of`, and an object reaches its goal where it belongs.
+    A goal for each object, unless `goal_count` is overridden. A task with places has `goals` and `place_of`,
+    and an object reaches its goal at a target place.
     """
 
     params_model: ClassVar[type[Params]] = TaskParams
@@ -57,7 +57,7 @@ class Task(Controller):
     is_board: ClassVar[bool] = False
     """Whether the rules of peg boards apply."""
     default_rules: ClassVar[tuple[str, ...]] = GENERAL
-    """Those on the card unless the parameters name others."""
+    """Default rules on the card."""
 
     def __init__(self, name: str, params: TaskParams) -> None:
         super().__init__(name, params)
@@ -67,7 +67,7 @@ class Task(Controller):
 
     @property
     def goals(self) -> Goals:
-        """The places of the task, and which objects belong there; the default has none."""
+        """The places of the task, with the targets of objects; none by default."""
         return Goals()
 
     @property
@@ -77,16 +77,16 @@ class Task(Controller):
 
     @property
     def workspace(self) -> Vector | None:
-        """Least and greatest coordinates that an object may have, m, shape (2, 3); None: any."""
+        """Least and greatest allowed coordinates of an object, m, shape (2, 3); None: any."""
         return None
 
     def place_of(self, thing: int, pose: Vector) -> int:  # noqa: ARG002
-        """Return the index of the place at which object `thing` lies at `pose`, shape (7,); -1: none."""
+        """Return the index of the place of object `thing` at `pose`, shape (7,); -1: none."""
         return -1
 
     @property
     def suture(self) -> Suture | None:
-        """Of a task in which a needle goes through a phantom: what rules know of it."""
+        """Setting of a suturing task, for rules; None: no suturing."""
         return None
 
     @property
@@ -95,23 +95,23 @@ class Task(Controller):
         return ()
 
     def observe(self, inputs: Inputs, now: Instant) -> None:
-        """Read inputs that only this task has, at the beginning of a step."""
+        """Read the task's own inputs, at the beginning of a step."""
 
     def more_events(self, now: Instant) -> Iterable[Event]:  # noqa: ARG002
-        """Return events that only this task has, after those of the objects."""
+        """Return the task's own events, after the events of objects."""
         return ()
 
     def reaches(self, event: Event) -> bool:
         """Say whether a goal is reached by `event`; called once for each event, in order."""
-        return self._legs is not None and self._legs.take(event)
+        return self._legs is not None and self._legs.count(event)
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """What is watched, and what is reported."""
+        """Watched inputs and reported outputs."""
         return task_ports(self.params)
 
     def configure(self, setup: Setup) -> Outputs:
-        """Prepare metrics and rules for the inputs that are connected."""
+        """Prepare metrics and rules for the connected inputs."""
         params, goals = self.params, self.goals
         self._reader = Reader(params, setup.connected)
         watched = self._reader.watched
@@ -120,7 +120,7 @@ class Task(Controller):
         box = self.workspace if corners is None else np.stack([corners.min(axis=0), corners.max(axis=0)])
         self._now = Instant(len(watched.arms), len(watched.things), period_s=setup.period_ns / 1e9)
         self._smoothing = Smoothing(len(watched.arms), setup.period_ns / 1e9)
-        self._events = Things(len(watched.things), params, box, self.place_of)
+        self._events = ObjectWatch(len(watched.things), params, box, self.place_of)
         self._legs = Legs(goals, hand_over=goals.hand_over) if goals.targets else None
         self._time, self._metrics = make_metrics(params, watched)
         self._metrics = (*self._metrics, *self.more_metrics)
@@ -162,7 +162,7 @@ class Task(Controller):
             yield from rules.records()
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
-        """Watch what has happened until `t + h`."""
+        """Watch the events until `t + h`."""
         now, state = self._now, self._state
         self._reader.read(inputs, now)
         self.observe(inputs, now)
@@ -170,21 +170,21 @@ class Task(Controller):
         if not state.begun:
             state.begun = True
             self._events.start(now)
-        self._smoothing.take(now)
-        events = (*self._events.take(now), *self.more_events(now))
+        self._smoothing.update(now)
+        events = (*self._events.observe(now), *self.more_events(now))
         if not state.done[0]:
             for metric in self._metrics:
-                metric.take(now, events)
+                metric.update(now, events)
             self._reach(events)
         for rules in self._rules:
-            rules.take(now, events)
+            rules.update(now, events)
         self._outputs["events"] = tuple(self._message(event, t + h) for event in events)
         if not (t + h) % self.params.card_period:
             self._outputs["score"] = self.card(t + h)
         return self._outputs
 
     def _reach(self, events: tuple[Event, ...]) -> None:
-        """Count the goals that are reached."""
+        """Count the reached goals."""
         state = self._state
         state.reached += sum(self.reaches(event) for event in events)
         if self._count:
@@ -205,7 +205,7 @@ class Task(Controller):
         )
 
     def card(self, time_ns: int) -> ScoreCard:
-        """Return the score card as it is now, at simulated time `time_ns`."""
+        """Return the present score card, at simulated time `time_ns`."""
         metrics: dict[str, ScoreValue] = {
             value.name: value for metric in self._metrics for value in metric.values()
         }

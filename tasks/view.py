@@ -1,4 +1,4 @@
-"""What the endoscope sees: points inside the pyramid of either of its two cameras."""
+"""The endoscope's view: points inside the pyramid of either of the two cameras."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ __all__ = ["Frustum", "optical_in_tip"]
 
 
 class Frustum:
-    """The space in which at least one of the two cameras sees a point."""
+    """The space in view of at least one of the two cameras."""
 
     def __init__(self, camera: StereoCamera, near: float, far: float) -> None:
-        """See what is between `near` and `far` (m) ahead of `camera`."""
+        """`near`, `far`: range of the view ahead of `camera`, m."""
         tangent = 0.5 * camera.width / camera.focal_length
         self._tangents = np.array([tangent, tangent * camera.height / camera.width])
         self._half = 0.5 * camera.baseline
         self._near, self._far = near, far
 
     def sees(self, optical: Vector, points: Vector) -> NDArray[np.bool_]:
-        """Return which points, m, shape (n, 3), are seen, shape (n,).
+        """Return whether points, m, shape (n, 3), are in view, shape (n,).
 
         `optical` is the frame midway between the cameras (x right, y down, z ahead), shape (4, 4), in the
         frame of the points.

@@ -1,4 +1,4 @@
-"""Metrics of skill: what is measured of any trial, whatever the rules."""
+"""Metrics of skill, measured in any trial under any rules."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["make_metrics"]
 
 
 def make_metrics(params: TaskParams, watched: Watched) -> tuple[Time, tuple[AnyMetric, ...]]:
-    """Return the clock of the trial, and all metrics with it, in the order of the score card."""
+    """Return the clock of the trial, and all metrics (clock included), in the order of the score card."""
     arms, time = watched.arms, Time()
     return time, (
         time,

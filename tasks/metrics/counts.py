@@ -1,4 +1,4 @@
-"""Metrics that count: time, what was done with objects, and how often a hand let go."""
+"""Counting metrics: time, events of objects, and clutching."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Time(Metric[TimeState]):
     def __init__(self) -> None:
         self.state = TimeState()
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Take the time."""
         self.state.time = now.time_s
 
     def finish(self) -> None:
-        """Say that all goals are reached now."""
+        """Note the time of reaching all goals."""
         self.state.done_at = self.state.time
 
     def values(self) -> Iterator[ScoreValue]:
@@ -62,7 +62,7 @@ class Counts(Metric[CountsState]):
         self.state = CountsState()
         self._things = things
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Count events."""
         state = self.state
         for event in events:
@@ -86,18 +86,18 @@ class ClutchingState(Record):
 
     count = array("arms")
     led = array("arms")
-    """1 while a hand leads it."""
+    """1 for each arm led by a hand."""
 
 
 class Clutching(Metric[ClutchingState]):
-    """How often each hand let go of its arm."""
+    """Number of times each hand let go of the arm."""
 
     def __init__(self, watched: Watched) -> None:
         self.state = ClutchingState(arms=len(watched.arms))
         self._watched = watched
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
-        """Count the hands that let go now."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+        """Count the hands letting go now."""
         for i, said in enumerate(now.hands):
             for led in said:
                 self.state.count[i] += bool(self.state.led[i]) and not led

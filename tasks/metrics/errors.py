@@ -1,4 +1,4 @@
-"""Metrics of what should not happen: instruments that collide, press too hard or are out of view."""
+"""Metrics of errors: instruments colliding, pressing too hard or out of view."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class CollisionsState(Record):
 
 
 class Collisions(Metric[CollisionsState]):
-    """How often instruments of different arms touch one another, and the impulse of it."""
+    """Number and impulse of contacts between instruments of different arms."""
 
     def __init__(self, watched: Watched) -> None:
         self.state = CollisionsState()
         self._reason = "" if watched.tools else _UNKNOWN
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:
+    def update(self, now: Instant, events: Sequence[Event]) -> None:
         """Count contacts."""
         self.state.count += sum(event.kind == "collision" for event in events)
         self.state.impulse = now.impulse
@@ -55,20 +55,20 @@ class FixtureCollisionsState(Record):
     impulse = number()
     """N s."""
     gap = number(CONTACT_GAP)
-    """Time since they touched, s."""
+    """Time since the last contact, s."""
 
 
 class FixtureCollisions(Metric[FixtureCollisionsState]):
-    """How often instruments touch boards, posts, walls and dishes, and the impulse of it.
+    """Number and impulse of contacts of instruments with boards, posts, walls and dishes.
 
-    A contact is a new one if there was none for `CONTACT_GAP`.
+    A contact is new after `CONTACT_GAP` without contact.
     """
 
     def __init__(self, watched: Watched) -> None:
         self.state = FixtureCollisionsState()
         self._known = watched.fixtures
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Count contacts."""
         state = self.state
         state.gap += now.period_s
@@ -99,14 +99,14 @@ class ForcesState(Record):
 
 
 class Forces(Metric[ForcesState]):
-    """Peak of the force on each instrument, and how long it was over a limit."""
+    """Peak of the force on each instrument, and time over a limit."""
 
     def __init__(self, watched: Watched, limit: float) -> None:
         """Measure with a `limit` in N."""
         self.state = ForcesState(arms=len(watched.arms))
         self._watched, self._limit = watched, limit
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Take the forces."""
         for i, force in enumerate(now.forces):
             if force > self.state.peak[i]:
@@ -138,14 +138,14 @@ class ViewState(Record):
 
 
 class View(Metric[ViewState]):
-    """How long each tip was outside of what the endoscope sees."""
+    """Time of each tip outside of the endoscope's view."""
 
     def __init__(self, watched: Watched) -> None:
         self.state = ViewState(arms=len(watched.arms))
         self._watched = watched
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
-        """Add one period for the tips that are not seen."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+        """Add a period for each tip out of view."""
         for i, seen in enumerate(now.tips_seen.tolist()):
             if not seen:
                 self.state.unseen[i] += now.period_s

@@ -1,4 +1,4 @@
-"""What a metric is."""
+"""The base of metrics."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ S = TypeVar("S", bound=Record)
 
 
 class Metric(ABC, Generic[S]):
-    """One or some numbers about a trial, computed while it goes on; its whole memory is in `state`."""
+    """Numbers about a trial, computed during the trial; the whole memory is in `state`."""
 
     state: S
 
     @abstractmethod
-    def take(self, now: Instant, events: Sequence[Event]) -> None:
-        """Take one instant, and the events in it."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:
+        """Observe an instant and its events."""
 
     @abstractmethod
     def values(self) -> Iterator[ScoreValue]:
-        """Yield the numbers so far, each by its name."""
+        """Yield the numbers so far, with names."""
 
 
 AnyMetric = Metric[Any]
 
 
 def missing(name: str, unit: str, reason: str) -> ScoreValue:
-    """Return a number that cannot be given, and why."""
+    """Return a number without a value, with the reason."""
     return ScoreValue(name=name, unit=unit, reason=reason)

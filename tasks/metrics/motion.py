@@ -36,8 +36,8 @@ class Paths(Metric[PathsState]):
         self.state = PathsState(arms=len(arms))
         self._arms, self._idle_speed = arms, idle_speed
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
-        """Add the way of one period."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+        """Add the path of a period."""
         if not now.is_smooth:
             return
         for i, speed in enumerate(now.speeds):
@@ -61,23 +61,23 @@ class EconomyState(Record):
     """Of each tip."""
 
     straight = array("arms")
-    """Sum of the distances between its events, m."""
+    """Sum of the distances between the arm's events, m."""
     length = array("arms")
     """Path, m."""
     last = array("arms", 3)
-    """Where it was at its last event, m."""
+    """Position at the arm's last event, m."""
     begun = number()
 
 
 class Economy(Metric[EconomyState]):
-    """Share of the way that a tip would have had to go: straight from each of its events to the next."""
+    """Economy of motion: straight distances between a tip's events over the tip's path."""
 
     def __init__(self, arms: Sequence[str]) -> None:
         self.state = EconomyState(arms=len(arms))
         self._arms = arms
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:
-        """Add the straight ways that end now."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:
+        """Add the straight distances ending now."""
         state = self.state
         if not state.begun:
             state.begun, state.last[:] = 1.0, now.tips
@@ -104,7 +104,7 @@ class Economy(Metric[EconomyState]):
 
 
 class VolumeState(Record):
-    """Of each tip: mean of its positions, and sum of the squared distances from it (Welford)."""
+    """Mean position of each tip, and sum of the squared distances from the mean (Welford)."""
 
     mean = array("arms", 3)
     squares = array("arms")
@@ -112,13 +112,13 @@ class VolumeState(Record):
 
 
 class WorkingVolume(Metric[VolumeState]):
-    """Radius of the space that each tip works in: root mean square of its distance from its mean position."""
+    """Radius of each tip's working volume: root mean square distance from the mean position."""
 
     def __init__(self, arms: Sequence[str]) -> None:
         self.state = VolumeState(arms=len(arms))
         self._arms = arms
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Add the positions."""
         state = self.state
         state.count += 1.0
@@ -147,14 +147,14 @@ class TurningState(Record):
 
 
 class Turning(Metric[TurningState]):
-    """Angular path: the sum of the angles by which each tip turns."""
+    """Angular path: the sum of each tip's rotation angles."""
 
     def __init__(self, arms: Sequence[str]) -> None:
         self.state = TurningState(arms=len(arms))
         self._arms = arms
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
-        """Add the angle of one period."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+        """Add the angle of a period."""
         state = self.state
         if state.begun:
             for i, (turn, before) in enumerate(zip(now.turns, state.before, strict=True)):

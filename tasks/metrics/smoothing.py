@@ -1,9 +1,9 @@
 """Velocity and jerk of sampled positions, by least squares.
 
-A cubic is fitted to the positions of the last 0.2 s; its derivatives in the middle of these are velocity and
-jerk there (Savitzky and Golay, "Smoothing and differentiation of data by simplified least squares
-procedures", Analytical Chemistry 36 (1964)). Differences of neighbouring samples would not do: at 10 ms,
-1 um of noise is 4 m/s^3 of jerk in them, and 0.01 m/s^3 here.
+A cubic is fitted to the positions of the last 0.2 s; the derivatives in the middle are velocity and jerk
+there (Savitzky and Golay, "Smoothing and differentiation of data by simplified least squares procedures",
+Analytical Chemistry 36 (1964)). Differences of neighbouring samples are no alternative: at 10 ms, 1 um of
+noise is 4 m/s^3 of jerk by differences, and 0.01 m/s^3 here.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from tasks.instant import Instant
 __all__ = ["Smoothing", "kernels"]
 
 _WINDOW = 0.2
-"""s; the movements of hands, and of arms led by them, have little above 5 Hz."""
+"""Window of the fit, s; the movements of hands and of led arms have little above 5 Hz."""
 _FEWEST = 5
 
 
 def kernels(count: int, period: float) -> Vector:
-    """Return what turns `count` samples, the oldest first, into velocity and jerk in their middle.
+    """Return the weights, (2, count), of samples, the oldest first, for velocity and jerk in the middle.
 
-    The samples are `period` (s) apart, `count` is odd; shape (2, count).
+    The samples are `period` (s) apart, `count` is odd.
     """
     t = (np.arange(count) - count // 2) * period
     fit = np.linalg.pinv(np.vander(t, 4, increasing=True))
@@ -40,15 +40,15 @@ class SmoothingState(Record):
 
 
 class Smoothing:
-    """Finds velocity and jerk of the tips, as they were half the window ago."""
+    """Finds velocity and jerk of the tips, half a window ago."""
 
     def __init__(self, arms: int, period: float) -> None:
-        """Take positions of `arms` tips every `period` seconds."""
+        """`arms`: number of tips; `period`: time between positions, s."""
         count = max(_FEWEST, round(_WINDOW / period) | 1)
         self._kernels, self._count = kernels(count, period), count
         self.state = SmoothingState(samples=count, arms=arms)
 
-    def take(self, now: Instant) -> None:
+    def update(self, now: Instant) -> None:
         """Write velocities, jerks and speeds into `now`."""
         state, positions = self.state, self.state.positions
         positions[:-1] = positions[1:]

@@ -17,22 +17,22 @@ from tasks.metrics.metric import Metric, missing
 __all__ = ["FREQUENCIES", "Smoothness", "spectral_arc_length"]
 
 FREQUENCIES = np.linspace(0.0, 10.0, 201)
-"""Hz, at which the spectrum of a speed is found. A movement of 10 s has lobes of 0.1 Hz."""
+"""Frequencies of a speed's spectrum, Hz. A movement of 10 s has lobes of 0.1 Hz."""
 _THRESHOLD = 0.05
-"""Of the spectrum at 0 Hz: what is smaller beyond its last larger one does not count."""
+"""Fraction of the spectrum at 0 Hz; the spectrum ends at the last frequency above this fraction."""
 _SHORTEST, _LONGEST = 0.2, 10.0
 """s; a longer movement is cut."""
 _EDGE = 0.1
-"""Of the speed at which a tip is idle: where a movement begins and ends. Most of the jerk is there."""
+"""Fraction of the idle speed at the beginning and the end of a movement, with most of the jerk."""
 _NEAREST = 1e-3
 """m; a shorter movement is none."""
 
 
 def spectral_arc_length(spectrum: Vector) -> float:
-    """Return the spectral arc length of a speed by its `spectrum` at `FREQUENCIES`, complex, shape (201,).
+    """Return the spectral arc length of a speed from the `spectrum` at `FREQUENCIES`, complex, shape (201,).
 
     Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet, "On the analysis of movement smoothness",
-    Journal of NeuroEngineering and Rehabilitation 12 (2015), with its largest frequency, 10 Hz, and its
+    Journal of NeuroEngineering and Rehabilitation 12 (2015), with the paper's largest frequency, 10 Hz, and
     threshold, 0.05.
     """
     magnitude = np.abs(spectrum)
@@ -45,13 +45,13 @@ def spectral_arc_length(spectrum: Vector) -> float:
 
 
 class SmoothnessState(Record):
-    """The movement of each tip that goes on, and the sums over those that are done."""
+    """The present movement of each tip, and sums over finished movements."""
 
     time = array("arms")
-    """s since it began; 0: none goes on."""
+    """Time since the movement began, s; 0: no movement."""
     length = array("arms")
     peak = array("arms")
-    """Of the speed, m/s."""
+    """Peak of the speed, m/s."""
     jerk = array("arms")
     """Integral of the squared jerk, m^2/s^5."""
     real = array("arms", FREQUENCIES.size)
@@ -64,8 +64,8 @@ class SmoothnessState(Record):
 class Smoothness(Metric[SmoothnessState]):
     """Mean normalised jerk and spectral arc length over the movements of each tip.
 
-    A movement lasts while the tip is faster than a tenth of the speed below which it is idle, and counts if
-    it has not been idle throughout.
+    A movement lasts while the tip is faster than a tenth of the idle speed, and counts if the tip was not
+    idle throughout.
     """
 
     def __init__(self, arms: Sequence[str], idle_speed: float) -> None:
@@ -73,8 +73,8 @@ class Smoothness(Metric[SmoothnessState]):
         self.state = SmoothnessState(arms=len(arms))
         self._arms, self._least, self._edge = arms, idle_speed, _EDGE * idle_speed
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
-        """Add one period to the movements that go on, and end those that are over."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+        """Add a period to present movements, and end finished movements."""
         if not now.is_smooth:
             return
         for i, speed in enumerate(now.speeds):

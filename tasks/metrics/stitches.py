@@ -1,4 +1,4 @@
-"""How well stitches are made: where the needle went in and out, how deep, and what it did to the tissue."""
+"""Quality of stitches: places of entry and exit, depth, and load of the tissue."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ __all__ = ["Stitches", "TissueSeen"]
 
 
 class TissueSeen:
-    """What the tissue reports at one instant."""
+    """Reports of the tissue at an instant."""
 
     def __init__(self) -> None:
         self.is_known = False
-        """Whether any of it is connected."""
+        """Whether any report is connected."""
         self.depth = self.force = self.trauma = 0.0
         """m, N, m^2."""
         self.entry, self.exit = np.zeros(3), np.zeros(3)
@@ -32,11 +32,11 @@ class StitchesState(Record):
     """Sums over all stitches."""
 
     errors = array(2)
-    """Of entries and of exits: sum of the distances from the hole, m."""
+    """Sum of the distances of entries and of exits from their holes, m."""
     largest = array(2)
     counts = array(2)
     missed = integer()
-    """Entries and exits that are not at any hole."""
+    """Number of entries and exits away from all holes."""
     made = integer()
     withdrawn = integer()
     depth = number()
@@ -53,11 +53,11 @@ class Stitches(Metric[StitchesState]):
     """Accuracy, depth, force and trauma."""
 
     def __init__(self, tissue: TissueSeen, holes: Vector) -> None:
-        """Take what the tissue reports, and where the holes are, m, shape (n, 3), in the world."""
+        """`tissue`: reports of the tissue; `holes`: places of the holes, m, shape (n, 3), in the world."""
         self.state = StitchesState()
         self._tissue, self._holes = tissue, holes
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:
+    def update(self, now: Instant, events: Sequence[Event]) -> None:
         """Follow tissue and events."""
         state, tissue = self.state, self._tissue
         for event in events:

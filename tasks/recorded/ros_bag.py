@@ -24,19 +24,20 @@ __all__ = ["score_ros_bag"]
 
 _PERIOD_NS = 10_000_000
 _INSTRUMENT = "LARGE_NEEDLE_DRIVER_400006"
-"""Whose tip is taken for that of an arm of which only joints are recorded."""
+"""Instrument assumed for the tip of an arm with recorded joints only."""
 _LEAST_NORM, _GREATEST_NORM = 0.9, 1.1
-"""Norm of a quaternion that was rounded or badly normalised, but turns."""
+"""Norms of a rounded or badly normalised but usable quaternion."""
 _CHAIN = MountedPsm(instrument=_INSTRUMENT).chain
 _SOURCES = ("local/measured_cp", "measured_cp", "measured_js")
-"""Topics of an arm from which its tip is known, the best first: without what moves the endoscope."""
+"""Topics of an arm with the tip's pose, the best first: independent of the endoscope's motion."""
 _TOPIC = re.compile(r"(?:.*/)?(PSM[123])/(" + "|".join(_SOURCES) + ")")
 
 
 def score_ros_bag(path: Path, rules: Sequence[str]) -> Scored:
-    """Return the metrics of the arms in a ROS bag; those that need objects or a scene have none.
+    """Return the metrics of the arms in a ROS bag; metrics of objects or a scene are missing.
 
-    Raises RecordingError if it cannot be read or has no topic of an arm, ScenarioError for unknown rules.
+    Raises RecordingError for an unreadable bag or a bag without a topic of an arm, ScenarioError for unknown
+    rules.
     """
     with RosBag(path) as bag:
         topics = _arm_topics(bag)
@@ -52,7 +53,7 @@ def score_ros_bag(path: Path, rules: Sequence[str]) -> Scored:
 
 
 def _arm_topics(bag: RosBag) -> dict[str, str]:
-    """Return by arm the best topic about its tip."""
+    """Return the best topic about each arm's tip."""
     found: dict[str, tuple[int, str]] = {}
     for topic, about in bag.topics.items():
         match = _TOPIC.fullmatch(topic)
@@ -66,7 +67,7 @@ def _arm_topics(bag: RosBag) -> dict[str, str]:
 
 
 def _tips(bag: RosBag, topic: str) -> Stream:
-    """Return the poses of a tip, by the time of the bag, from its start."""
+    """Return the poses of a tip, by the time from the start of the bag."""
     read = _from_joints if topic.endswith("measured_js") else _from_pose
     times: list[int] = []
     poses: list[Vector] = []
@@ -83,7 +84,7 @@ def _tips(bag: RosBag, topic: str) -> Stream:
 
 
 def _problem(pose: Vector) -> str:
-    """Return why position and quaternion, shape (7,), are no pose of an instrument; empty if they are."""
+    """Return why position and quaternion, shape (7,), are no pose of an instrument; empty: valid."""
     if not np.isfinite(pose).all():
         return "not all numbers are finite"
     if np.abs(pose).max() > MAGNITUDES["m"].most:

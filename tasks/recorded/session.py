@@ -1,4 +1,4 @@
-"""The task of a recorded session, and what its inputs received."""
+"""The task of a recorded session, and the recorded inputs."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from tasks.task import Task
 __all__ = ["score_session"]
 
 _PERIOD_NS = 10_000_000
-"""Of a task that was not in the session."""
+"""Period of a task missing in the session."""
 
 
 def score_session(recording: Recording, rules: Sequence[str], *, trust: bool = False) -> dict[str, Scored]:
-    """Return by name what each task of a recorded session says, by `rules` or, without any, by its own.
+    """Return the score of each task of a recorded session by name, by `rules` or by the task's own rules.
 
-    A session without a task is measured without goals; if a peg board was in its scene, with those of that.
-    `trust` allows tasks that are classes of the recording's own. Raises RecordingError if the recording is
-    not of a session or has no arm, ScenarioError for unknown rules.
+    A session without a task is measured without goals, with a peg board in the scene by the board's goals.
+    `trust` allows tasks of foreign classes. Raises RecordingError for a recording without a session or an
+    arm, ScenarioError for unknown rules.
     """
     plan, scenario = recording.plan(), recording.scenario()
     found: dict[str, Scored] = {}
@@ -44,7 +44,7 @@ def score_session(recording: Recording, rules: Sequence[str], *, trust: bool = F
 
 
 def _require(recording: Recording, plan: Plan, task: Task) -> None:
-    """Raise RecordingError if what the task cannot do without was not recorded."""
+    """Raise RecordingError if a required input of the task was not recorded."""
     needed = {
         port.name
         for port in task.ports
@@ -63,7 +63,7 @@ def _require(recording: Recording, plan: Plan, task: Task) -> None:
 
 
 def _inputs(recording: Recording, plan: Plan, task: str) -> dict[str, Stream]:
-    """Return by input what a task of the session received, when it did."""
+    """Return the recorded inputs of a task of the session, by input."""
     found: dict[str, Stream] = {}
     for one in plan.connections:
         source = f"{one.source}.{one.source_port}"
@@ -94,7 +94,7 @@ def _make(parameters: SessionParameters, name: str, rules: Sequence[str]) -> Tas
 
 
 def _without_task(recording: Recording, rules: Sequence[str], *, trust: bool) -> Scored:
-    """Return what a task says that was not in the session, from the scene of its robot."""
+    """Return the score by a task missing in the session, from the scene of the robot."""
     robot, scene = _robot(recording)
     arms = {
         arm: one for arm, one in _table(scene, "arms").items() if f"{robot}.{arm}/measured_cp" in recording
@@ -118,7 +118,7 @@ def _without_task(recording: Recording, rules: Sequence[str], *, trust: bool) ->
 
 
 def _robot(recording: Recording) -> tuple[str, dict[str, Any]]:
-    """Return the participant that publishes the poses of arms, best an engine, and its parameters."""
+    """Return the participant publishing the poses of arms, best an engine, and the parameters."""
     plan, specs = recording.plan(), recording.scenario().participants
     engines = {name for name, planned in plan.participants.items() if planned.role == "engine"}
     for name, spec in sorted(specs.items(), key=lambda item: item[0] not in engines):
@@ -131,7 +131,7 @@ def _robot(recording: Recording) -> tuple[str, dict[str, Any]]:
 
 
 def _table(params: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Return a mapping of a recorded scenario, which may be a stranger's; empty if it is none."""
+    """Return a mapping of a recorded scenario, perhaps a stranger's; empty: not a mapping."""
     value: Any = params.get(name)
     return cast("dict[str, Any]", value) if isinstance(value, dict) else {}
 

@@ -1,4 +1,4 @@
-"""Recorded inputs of a task, and a task that is stepped with them."""
+"""Recorded inputs of a task, and a task stepped with recorded inputs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["Scored", "Stream", "score"]
 
 @dataclass(frozen=True)
 class Stream:
-    """What one input received."""
+    """The recorded values of an input."""
 
     times_ns: NDArray[np.int64]
     """When each value held, shape (n,), ascending."""
@@ -32,14 +32,14 @@ class Stream:
 
 
 class Scored(NamedTuple):
-    """What a task says of a recording."""
+    """Score of a recording by a task."""
 
     card: ScoreCard
     events: list[TaskEvent]
 
 
 def score(task: Task, streams: Mapping[str, Stream], period_ns: int) -> Scored:
-    """Step `task` through the recorded values of its inputs, as it was or would have been in the session.
+    """Step `task` through the recorded values of the inputs, as in the session.
 
     Begins once every signal without a start value has a value; ends with the last value.
     """

@@ -1,4 +1,4 @@
-"""The rules of other evaluators, each with its source: docs/scores.md."""
+"""The rules of foreign evaluators, with sources: docs/scores.md."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SUTURES: tuple[type[AnyRules], ...] = (Src1, Src2Script, Src2Rules, Src3Script,
 RULES: Mapping[str, type[AnyRules]] = MappingProxyType(
     {rules.name: rules for rules in (*_GENERAL, *_SUTURES)}
 )
-"""By name."""
+"""Sets of rules by name."""
 
 GENERAL = tuple(rules.name for rules in _GENERAL)
-"""Those that a task has unless it states its own."""
+"""Default rules of a task."""

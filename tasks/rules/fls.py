@@ -4,9 +4,9 @@ All objects over the board and back, each handed over in mid-air; timed from the
 release; cut off at 300 s. Proficiency: 48 s without an object lost out of the field of view (Surgeons as
 Educators, chapter on FLS; docsbay eTable 1).
 
-The score 300 - time - penalty, with the share of the objects that were lost in per cent for a penalty, is
-that of MISTELS, from which FLS comes, as it is remembered: no stored source states it. The scores that FLS
-itself computes are not published.
+The score 300 - time - penalty, with the share of lost objects in per cent as penalty, is the score of
+MISTELS, the origin of FLS, from memory: no stored source states the score. The scores of FLS itself are not
+published.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ class FlsState(Record):
     """Since then, s, at most the cut-off."""
     done = flag()
     lost = array("objects")
-    """1 for each object that was dropped and is out of view."""
+    """1 for each object dropped and out of view."""
     fallen = array("objects")
-    """1 for each object that was dropped and not grasped since."""
+    """1 for each object dropped and not grasped since."""
 
 
 class Fls(Rules[FlsState]):
@@ -63,16 +63,16 @@ class Fls(Rules[FlsState]):
         self._transfers = 2 * count
 
     def records(self) -> Iterator[Record]:
-        """Yield the state, in all its parts."""
+        """Yield all parts of the state."""
         yield from (self.state, self._legs.state)
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:
-        """Time the transfers, and see which objects are lost."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:
+        """Time the transfers, and note lost objects."""
         state = self.state
         if self._reason or state.done or state.time >= _CUT_OFF:
             return
         for event in events:
-            self._legs.take(event)
+            self._legs.count(event)
             if event.kind == "grasped":
                 state.fallen[event.thing] = 0.0
                 state.begun = now.time_s if state.begun < 0.0 else state.begun

@@ -1,7 +1,8 @@
-"""The peg transfer of the Surgical Robotics Challenge at ICRA 2026, in both of its published readings.
+"""The peg transfer of the Surgical Robotics Challenge at ICRA 2026, in both published readings.
 
 Source: surgical-robotics-ai.github.io, icra-competition-2026/rules.md (`icra2026`), and the live page of the
-challenge (`icra2026-live`). They differ in what a ring out of the workspace does and in what breaks a tie.
+challenge (`icra2026-live`). Differences: the effect of a ring out of the workspace, and the breaking of a
+tie.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Icra2026State(Record):
 class Icra2026(Rules[Icra2026State]):
     """Rules of the challenge's repository.
 
-    A ring that leaves the workspace ends the trial. Of equal points, less motion of the PSMs is better.
+    A ring out of the workspace ends the trial. At equal points, less motion of the PSMs is better.
     """
 
     name: ClassVar[str] = "icra2026"
@@ -52,11 +53,11 @@ class Icra2026(Rules[Icra2026State]):
         self._legs = Legs(setting.goals, hand_over=True)
 
     def records(self) -> Iterator[Record]:
-        """Yield the state, in all its parts."""
+        """Yield all parts of the state."""
         yield from (self.state, self._legs.state)
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:
-        """Count a point for each ring that is placed, after a hand-over, until the limit."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:
+        """Count a point for each ring placed after a hand-over, until the limit."""
         state = self.state
         if state.ended or not self._applies:
             return
@@ -64,7 +65,7 @@ class Icra2026(Rules[Icra2026State]):
         if now.is_smooth:
             state.motion += plain_sum(now.speeds) * now.period_s
         for event in events:
-            if self._legs.take(event):
+            if self._legs.count(event):
                 state.last = now.time_s
             if event.kind == "out of workspace" and not self._goes_on:
                 state.ended = True
@@ -72,7 +73,7 @@ class Icra2026(Rules[Icra2026State]):
             state.time, state.ended = _LIMIT, True
 
     def values(self, metrics: Mapping[str, ScoreValue]) -> Iterator[ScoreValue]:  # noqa: ARG002
-        """Yield the points, whether there is any, what breaks a tie (less is better), and the time."""
+        """Yield the points, success (any point), the tie-breaker (less is better), and the time."""
         if not self._applies:
             yield from missing_all(_UNITS, _REASON)
             return

@@ -1,7 +1,7 @@
-"""Proficiency as MScore has it: every metric has to pass its benchmark, and none makes up for another.
+"""Proficiency by MScore: every metric has to pass its benchmark, without compensation between metrics.
 
-Source: mimicsimulation.com/mscore, of the dV-Trainer and the da Vinci Skills Simulator. Its benchmarks, mean
-and standard deviation of experts with at least 75 cases, are not published: a scenario states its own.
+Source: mimicsimulation.com/mscore, of the dV-Trainer and the da Vinci Skills Simulator. MScore's benchmarks,
+mean and standard deviation of experts with at least 75 cases, are not published: a scenario states its own.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class MScore(Rules[MScoreState]):
         self.state = MScoreState()
         self._benchmarks = setting.benchmarks
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:
+    def update(self, now: Instant, events: Sequence[Event]) -> None:
         """Do nothing: the metrics take all."""
 
     def values(self, metrics: Mapping[str, ScoreValue]) -> Iterator[ScoreValue]:

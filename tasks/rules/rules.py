@@ -1,4 +1,4 @@
-"""What a set of rules is."""
+"""The base of sets of rules."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["AnyRules", "Rules", "Setting", "Suture", "TipByHoles", "missing_all"
 
 
 class TipByHoles:
-    """Where a needle's tip is by the holes; several rules ask for it at the same pose."""
+    """Place of a needle's tip at the holes, computed once per pose for several rules."""
 
     def __init__(self, holes: Vector, needle: NeedleShape) -> None:
         self._places, self._axes = holes[:, :3, 3], holes[:, :3, :3]
@@ -46,7 +46,7 @@ class TipByHoles:
 
 @dataclass(frozen=True)
 class Suture:
-    """What rules know of a task in which a needle is to go through a phantom."""
+    """Setting of a suturing task, for rules."""
 
     holes: Vector
     """Frames of all holes in the world, entries before exits, shape (2 n, 4, 4), m; z out of the tissue."""
@@ -54,9 +54,9 @@ class Suture:
     thing: int
     """Index of the needle among the objects."""
     estimated: bool
-    """Whether there is an estimate of its pose."""
+    """Whether there is an estimate of the needle's pose."""
     asked: bool
-    """Whether a report is what ends a stitch."""
+    """Whether a report ends a stitch."""
 
     @cached_property
     def tip(self) -> TipByHoles:
@@ -66,12 +66,12 @@ class Suture:
 
 @dataclass(frozen=True)
 class Setting:
-    """What rules know of the task that they score."""
+    """Setting of the scored task, for rules."""
 
     things: tuple[str, ...]
     goals: Goals
     is_board: bool
-    """Whether it is a peg board."""
+    """Whether the task is a peg board."""
     camera: bool
     """Whether the endoscope's view is known."""
     benchmarks: Mapping[str, float]
@@ -82,7 +82,7 @@ S = TypeVar("S", bound=Record)
 
 
 class Rules(ABC, Generic[S]):
-    """Scores of one foreign evaluator, computed while the trial goes on; the whole memory is in `records`."""
+    """Scores of a foreign evaluator, computed during the trial; the whole memory is in `records`."""
 
     name: ClassVar[str]
     state: S
@@ -91,22 +91,22 @@ class Rules(ABC, Generic[S]):
     def __init__(self, setting: Setting) -> None: ...
 
     def records(self) -> Iterator[Record]:
-        """Yield the state, in all its parts."""
+        """Yield all parts of the state."""
         yield self.state
 
     @abstractmethod
-    def take(self, now: Instant, events: Sequence[Event]) -> None:
-        """Take one instant, and the events in it."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:
+        """Observe an instant and its events."""
 
     @abstractmethod
     def values(self, metrics: Mapping[str, ScoreValue]) -> Iterator[ScoreValue]:
-        """Yield the scores so far; `metrics` are those of the card."""
+        """Yield the scores so far; `metrics`: metrics of the card."""
 
 
 AnyRules = Rules[Any]
 
 
 def missing_all(rows: Mapping[str, str], reason: str) -> Iterator[ScoreValue]:
-    """Yield scores that cannot be given; `rows` has the unit of each."""
+    """Yield scores without values; `rows` has the unit of each."""
     for name, unit in rows.items():
         yield ScoreValue(name=name, unit=unit, reason=reason)

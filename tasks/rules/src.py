@@ -1,11 +1,11 @@
-"""The rules of the Surgical Robotics Challenge 2021-2022: where the needle is, one stitch, four stitches.
+"""The rules of the Surgical Robotics Challenge 2021-2022: pose of the needle, one stitch, four stitches.
 
-Source: surgical-robotics-ai/surgical_robotics_challenge, scripts/surgical_robotics_challenge/evaluation,
-whose script and whose page do not ask for the same: the script only for the order of the holes, the page
-also for how near to their middles the needle goes, and how far it comes out.
+Source: surgical-robotics-ai/surgical_robotics_challenge, scripts/surgical_robotics_challenge/evaluation, with
+different demands of script and page: the script asks only for the order of the holes, the page also for the
+distance of the needle from their middles, and for the length out of the tissue.
 
-A stitch is reported when the competitor says so; without a source for `report` it is taken as reported as
-soon as it counts and the needle is out as far as the page asks for.
+A stitch is reported by the competitor; without a source for `report` a valid stitch counts as reported with
+the needle as far out as the page demands.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from tasks.rules.rules import Rules, Setting, Suture, missing_all
 __all__ = ["Src1", "Src2Rules", "Src2Script", "Src3Rules", "Src3Script"]
 
 _NEAR = 5.0e-3
-"""A sample of the tip counts for a hole within this box about its frame, m."""
+"""Box about a hole's frame for counted samples of the tip, m."""
 _ACROSS, _OUT = 2.5e-3, 5.0e-3
-"""The page: largest distance across a hole, and least length that comes out, m."""
+"""Limits of the page: largest distance across a hole, and least length out of the tissue, m."""
 _LIMIT = 60.0
 """s, for the pose of the needle."""
 _NO_SUTURE = "these rules score a needle in a phantom: run or record a task of kind suturing-task"
 
 
 class Src1State(Record):
-    """The last estimate that was not the start value."""
+    """The last estimate after the start value."""
 
     error = number(-1.0)
     """m; -1: none yet."""
@@ -43,7 +43,7 @@ class Src1State(Record):
 
 
 class Src1(Rules[Src1State]):
-    """Challenge 1: the sum of the errors of base, mid and tip of the needle whose pose is reported."""
+    """Challenge 1: the sum of the errors of base, mid and tip of the needle at the reported pose."""
 
     name: ClassVar[str] = "src1"
     _units: ClassVar[Mapping[str, str]] = {"error": "m", "in_time": "", "in_view": ""}
@@ -53,7 +53,7 @@ class Src1(Rules[Src1State]):
         self._suture = setting.suture
         self._seen = False
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Compare the newest estimate with where the needle is, within the time."""
         suture = self._suture
         if suture is None or not suture.estimated or now.time_s > _LIMIT:
@@ -65,7 +65,7 @@ class Src1(Rules[Src1State]):
         self._seen = bool(now.things_seen[suture.thing])
 
     def values(self, metrics: Mapping[str, ScoreValue]) -> Iterator[ScoreValue]:  # noqa: ARG002
-        """Yield E, and whether it was reported in time and with the needle in view."""
+        """Yield E, and whether the report was in time and with the needle in view."""
         if self._suture is None or not self._suture.estimated:
             reason = _NO_SUTURE if self._suture is None else "no estimate: connect a tracker to estimate/pose"
             yield from missing_all(self._units, reason)
@@ -83,12 +83,12 @@ class InsertionsState(Record):
     """The tip's way through the holes; entries before exits."""
 
     before = array("holes")
-    """Height of the tip over each hole at the last sample that counted, m; 0: none has."""
+    """Height of the tip over each hole at the last counted sample, m; 0: none."""
     order = array("holes")
     """Number of the last insertion of each hole; 0: none."""
     count = integer()
     across = array("holes", 2)
-    """Where the tip was across each hole at its last insertion, m."""
+    """Position of the tip across each hole at the last insertion, m."""
     out = number()
     """How far the tip is out of the nearest hole, m."""
     nearest = integer(-1)
@@ -102,7 +102,7 @@ class StitchState(Record):
     time = number()
     out = number()
     across = array("pairs", 2)
-    """Largest distance across entry and exit of each pair, as the report found them, m."""
+    """Largest distance across entry and exit of each pair at the report, m."""
     lateral = array("pairs", 2)
 
 
@@ -110,7 +110,7 @@ class _Stitches(Rules[StitchState]):
     """Challenges 2 and 3: insertions in the right order."""
 
     _all: ClassVar[bool]
-    """Whether all pairs of holes have to be stitched, one after the other."""
+    """Whether all pairs of holes have to be stitched in turn."""
     _strict: ClassVar[bool]
     """Whether the page's limits hold."""
     _units: ClassVar[Mapping[str, str]] = {
@@ -130,10 +130,10 @@ class _Stitches(Rules[StitchState]):
         self._seen = InsertionsState(holes=holes)
 
     def records(self) -> Iterator[Record]:
-        """Yield the state, in all its parts."""
+        """Yield all parts of the state."""
         yield from (self.state, self._seen)
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Follow the tip through the holes, and see whether a report counts."""
         if self._suture is None or self.state.reported:
             return
@@ -181,7 +181,7 @@ class _Stitches(Rules[StitchState]):
                     state.lateral[k, side] = float(np.hypot(*seen.across[hole]))
 
     def values(self, metrics: Mapping[str, ScoreValue]) -> Iterator[ScoreValue]:  # noqa: ARG002
-        """Yield success, its time, and the largest distances at entries and exits, of what is reported."""
+        """Yield success, time, and the largest distances at entries and exits, of the reported stitches."""
         state = self.state
         if self._suture is None:
             yield from missing_all(self._units, _NO_SUTURE)
@@ -199,7 +199,7 @@ class _Stitches(Rules[StitchState]):
 
 
 class Src2Script(_Stitches):
-    """Challenge 2, one stitch, by the script."""
+    """Challenge 2, a single stitch, by the script."""
 
     name: ClassVar[str] = "src2-script"
     _all: ClassVar[bool] = False
@@ -207,7 +207,7 @@ class Src2Script(_Stitches):
 
 
 class Src2Rules(_Stitches):
-    """Challenge 2, one stitch, by the page."""
+    """Challenge 2, a single stitch, by the page."""
 
     name: ClassVar[str] = "src2-rules"
     _all: ClassVar[bool] = False

@@ -1,8 +1,8 @@
 """The success of SurRoL's environments.
 
-Source: med-air/SurRoL at a903fa6, surrol/tasks: steps of 0.2 s, of which an episode has 50; at the end of a
-step an object is where it belongs within 5 mm of its goal, on a peg within 5 mm across and 4 mm along it.
-(All lengths are 5 times as large there, as the whole world is.)
+Source: med-air/SurRoL at a903fa6, surrol/tasks: 50 steps of 0.2 s an episode; at the end of a step an object
+is at its goal within 5 mm, on a peg within 5 mm across and 4 mm along the peg. (All lengths of SurRoL are 5
+times as large, like the whole world.)
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _STEP = 0.2
 """s."""
 _STEPS = 50
 _TOLERANCE = 5e-3
-"""m, of a distance; on a peg, of that across it."""
+"""Tolerance of a distance, m; on a peg, of the distance across the peg."""
 _ALONG_PEG = 4e-3
 """m."""
 _UNITS = {"success": "", "success_at_end": "", "reached": "", "first_success": "s"}
@@ -36,13 +36,13 @@ class SurrolState(Record):
 
     steps = integer()
     reached = array("objects")
-    """1 for each object that is where it belongs."""
+    """1 for each object at its goal."""
     first = number(-1.0)
     """When all objects first were, s; -1: never."""
 
 
 class Surrol(Rules[SurrolState]):
-    """SurRoL's success, of all objects instead of one."""
+    """SurRoL's success, for all objects instead of a single object."""
 
     name: ClassVar[str] = "surrol"
 
@@ -54,8 +54,8 @@ class Surrol(Rules[SurrolState]):
         if goals.positions is not None:
             self._goals = [goals.positions[sorted(targets)] for targets in goals.targets]
 
-    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
-        """At the end of a step, see which objects are where they belong."""
+    def update(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+        """At the end of a step, find the objects at their goals."""
         state = self.state
         if not self._goals or now.time_s < (state.steps + 1) * _STEP - 0.5 * now.period_s:
             return
@@ -73,7 +73,7 @@ class Surrol(Rules[SurrolState]):
         return bool((np.linalg.norm(away, axis=1) < _TOLERANCE).any())
 
     def values(self, metrics: Mapping[str, ScoreValue]) -> Iterator[ScoreValue]:  # noqa: ARG002
-        """Yield success within 50 steps, success now, objects where they belong, and the first success."""
+        """Yield success within 50 steps, success now, objects at their goals, and the first success."""
         if not self._goals:
             yield from missing_all(_UNITS, "the task has no goals with positions, from which distances count")
             return

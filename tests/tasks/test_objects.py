@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tasks.instant import Instant
-from tasks.objects import Things
+from tasks.objects import ObjectWatch
 from tasks.params import TaskParams
 
 PERIOD_S = 0.01
@@ -15,7 +15,7 @@ class Table:
     """One object over a table with a place at x > 0.1 m; steps of 10 ms."""
 
     def __init__(self, workspace=None):
-        self.things = Things(1, PARAMS, workspace, lambda _, pose: 3 if pose[0] > 0.1 else -1)
+        self.things = ObjectWatch(1, PARAMS, workspace, lambda _, pose: 3 if pose[0] > 0.1 else -1)
         self.now = Instant(2, 1, period_s=PERIOD_S)
         self.events = []
         self.things.start(self.now)
@@ -28,7 +28,7 @@ class Table:
             self.now.poses[0, :3] = position
             self.now.holders, self.now.impulse = [holder], self.now.impulse + impulse
             self.now.things_seen = np.array([seen])
-            self.events += self.things.take(self.now)
+            self.events += self.things.observe(self.now)
         return self
 
     @property

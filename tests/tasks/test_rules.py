@@ -34,7 +34,7 @@ class Trial:
         while self.step < end:
             self.step += 1
             self.now.time_s = self.step * 0.1
-            self.rules.take(self.now, events if self.step == end else ())
+            self.rules.update(self.now, events if self.step == end else ())
         return self
 
     def __getitem__(self, name):

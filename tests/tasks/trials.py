@@ -30,8 +30,8 @@ def measured(metric, tips, *, turns=None, events=(), period_s=PERIOD_S):
         now.time_s = (i + 1) * period_s
         now.tips[0] = tip
         now.turns[0] = (0.0, 0.0, 0.0, 1.0) if turns is None else turns[i]
-        smoothing.take(now)
-        metric.take(now, [event for at, event in events if at == i])
+        smoothing.update(now)
+        metric.update(now, [event for at, event in events if at == i])
     return {value.name: None if value.reason else value.value for value in metric.values()}
 
 
