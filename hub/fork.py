@@ -1,4 +1,4 @@
-"""Forks: a session that is another one's recording up to an instant, and goes on from there with changes."""
+"""Forks: a session that repeats a recording up to an instant, and goes on from there with changes."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ _Key = tuple[str, str]
 class Fork:
     """A session that goes on from an instant of a recording.
 
-    All is simulated again from the recorded grants up to that instant, as fast as the machine can, and every
-    state hash is compared on the way. Then the devices of the scenario lead, at its pace.
+    All is simulated again from the recorded grants up to the instant, as fast as the machine can, and every
+    state hash is compared on the way. Then the devices of the scenario lead, at the scenario's pace.
 
     Args:
         recording: The parent, which may be a stranger's.
-        at_ns: Simulated time; it is rounded down to a communication point.
-        overrides: What is to be changed, `a.b.c=value`: parameters of engines and controllers that can save
-            their state, devices, hosts, pace, duration, measures. More tasks and cameras may be added.
+        at_ns: Simulated time; rounded down to a communication point.
+        overrides: Changes, `a.b.c=value`: parameters of engines and controllers that can save their state,
+            devices, hosts, pace, duration, measures. More tasks and cameras may be added.
         record: The directory of the fork's own recording.
-        trust: Allow what `trusted_parameters` refuses.
-        directory: Where relative paths of the scenario start, by default where they did.
+        trust: Allow the demands refused by `trusted_parameters`.
+        directory: Where relative paths of the scenario start, by default the recorded directory.
         one_host: Run every participant in this process.
         endpoint: Where the hub listens on loopback.
-        outside: Where other machines may join, by TLS with the certificate in `certificates`.
+        outside: Endpoint for other machines to join, by TLS with the certificate in `certificates`.
         certificates: By default this user's directory.
 
     Raises RecordingError if there is no such instant in the recording, ScenarioError if a change is not
-    possible in a running session, and what `trusted_parameters` and `launch` raise.
+    possible in a running session, and the errors of `trusted_parameters` and `launch`.
     """
 
     def __init__(
@@ -119,8 +119,8 @@ class Fork:
     def run(self, progress: Callable[[Progress], None] | None = None) -> Summary:
         """Run to the end and return the summary.
 
-        Raises SessionError if the recorded part does not give the recorded state hashes again, and what
-        `Session.run` raises.
+        Raises SessionError if the recorded part does not give the recorded state hashes again, and the errors
+        of `Session.run`.
         """
         summary = self.session.run(progress)
         if (first := self._comparison.first) is not None:
@@ -148,10 +148,10 @@ def _changed(before: Scenario, directory: Path, overrides: Sequence[str]) -> Sce
 
 
 def _going_on(parent: Plan, plan: Plan) -> Plan:
-    """Return the plan of a fork, with the start values of its parent.
+    """Return the plan of a fork, with the start values of the parent.
 
-    Raises ScenarioError where its stepped part differs from the recorded one. Participants that only look,
-    such as tasks, may come: what they add feeds none that was there.
+    Raises ScenarioError where the stepped part differs from the recorded plan. Participants that only look,
+    such as tasks, may be added: their outputs feed no recorded participant.
     """
     if plan.step_ns != parent.step_ns:
         raise ScenarioError("a fork keeps the communication step of its parent")
@@ -181,7 +181,7 @@ def _going_on(parent: Plan, plan: Plan) -> Plan:
 
 
 def _differing(one: PlannedParticipant, other: PlannedParticipant) -> str:
-    """Return what of a participant may not change in a fork, and does."""
+    """Return the first changed property of a participant that may not change in a fork."""
     parts = {
         "kind": (one.kind, other.kind),
         "period": (one.period, other.period),
@@ -201,7 +201,7 @@ def _feeding(plan: Plan, name: str) -> list[PlannedConnection]:
 
 
 def _renewals(before: Scenario, scenario: Scenario, plan: Plan, step: int) -> Iterator[Renewal]:
-    """Yield what changes at `step`, if anything does."""
+    """Yield the changes at `step`, if any."""
     changed = {
         name: before.participants[name].params
         for name in plan.order
@@ -213,7 +213,7 @@ def _renewals(before: Scenario, scenario: Scenario, plan: Plan, step: int) -> It
 
 
 def _new_devices(before: Scenario, scenario: Scenario, plan: Plan) -> frozenset[str]:
-    """Return the devices that do not stand where they stood: a person's, and those that were replaced."""
+    """Return the devices in a new place: a person's, and replaced devices."""
     return frozenset(
         name
         for name, planned in plan.participants.items()
@@ -230,7 +230,7 @@ def _same_device(before: Scenario, scenario: Scenario, name: str) -> bool:
 
 
 class _Grants:
-    """The recorded grants before a step, as the plan of the fork needs them."""
+    """The recorded grants before a step, in the form needed by the plan of the fork."""
 
     def __init__(self, recording: Recording, parent: Plan, plan: Plan, step: int) -> None:
         self._recording, self._step_ns, self._end = recording, plan.step_ns, step
@@ -263,7 +263,7 @@ class _Grants:
                 begin, inlets = begin + count, []
 
     def _entering(self, sample: InletSample) -> Iterator[InletSample]:
-        """Yield a sample by its device, or by the inputs that it enters where those have another one now."""
+        """Yield a sample by its device, or by the entered inputs if the inputs have another device now."""
         key = sample.participant, sample.port
         if key in self._kept or key not in self._targets:
             yield sample
@@ -273,7 +273,7 @@ class _Grants:
 
 
 def _targets(plan: Plan) -> dict[_Key, set[_Key]]:
-    """Return by the output of each device the inputs that it feeds."""
+    """Return the inputs fed by each output of a device."""
     targets: dict[_Key, set[_Key]] = {}
     for one in plan.from_devices:
         targets.setdefault((one.source, one.source_port), set()).add((one.target, one.target_port))

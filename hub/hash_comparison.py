@@ -1,4 +1,4 @@
-"""Compares the state hashes of a session that runs with those of a recording."""
+"""Compares the state hashes of a running session with the hashes of a recording."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ __all__ = ["HashComparison"]
 
 
 class HashComparison:
-    """Compares every state hash, whatever grants the steps came in, with the recorded one of that step.
+    """Compares every state hash with the recorded hash of the same step, whatever the grants.
 
     Args:
         recording: The recording.
-        plan: The plan of the session that runs.
-        until: The step from which on it may differ; None: it may not.
+        plan: The plan of the running session.
+        until: The first step with allowed differences; None: no step.
     """
 
     def __init__(self, recording: Recording, plan: Plan, until: int | None = None) -> None:
@@ -29,7 +29,7 @@ class HashComparison:
         self._order, self._until = plan.order, until
         self._differences: list[tuple[int, int]] = []
         self.hashes = 0
-        """State hashes that were compared."""
+        """State hashes compared."""
         self.stop: Callable[[], None] = lambda: None
         """Is called at the first difference."""
 
@@ -65,6 +65,6 @@ def _hashes(recording: Recording, planned: PlannedParticipant) -> Iterator[tuple
 
 
 def _steps(planned: PlannedParticipant, ack: Ack) -> Iterator[tuple[int, int]]:
-    """Yield each step of an ack, which has the number of its grant's first one, and its hash."""
+    """Yield the number and the hash of each step of an ack; steps count from the first of the grant."""
     first = -(-ack.step // planned.period) * planned.period
     return ((first + i * planned.period, value) for i, value in enumerate(ack.state_hash))

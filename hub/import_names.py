@@ -1,4 +1,4 @@
-"""Whether Trocar's import names, some of them generic words, belong to Trocar in this environment."""
+"""Whether Trocar's import names, some of these generic words, belong to Trocar in this environment."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ _ROOT = Path(__file__).resolve().parents[1]
 
 @dataclass(frozen=True)
 class Collision:
-    """An import name of Trocar that another distribution, or another folder on the path, has too."""
+    """An import name of Trocar shared with another distribution, or with another folder on the path."""
 
     name: str
     others: tuple[str, ...]
-    """Distributions that bring a module of that name."""
+    """Distributions with a module of the same name."""
     file: str
-    """The file that is imported."""
+    """The imported file."""
     owner: str
-    """The distribution that this file is from; empty if it is from none."""
+    """The distribution of this file; empty if none."""
 
 
 def collisions() -> list[Collision]:
-    """Return the import names that are not Trocar's alone."""
+    """Return the import names not owned by Trocar alone."""
     owners = _owners()
     found: list[Collision] = []
     for name in NAMES:
@@ -59,7 +59,7 @@ def collisions() -> list[Collision]:
 
 
 def _owners() -> dict[str, dict[str, list[PackagePath]]]:
-    """Return, by import name, the distributions that bring it, each with the files of that name."""
+    """Return the distributions of each import name, each with the files of the name."""
     owners: dict[str, dict[str, list[PackagePath]]] = {}
     for distribution in distributions():
         for file in distribution.files or ():
@@ -70,7 +70,7 @@ def _owners() -> dict[str, dict[str, list[PackagePath]]]:
 
 
 def _is_from(file: Path, files: list[PackagePath]) -> bool:
-    """Say whether `file` is one of `files`, by place and by the hash that its distribution recorded."""
+    """Return whether `file` is one of `files`, by place and by the hash recorded in the distribution."""
     if not file.is_file():
         return False
     digest = urlsafe_b64encode(hashlib.sha256(file.read_bytes()).digest()).rstrip(b"=").decode()

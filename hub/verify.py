@@ -1,4 +1,4 @@
-"""Re-simulates a recording from its grants, and compares every state hash."""
+"""Re-simulates a recording from the recorded grants, and compares every state hash."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["VerifySummary", "verify"]
 
 @dataclass(frozen=True)
 class VerifySummary:
-    """The result of a comparison: whether every state hash is the same, or the first that differs.
+    """The result of a comparison: whether every state hash is the same, or the first difference.
 
     Examples:
         found = trocar.verify("recordings/table")
@@ -34,7 +34,7 @@ class VerifySummary:
     """Whether every recorded state hash is the same again."""
     steps: int
     hashes: int
-    """State hashes that were compared."""
+    """State hashes compared."""
     first_difference_step: int | None
     first_difference_participant: str | None
 
@@ -51,13 +51,13 @@ def verify(
 
     Args:
         recording: The recording, which may be a stranger's.
-        trust: Allow what `trusted_parameters` refuses.
-        directory: Where relative paths of the scenario start, by default where they did.
+        trust: Allow the demands refused by `trusted_parameters`.
+        directory: Where relative paths of the scenario start, by default the recorded directory.
         endpoint: Where the hub listens on loopback; by default at a free port.
-        progress: Is called several times a second of wall time.
+        progress: Called several times a second of wall time.
 
-    Raises RecordingError if the recording is not of a session, and what `trusted_parameters` and
-    `Session.run` raise.
+    Raises RecordingError if the recording is not of a session, and the errors of `trusted_parameters` and
+    `Session.run`.
     """
     scenario = recording.scenario().model_copy(update={"pace": "fast", "measure": {}})
     plan, directory = _plan(recording), directory or recording.directory()
@@ -91,7 +91,8 @@ def verify(
 def _grants(recording: Recording, plan: Plan, most: int) -> Iterator[GrantMessage]:
     """Yield the recorded grants, of at most `most` steps.
 
-    Raises RecordingError at one that does not follow the one before, or covers more: nothing ends it.
+    Raises RecordingError at a grant that does not follow the grant before, or covers more steps: a longer
+    grant could not be ended.
     """
     step = 0
     for grant in recording.grants():
@@ -110,7 +111,7 @@ def _grants(recording: Recording, plan: Plan, most: int) -> Iterator[GrantMessag
 def _plan(recording: Recording) -> Plan:
     """Return the recorded plan, with remote participants in processes here and without outputs to devices.
 
-    Devices are in the hub's process, which makes none in a re-simulation; a host process would open them.
+    Devices are in the hub's process, where a re-simulation makes none; a host process would open devices.
     Observers have no hashes and are left out.
     """
     plan = recording.plan()

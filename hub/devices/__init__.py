@@ -1,1 +1,1 @@
-"""Devices: inlets into simulated time, threads that read them, network links and clock offsets."""
+"""Devices: inlets into simulated time, reading threads, network links and clock offsets."""

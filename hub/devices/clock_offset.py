@@ -1,6 +1,6 @@
-"""The offset of the hub's clock from that of a device's host: four timestamps an exchange, the best of 16.
+"""The offset between the clocks of the hub and a device's host: four timestamps, the best of 16 exchanges.
 
-The clocks are the monotonic ones of both machines, so that setting a wall clock does not disturb it.
+Both clocks are monotonic: setting a wall clock does not disturb the offset.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ _DRIFT = 15e-6
 
 @dataclass(frozen=True)
 class ClockExchange:
-    """A query for the time of the hub, and its answer."""
+    """A query for the time of the hub, and the answer."""
 
     asked_ns: int
-    """By the device host's clock, as is `answered_ns`."""
+    """Time by the device host's clock, like `answered_ns`."""
     received_ns: int
-    """By the hub's clock, as is `replied_ns`."""
+    """Time by the hub's clock, like `replied_ns`."""
     replied_ns: int
     answered_ns: int
 
@@ -32,7 +32,7 @@ class ClockExchange:
 
     @property
     def round_trip_ns(self) -> int:
-        """Time on the way, there and back; half of it bounds the error of the offset."""
+        """Time on the way, there and back; half of this time bounds the error of the offset."""
         return max(self.answered_ns - self.asked_ns - (self.replied_ns - self.received_ns), 0)
 
     def error_ns(self, now_ns: int) -> float:
@@ -41,20 +41,21 @@ class ClockExchange:
 
 
 class ClockOffset:
-    """The offset of two clocks, from the exchange with the smallest error among the last ones."""
+    """The offset of two clocks, from the exchange with the smallest error among the last exchanges."""
 
     def __init__(self) -> None:
         self._exchanges: tuple[ClockExchange, ...] = ()
         self.best: ClockExchange | None = None
         """The exchange with the smallest error, None before the first.
 
-        It stays the best until the next one, as the errors of all grow at the same rate.
+        The best exchange stays until a better exchange, as all errors grow at the same rate.
         """
 
     def add(self, exchange: ClockExchange) -> None:
         """Add an exchange.
 
-        If it contradicts those before (a clock has stood still or jumped), they are forgotten.
+        A contradiction with earlier exchanges (a clock has stood still or jumped) forgets the earlier
+        exchanges.
         """
         now_ns, best = exchange.answered_ns, self.best
         if (

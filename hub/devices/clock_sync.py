@@ -22,7 +22,7 @@ _PERIOD_S = 0.5
 
 
 class ClockSync:
-    """Queries the hub's clock while it is entered: a few times in quick succession, then twice a second."""
+    """Queries the hub's clock in its `with` block: a few times in quick succession, then twice a second."""
 
     def __init__(self, session: zenoh.Session, keys: Keys) -> None:
         self.offset = ClockOffset()

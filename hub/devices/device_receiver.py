@@ -1,4 +1,4 @@
-"""Receives what the simulation sends to a wall-time device, and writes it to the device."""
+"""Receives the simulation's messages to a wall-time device, and writes the values to the device."""
 
 from __future__ import annotations
 
@@ -29,13 +29,14 @@ from schemas.errors import MessageError
 __all__ = ["DeviceReceiver"]
 
 _MOST_WAITING = 8
-"""Bundles of signals: a host that is busy for longer misses the oldest ones, as its values should be new."""
+"""Bundles of signals: a host busy for longer misses the oldest, as values should be new."""
 
 
 class DeviceReceiver:
-    """Receives what the connections to a device bring, until it is closed.
+    """Receives the messages of the connections to a device, until closed.
 
-    All in one thread: with one for each of a hundred ports, the simulation would wait for each in turn.
+    All in a single thread: with a thread for each of a hundred ports, the simulation would wait for each in
+    turn.
     """
 
     def __init__(
@@ -49,7 +50,7 @@ class DeviceReceiver:
         offset: ClockOffset | None,
     ) -> None:
         self.latencies = Latencies()
-        """From a value to the device."""
+        """Latencies from a value to the device."""
         self._name, self._run, self._link, self._device = name, run, link, thread
         self._refusals, self._offset = refusals, offset
         self._inputs: list[_Input] = []
@@ -57,7 +58,7 @@ class DeviceReceiver:
         self._has_reported = False
         """Whether the sources know `_unused`: of most devices everything is used."""
         self._uses: list[tuple[list[str], zenoh.Publisher]] = []
-        """Inputs of each bundle, and where it is published which of them are used."""
+        """Inputs of each bundle, and the publisher of the inputs in use."""
         self._arrived: SimpleQueue[_Subscription | None] = SimpleQueue()
         self._thread = Thread(target=self._receive, name=f"receiver {name}", daemon=True)
         self._thread.start()
@@ -103,7 +104,7 @@ class DeviceReceiver:
                     self._refusals.refuse_sample(sample, error)
 
     def want_all_but(self, unused: Collection[str], *, again: bool = False) -> None:
-        """Tell the sources which signals they need not send, if that has changed; or `again`."""
+        """Tell the sources the signals not needed, after a change or on `again`."""
         if unused is self._unused and not (again and self._has_reported):
             return
         self._unused, self._has_reported = unused, True
@@ -111,7 +112,7 @@ class DeviceReceiver:
             publisher.put(use_mask(ports, unused), attachment=Tag.pack(self._run.number, 0, INITIAL, 0))
 
     def write_arrived(self, t: int) -> None:
-        """Write to the device what has passed the link by `t` (ns since the start of the device's thread)."""
+        """Write to the device the values past the link by `t` (ns since the start of the device's thread)."""
         for one in self._inputs:
             one.write_arrived(t)
 
@@ -126,18 +127,18 @@ class DeviceReceiver:
 
 
 class _Subscription:
-    """The messages of one key, and the inputs that they are for.
+    """The messages of a key, and the receiving inputs.
 
-    `whole`: a message is the value of the only input; otherwise it is a bundle.
+    `whole`: a message is the value of the only input; otherwise the message is a bundle.
     """
 
     def __init__(self, key: str, inputs: Sequence[_Input], *, whole: bool) -> None:
         self.key, self._inputs, self._whole = key, inputs, whole
         self.waiting: deque[zenoh.Sample] = deque(maxlen=None if whole else _MOST_WAITING)
-        """What has arrived and is not yet handled."""
+        """Messages received but not yet handled."""
 
     def receive(self, sample: zenoh.Sample, run: RunInfo) -> None:
-        """Give a message's values to the inputs; raises MessageError if it is invalid or of another run."""
+        """Give a message's values to the inputs; raises MessageError if invalid or of another run."""
         tag = Tag.of(sample)
         if tag.run != run.number:
             raise MessageError(f"belongs to run {tag.run:x}, this is run {run.number:x}")
@@ -156,7 +157,7 @@ class _Subscription:
 
 
 class _Input:
-    """One connection to the device."""
+    """A connection to the device."""
 
     def __init__(
         self,
@@ -181,11 +182,11 @@ class _Input:
         self._newest = (INITIAL - 1, 0)
 
     def receive(self, tag: Tag, payload: bytes) -> None:
-        """Write a value (CDR), or send it over the link; raises MessageError if it is invalid."""
+        """Write a value (CDR), or send it over the link; raises MessageError for an invalid value."""
         self._take(tag, self._codec.decode(payload))
 
     def receive_packed(self, tag: Tag, packed: bytes) -> None:
-        """Write a value of a bundle, or send it over the link; raises MessageError if it is invalid."""
+        """Write a value of a bundle, or send it over the link; raises MessageError for an invalid value."""
         value = self._codec.unpack(packed)
         if self._as_messages and self._codec.vector is not None:
             value = self._codec.vector.to_message(value, tag.time_ns)
@@ -198,7 +199,7 @@ class _Input:
             self._line.send(self._device.now_ns, (tag, value))
 
     def write_arrived(self, t: int) -> None:
-        """Write what has passed the link by `t` (ns since the start of the device's thread)."""
+        """Write the values past the link by `t` (ns since the start of the device's thread)."""
         for _, (tag, value) in self._line.arrived(t):
             self._write(tag, value)
 

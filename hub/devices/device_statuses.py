@@ -1,4 +1,4 @@
-"""What the hosts of wall-time devices report of them: clock offsets, network links and latencies."""
+"""Reports of the hosts of wall-time devices: clock offsets, network links and latencies."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from schemas.trocar_msgs import DeviceStatus, Latency
 __all__ = ["DeviceStatuses"]
 
 _RATE = 10.0
-"""Statuses per second that are accepted for each participant; a host sends one of each device."""
+"""Statuses per second accepted for each participant; a host sends a status of each device."""
 
 
 class DeviceStatuses:
@@ -31,7 +31,7 @@ class DeviceStatuses:
         self._plan, self._keys, self._inlets, self._refusals = plan, keys, inlets, refusals
         self._statuses: dict[str, DeviceStatus] = {}
         self._latencies: dict[str, list[Latency]] = {}
-        """The last ones of each device, also of one that is gone."""
+        """The last latencies of each device, also of a device already gone."""
         self._limit = TokenBucket(_RATE * (1.0 + len(plan.participants)))
         self._subscriber = session.declare_subscriber(
             keys.device_status("*"), Callback(self._receive, indirect=False)
@@ -39,7 +39,7 @@ class DeviceStatuses:
 
     @property
     def statuses(self) -> list[DeviceStatus]:
-        """The last status of each device that is here, by name."""
+        """The last status of each present device, by name."""
         return [status for _, status in sorted(self._statuses.items())]
 
     @property
@@ -67,7 +67,7 @@ class DeviceStatuses:
             self._inlets.offsets_ns[status.device] = status.offset_ns
 
     def forget(self, device: str) -> None:
-        """Forget the status and the clock offset of a device that is gone."""
+        """Forget the status and the clock offset of a departed device."""
         self._inlets.offsets_ns.pop(device, None)
         self._statuses = {name: status for name, status in self._statuses.items() if name != device}
 

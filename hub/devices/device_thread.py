@@ -1,4 +1,4 @@
-"""A device in wall time: a thread reads it at its own rate, and as soon as it has something new."""
+"""A device in wall time: a thread reads the device at its own rate, and as soon as there is something new."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 
 _LONGEST_SLEEP_S = 0.05
 _LINK_NS = 1_000_000
-"""Period at which an uplink is called while its network link delays messages."""
+"""Period of calls to an uplink while the network link delays messages."""
 
 
 class Uplink(Protocol):
@@ -29,13 +29,13 @@ class Uplink(Protocol):
     def exchange(self, t: int, samples: list[Sample]) -> bool:
         """Send the samples read at `t` (ns since the thread's start).
 
-        Returns whether a network link delays anything, so that this must be called again soon.
+        Returns whether a network link delays anything, and the next call must come soon.
         """
         ...
 
 
 class DeviceThread:
-    """Reads a device at its period, with or without a hub: samples go to the uplink that is attached.
+    """Reads a device at its period, with or without a hub: samples go to the attached uplink.
 
     `failed` is called with the device's name and the cause when an error ends the thread.
     """
@@ -47,7 +47,7 @@ class DeviceThread:
         self._uplink: Uplink | None = None
         self._attaching = threading.Lock()
         self._current: dict[str, Sample] = {}
-        """The newest buttons and diagnosis of each port: they hold until the next ones."""
+        """The newest buttons and diagnosis of each port: valid until replaced."""
         self._ending = False
         self._start_ns = monotonic_ns()
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
@@ -58,15 +58,16 @@ class DeviceThread:
         return monotonic_ns() - self._start_ns
 
     def start(self, directory: Path) -> None:
-        """Open the device and start to read it; raises ParticipantError."""
+        """Open the device and start reading; raises ParticipantError."""
         open_device(self._name, self._device, directory)
         self._start_ns = monotonic_ns()
         self._thread.start()
 
     def attach(self, uplink: Uplink | None) -> None:
-        """Give what is read from now on to `uplink`, and nothing more to the one before.
+        """Give samples from now on to `uplink`, and no more to the uplink before.
 
-        First it gets the buttons and diagnoses as they are: they may have changed while none was attached.
+        The new uplink first gets the current buttons and diagnoses: changes may have come while no uplink was
+        attached.
         """
         with self._attaching:
             self._uplink = uplink
@@ -74,13 +75,13 @@ class DeviceThread:
                 uplink.exchange(self.now_ns, list(self._current.values()))
 
     def unused(self) -> Collection[str]:
-        """Return the signals that the device does not use now."""
+        """Return the signals not used by the device now."""
         return self._device.unused()
 
     def write(self, port: str, value: Value) -> None:
         """Write to the device; may be called from any thread.
 
-        Raises MessageError if the device refuses the value; any other error ends the thread.
+        Raises MessageError if the device refuses the value; all remaining errors end the thread.
         """
         try:
             self._device.write(port, value)
@@ -105,7 +106,7 @@ class DeviceThread:
             self._fail(error)
 
     def _read(self, t: int) -> bool:
-        """Read the device and give its samples to the uplink; return whether a link delays anything."""
+        """Read the device and give the samples to the uplink; return whether a link delays anything."""
         samples = list(self._device.read(t))
         lasting = [
             sample

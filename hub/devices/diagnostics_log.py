@@ -1,6 +1,6 @@
-"""The diagnoses of devices on other machines, in the hub's log: which device, and what to do.
+"""The diagnoses of devices on other machines, in the hub's log: name of the device, and advice.
 
-Devices that the session has started itself write to the same terminal.
+Devices started by the session write to the same terminal.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ __all__ = ["DiagnosticsLog"]
 log = logging.getLogger(__name__)
 
 _LONGEST = 500
-"""Characters of a message from elsewhere that are logged."""
+"""Characters logged of a message from elsewhere."""
 
 
 _RATE = 10.0
-"""Diagnoses of one port that are accepted in a second."""
+"""Diagnoses of a port accepted in a second."""
 
 
 class DiagnosticsLog:
-    """Logs the diagnoses of remote devices, whether or not they are connected to anything."""
+    """Logs the diagnoses of remote devices, connected or not."""
 
     def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, refusals: Refusals) -> None:
         self._refusals = refusals

@@ -29,13 +29,13 @@ _MOST_QUEUED = 10_000
 
 
 class _Queued(NamedTuple):
-    """A sample that has arrived and has not entered yet."""
+    """A sample received but not yet entered."""
 
     payload: bytes
     value: Any
     arrived_ns: int
     sent_ns: int | None
-    """By the device's own clock."""
+    """Time by the device's own clock."""
 
 
 @dataclass
@@ -44,7 +44,7 @@ class _Inlet:
     port: str
     codec: PortCodec
     number: int
-    """Its place among all inlets."""
+    """Index among all inlets."""
     simulated: bool = False
     max_age_ns: int = 0
     queue: deque[_Queued] = field(default_factory=deque["_Queued"])
@@ -58,7 +58,7 @@ class _Inlet:
         self.name = f"{self.source}.{self.port}"
 
     def follow(self, stamp: Stamp) -> None:
-        """Raise LateError for a sample that is not newer than the last one."""
+        """Raise LateError for a sample not newer than the last sample."""
         if stamp[:2] <= self.newest:
             raise LateError(
                 f"sample {stamp.sequence} of '{self.source}.{self.port}' is late: {self.newest[1]} arrived"
@@ -76,13 +76,13 @@ class Inlets:
     def __init__(self, plan: Plan) -> None:
         self._lock = threading.Lock()
         self.latencies = Latencies()
-        """From a device to the grant."""
+        """Latencies from a device to the grant."""
         self.offsets_ns = {
             planned.name: 0
             for planned in plan.participants.values()
             if planned.simulated_time or (planned.role == "device" and planned.host == "hub")
         }
-        """What is added to a device's clock to get that of the hub, where it is known."""
+        """Difference from a device's clock to the hub's, where known."""
         self._inlets: dict[tuple[str, str], _Inlet] = {}
         for inlet in plan.from_devices:
             port = plan.participants[inlet.target].port(inlet.target_port)
@@ -111,10 +111,10 @@ class Inlets:
         self._all = list(self._inlets.values())
         self._aging = {inlet.number for inlet in self._all if inlet.max_age_ns}
         self._offered: set[int] = set()
-        """The inlets with samples that have not entered yet."""
+        """The inlets with samples not yet entered."""
 
     def settable(self, participant: str, port: str) -> Port:
-        """Return the input that `set` may write; raises MessageError if it is connected or does not exist."""
+        """Return the input for `set`; raises MessageError if the input is connected or does not exist."""
         found = self._settable.get((participant, port))
         if found is None:
             raise MessageError(
@@ -128,7 +128,7 @@ class Inlets:
     ) -> None:
         """Keep a sample that arrived at `now_ns` of the port's clock; a value set by hand has no stamp.
 
-        Raises MessageError if it is invalid for this port, and LateError if a newer one arrived before it.
+        Raises MessageError if the sample is invalid for this port, and LateError after a newer sample.
         """
         inlet = self._inlets.get((participant, port))
         if inlet is None:
@@ -148,9 +148,9 @@ class Inlets:
             self._offered.add(inlet.number)
 
     def restart(self, devices: Collection[str]) -> list[Entering]:
-        """Forget all samples of `devices`; return what enters for that: their signals are stale.
+        """Forget all samples of `devices`; return the resulting entries: the devices' signals are stale.
 
-        So an arm holds until its hand has spoken, and pressed the button, anew.
+        So an arm holds until the hand has sent a new pose, and pressed the button, anew.
         """
         entering: list[Entering] = []
         with self._lock:
@@ -164,9 +164,9 @@ class Inlets:
         return entering
 
     def sample(self, time_ns: int, wall_ns: int) -> list[Entering]:
-        """Return what enters at a communication point: samples that are new, and changes of staleness.
+        """Return the entries at a communication point: new samples, and changes of staleness.
 
-        Samples of a device in simulated time age in `time_ns`, those of any other in `wall_ns`.
+        Samples of a device in simulated time age in `time_ns`, all other samples in `wall_ns`.
         """
         entering: list[Entering] = []
         with self._lock:

@@ -1,12 +1,12 @@
-"""The network link of a device: delay, jitter, loss and outages between it and the hub.
+"""The network link of a device: delay, jitter, loss and outages between device and hub.
 
 For studies of remote operation. Nothing here reads a clock: the caller passes the time, wall or simulated, so
 that the same seed and the same messages at the same times give the same arrivals. Random numbers are drawn
-for each port and direction by itself, two a message, independent of the others.
+for each port and direction separately, two a message.
 
-A *signal* travels as datagrams do: a lost message stays lost, and with jitter one message may overtake
-another (the receiver refuses the late one). *Events* travel as over TCP: none overtakes another, and a lost
-one is sent again until it arrives, each time a round trip later.
+A *signal* travels like datagrams: a lost message stays lost, and with jitter a message may overtake an
+earlier message (the receiver refuses the late message). *Events* travel like TCP: none overtakes another, and
+a lost message is sent again until received, each time a round trip later.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ class NetworkLinkOrder(BaseModel):
 
 @dataclass
 class Line:
-    """One port's messages in one direction. All times in nanoseconds since the start of the device's clock.
+    """A port's messages in one direction. All times in nanoseconds since the start of the device's clock.
 
-    One thread may send while another receives: each operation on the heap is atomic in the interpreter.
+    A thread may send while another receives: each operation on the heap is atomic in the interpreter.
     """
 
     link: NetworkLink
@@ -52,7 +52,7 @@ class Line:
 
     @property
     def empty(self) -> bool:
-        """Whether no message is on its way."""
+        """Whether no message is on the way."""
         return not self._waiting
 
     def send(self, now_ns: int, message: Any) -> None:
@@ -72,23 +72,24 @@ class Line:
         heappush(self._waiting, (arrival_ns, self._count, message))
 
     def arrived(self, now_ns: int) -> Iterator[tuple[int, Any]]:
-        """Yield time of arrival and message of all that has newly arrived, in the order of arrival."""
+        """Yield time of arrival and message of all new arrivals, in the order of arrival."""
         while self._waiting and self._waiting[0][0] <= now_ns:
             arrival_ns, _, message = heappop(self._waiting)
             yield arrival_ns, message
 
 
 class NetworkLink:
-    """Both directions of all ports of one device.
+    """Both directions of all ports of a device.
 
-    Without a spec everything arrives at once; `order` can change it at any time.
+    Without a spec everything arrives at once; `order` can change the link at any time.
     """
 
     def __init__(self, spec: NetworkLinkSpec | None) -> None:
         self.spec = spec or NetworkLinkSpec()
         self._lines: dict[tuple[str, str], Line] = {}
         self.used = False
-        """Whether any message was ever sent over it: a gateway has hundreds of ports, and most links idle."""
+        """Whether the link has ever carried a message: a gateway has hundreds of ports, and most links idle.
+        """
         self._outages = list(self.spec.outages)
         self._orders: deque[NetworkLinkOrder] = deque()
 
@@ -99,11 +100,11 @@ class NetworkLink:
 
     @property
     def idle(self) -> bool:
-        """Whether it is clear and no message is on its way: messages may pass beside it."""
+        """Whether the link is clear and no message is on the way: messages may pass beside the link."""
         return self.clear and (not self.used or all(line.empty for line in self._lines.values()))
 
     def line(self, port: Port) -> Line:
-        """Return the line of one of the device's ports: outputs go to the hub, inputs come from there."""
+        """Return the line of a port of the device: outputs go to the hub, inputs come from the hub."""
         line = self._lines.get((port.causality, port.name))
         if line is None:
             line = self._lines[port.causality, port.name] = Line(
@@ -116,7 +117,7 @@ class NetworkLink:
         self._orders.append(order)
 
     def settle(self, now_ns: int) -> None:
-        """Carry out the orders, for what is sent from now on; what is on its way arrives as it would have."""
+        """Carry out the orders for messages sent from now on; messages already in flight are not affected."""
         while self._orders:
             order = self._orders.popleft()
             reseeded, self.spec = order.spec.seed != self.spec.seed, order.spec
@@ -140,7 +141,7 @@ class NetworkLink:
 
 
 def in_words(spec: NetworkLinkSpec, outage_ns: int = 0) -> str:
-    """Describe a network link; empty if it neither delays nor loses anything."""
+    """Describe a network link; empty without delay and loss."""
     parts = (
         f"{spec.delay_ns / 1e6:g} ms each way" if spec.delay_ns else "",
         f"up to {spec.jitter / 1e6:g} ms more" if spec.jitter else "",

@@ -21,9 +21,9 @@ __all__ = ["NetworkLinkControl", "NetworkLinkReply", "NetworkLinkRequest"]
 
 
 class NetworkLinkRequest(BaseModel):
-    """Change the network link of a device; fields left out stay as they are.
+    """Change the network link of a device; omitted fields stay unchanged.
 
-    A preset or a delay takes the place of the other.
+    A preset replaces a delay, and a delay replaces a preset.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -45,13 +45,13 @@ class NetworkLinkReply(BaseModel):
     device: str
     link: NetworkLinkSpec
     description: str
-    """The same in words; empty if it neither delays nor loses anything."""
+    """The same in words; empty without delay and loss."""
 
 
 class NetworkLinkControl:
-    """Knows the network link of every device, and orders changes in the process that runs it.
+    """Knows the network link of every device, and orders changes in the device's process.
 
-    `simulated` are the links of the devices in simulated time; orders to the others are published.
+    `simulated` are the links of the devices in simulated time; orders to all other links are published.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class NetworkLinkControl:
         )
 
     def repeat(self, device: str) -> None:
-        """Publish the changed link again, for a device whose host has joined again."""
+        """Publish the changed link again, for a device after its host has joined again."""
         if device in self._changed:
             self._order(device, 0)
 

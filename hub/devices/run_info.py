@@ -1,4 +1,4 @@
-"""The run of a session that a device takes part in."""
+"""The run of a session, as known to a device."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ __all__ = ["RunInfo"]
 
 @dataclass(frozen=True)
 class RunInfo:
-    """The run of a session that a device takes part in."""
+    """The run of a session, as known to a device."""
 
     plan: Plan
     keys: Keys
     number: int
-    """Tells the messages of this run from those of any other."""
+    """Tells messages of this run from messages of any other."""
     admission: int = 0
-    """The number that the hub has given to this host when it joined; 0 in the hub's own process."""
+    """The hub's number for this host since it joined; 0 in the hub's own process."""
     live_from_ns: int = 0
-    """Simulated time before which the run repeats a recorded one: devices receive nothing of that."""
+    """Simulated time before which the run repeats a recording: devices receive nothing of the repetition."""

@@ -1,4 +1,4 @@
-"""The devices of a session as its hub has them: their samples on the way to the grant, and their statuses."""
+"""The hub's side of a session's devices: samples on the way to the grant, and statuses."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ __all__ = ["SessionDevices"]
 _SWITCH_S = 5e-4
 """How long a step may compute in Python before a device's sample is received, instead of 5 ms.
 
-It brought the median of `bench/latency.py` from 2.5 to 2.2 ms.
+The value brought the median of `bench/latency.py` from 2.5 to 2.2 ms.
 """
 
 
@@ -43,11 +43,11 @@ class SessionDevices:
     Args:
         run: The run of the session.
         session: The hub's Zenoh session.
-        devices: Those of this process, not yet open.
-        inputs: What those among them that live in simulated time are written.
-        monitor: What records and measures device samples.
-        refusals: Counts the samples that are refused.
-        failed: Is called with a device's name and the cause when it has failed.
+        devices: The devices of this process, not yet open.
+        inputs: The values for devices of this process in simulated time.
+        monitor: Records and measures device samples.
+        refusals: Counts the samples refused.
+        failed: Called with the name and the cause after a failure of a device.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class SessionDevices:
         ]
 
     def _received(self) -> list[tuple[str, str]]:
-        """Return device and port of every output of a wall-time device that is connected or watched."""
+        """Return device and port of every connected or watched output of a wall-time device."""
         outputs = [
             (planned.name, port.name)
             for planned in self._plan.participants.values()
@@ -99,7 +99,7 @@ class SessionDevices:
         return [source for source in outputs if source in self._connected or self._monitor.watches(*source)]
 
     def open(self, directory: Path) -> None:
-        """Open the devices of this process, and start to read those that live in wall time."""
+        """Open the devices of this process, and start reading the wall-time devices."""
         away = any(p.role == "device" and p.host != "hub" for p in self._plan.participants.values())
         if away or self._threads:
             sys.setswitchinterval(_SWITCH_S)
@@ -108,23 +108,23 @@ class SessionDevices:
             thread.start(directory)
 
     def enter(self, time_ns: int, step: int) -> list[Entering]:
-        """Return what enters the simulation at a communication point."""
+        """Return the entries into the simulation at a communication point."""
         self._time_ns = time_ns
         self._simulated.exchange(time_ns, step, self._take)
         return self.inlets.sample(time_ns, monotonic_ns())
 
     def forget(self, device: str) -> None:
-        """Forget the clock and the status of a device that is gone."""
+        """Forget the clock and the status of a departed device."""
         self._statuses.forget(device)
 
     @property
     def statuses(self) -> list[DeviceStatus]:
-        """The last status of each device that lives in wall time."""
+        """The last status of each wall-time device."""
         return self._statuses.statuses
 
     @property
     def latencies(self) -> list[Latency]:
-        """How long samples took into the simulation, and its values out of it."""
+        """Latencies of samples into the simulation, and of values out of the simulation."""
         own = *self.inlets.latencies.messages(), *self._simulated.latencies.messages()
         return [*own, *self._statuses.latencies]
 

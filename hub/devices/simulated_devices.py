@@ -18,15 +18,15 @@ from schemas.errors import ParticipantError
 __all__ = ["SimulatedDevices", "open_device"]
 
 Take = Callable[[str, Sample, int, Stamp], None]
-"""Is called with a sample: device, sample, time of arrival (simulated ns), and its stamp."""
+"""Called with a sample: device, sample, time of arrival (simulated ns), and stamp."""
 
 
 class SimulatedDevices:
-    """The devices of the hub's process that live in simulated time.
+    """The devices of the hub's process in simulated time.
 
-    One with inputs, or behind a network link, is exchanged with once in each of its own periods, wherever the
-    participants run that it is connected to: first it is written what they had computed by then, then it is
-    read. Any other is read at every communication point.
+    A device with inputs, or behind a network link, is exchanged with once in each of its own periods,
+    wherever the connected participants run: the device is written the values computed by then, and read
+    afterwards. All other devices are read at every communication point.
     """
 
     def __init__(
@@ -43,15 +43,15 @@ class SimulatedDevices:
         ]
         self.links = {device.name: device.link for device in self._devices}
         self.latencies = Latencies()
-        """From a value to the device."""
+        """Latencies from a value to the device."""
 
     def open(self, directory: Path) -> None:
-        """Open all; raises ParticipantError with the name of the one that cannot be opened."""
+        """Open all; raises ParticipantError with the name of a device that cannot be opened."""
         for one in self._devices:
             open_device(one.name, one.device, directory)
 
     def exchange(self, time_ns: int, step: int, take: Take) -> None:
-        """Write and read all devices that are due; raises ParticipantError."""
+        """Write and read all devices due; raises ParticipantError."""
         for one in self._devices:
             if one.periodic and step % one.planned.period:
                 continue
@@ -69,7 +69,7 @@ class SimulatedDevices:
 
 
 class _SimulatedDevice:
-    """One device, its network link, and the sequence numbers of its samples."""
+    """A device, the network link, and the sequence numbers of the samples."""
 
     def __init__(
         self,
@@ -89,14 +89,14 @@ class _SimulatedDevice:
         self._newest_ns = dict.fromkeys(self._ports, INITIAL)
 
     def write(self, time_ns: int, step: int, latencies: Latencies) -> None:
-        """Write what has arrived from the simulation."""
+        """Write the arrivals from the simulation."""
         self.link.settle(time_ns)
         for port, valid_ns, value in self._arrived(time_ns, step):
             self._write_one(port, valid_ns, value)
             latencies.add("state to force", self._streams[port], time_ns - valid_ns)
 
     def _arrived(self, time_ns: int, step: int) -> Iterator[tuple[str, int, Value]]:
-        """Yield port, time of validity (ns) and value of what has passed the link by `time_ns`."""
+        """Yield port, time of validity (ns) and value of all values past the link by `time_ns`."""
         due = self._inputs.due(step)
         if self.link.idle:
             yield from sorted(due, key=lambda one: (self._places[one[0]], one[1]))
@@ -120,7 +120,7 @@ class _SimulatedDevice:
         self.device.write(port, value)
 
     def read(self, time_ns: int) -> Iterator[tuple[Sample, int, Stamp]]:
-        """Yield the samples that have arrived at the hub: sample, time of arrival, stamp."""
+        """Yield the samples now at the hub: sample, time of arrival, stamp."""
         idle = self.link.idle
         for sample in self.device.read(time_ns):
             number = self._sequence[sample.port] = self._sequence[sample.port] + 1
@@ -136,7 +136,7 @@ class _SimulatedDevice:
 
 
 def open_device(name: str, device: Device, directory: Path) -> None:
-    """Open a device; raises ParticipantError with its name."""
+    """Open a device; raises ParticipantError with the device's name."""
     try:
         device.open(directory)
     except Exception as error:

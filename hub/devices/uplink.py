@@ -1,4 +1,4 @@
-"""A wall-time device's connection to the hub in one run: it sends samples and reports the device's status."""
+"""A wall-time device's connection to the hub in a run: sends samples and reports the device's status."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ _STATUS_NS = 1_000_000_000
 
 
 class DeviceUplink:
-    """Publishes a device's samples, and writes to the device what its connections bring, until it is closed.
+    """Publishes a device's samples, and writes the values of connections to the device, until closed.
 
     Args:
         planned: The device.
-        run: The run that it takes part in.
+        run: The run of the session.
         session: The Zenoh session with the hub.
-        thread: The thread that reads the device.
-        refusals: Counts the messages that are refused.
-        offset: Of the hub's clock; None in the hub's own process.
+        thread: The reading thread of the device.
+        refusals: Counts the messages refused.
+        offset: Offset of the hub's clock; None in the hub's own process.
     """
 
     def __init__(
@@ -69,9 +69,9 @@ class DeviceUplink:
         )
 
     def exchange(self, t: int, samples: list[Sample]) -> bool:
-        """Send what the device returned at `t` (ns since its thread's start), and write what has arrived.
+        """Send the samples read at `t` (ns since the thread's start), and write the arrivals to the device.
 
-        Returns whether the network link delays anything, so that this must be called again soon.
+        Returns whether the network link delays anything, and the next call must come soon.
         """
         self._link.settle(t)
         now_ns, idle = monotonic_ns(), self._link.idle

@@ -1,1 +1,1 @@
-"""What watches a session without taking part: measures, energy books, latencies, summary."""
+"""Watching a session without taking part: measures, energy books, latencies, summary."""

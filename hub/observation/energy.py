@@ -1,7 +1,7 @@
 """The energy books of the bonds.
 
-A book holds the work that the motion side did, the work that the force side received, and their difference:
-the energy that the coupling created or lost.
+A book holds the work done by the motion side, the work received by the force side, and the difference: the
+energy created or lost by the coupling.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class EnergyBooks:
             self._rows.setdefault(bond.force.participant, []).append((book, "force_work_j"))
 
     def take(self, participant: str, ack: Ack) -> None:
-        """Book the work (J since the start) that a participant states in the last step of its ack."""
+        """Book the work (J since the start) in the last step of a participant's ack."""
         rows = self._rows.get(participant)
         if rows and len(ack.work_j) >= len(rows):
             for (book, side), work in zip(rows, ack.work_j[-len(rows) :], strict=True):
@@ -51,7 +51,7 @@ class EnergyBooks:
 
     @property
     def residual_j(self) -> float:
-        """Sum over all bonds of the work received by the force side minus that of the motion side (J)."""
+        """Work received by the force sides minus work done by the motion sides, summed over all bonds (J)."""
         return plain_sum(book.residual_j for book in self._books)
 
     def encoded(self, time_ns: int) -> dict[str, bytes]:

@@ -1,4 +1,4 @@
-"""Why steps are late: what took most of each, counted by cause, and the longest of them."""
+"""Causes of late steps: the largest part of each step, counted by cause, and the longest steps."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _WORST = 5
 class LateSteps:
     """The late steps of a run.
 
-    A step that took no longer than the time it simulates is late because of one before it, which it helps to
-    catch up: its cause is that of the other.
+    A short step, no longer than its simulated time, is late because of an earlier slow step: the short step
+    inherits the slow step's cause.
     """
 
     def __init__(self) -> None:
@@ -27,9 +27,9 @@ class LateSteps:
         self._cause = "hub"
 
     def add(self, steps: int, simulated_ns: int, time_ns: int, causes: Mapping[str, int]) -> None:
-        """Add `steps` late steps of one grant, which end at `time_ns` and simulate `simulated_ns`.
+        """Add `steps` late steps of a grant, with the end `time_ns` and the simulated time `simulated_ns`.
 
-        `causes` are what the grant's wall time (ns) was used for.
+        `causes` are the uses of the grant's wall time (ns).
         """
         took_ns = sum(causes.values())
         if took_ns > simulated_ns:

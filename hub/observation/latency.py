@@ -15,11 +15,11 @@ __all__ = ["Histogram", "Latencies", "by_way"]
 _BITS = 5
 """Each doubling of time has 2^5 bins: a percentile is right within 1/32 of itself."""
 _BINS = 64 << _BITS
-"""As many doublings as an integer of 64 bits has."""
+"""Number of bins: as many doublings as an integer of 64 bits has."""
 
 
 class Histogram:
-    """Counts of times in bins whose width grows with the time; its memory is the same from the start on."""
+    """Counts of times in bins; the bin width grows with the time, the memory never grows."""
 
     def __init__(self) -> None:
         self._counts = array("Q", bytes(8 * _BINS))
@@ -32,7 +32,7 @@ class Histogram:
         return int(np.frombuffer(self._counts, np.uint64).sum())
 
     def add(self, time_ns: int) -> None:
-        """Count one time; below zero (two clocks, one offset) counts as zero."""
+        """Count a time; below zero (two clocks, one offset) counts as zero."""
         if time_ns < 0:
             time_ns = 0
         shift = time_ns.bit_length() - _BITS - 1
@@ -43,7 +43,7 @@ class Histogram:
             self.largest_ns = time_ns
 
     def percentile(self, share: float) -> float:
-        """Return the time (ns) below which `share` of all times are: the mean of its bin.
+        """Return the time (ns) at the quantile `share` of all times: the mean of the bin.
 
         Raises ValueError if no time was counted.
         """
@@ -54,7 +54,7 @@ class Histogram:
         return self._totals_ns[index] / self._counts[index]
 
     def message(self, way: str, stream: str) -> Latency:
-        """Return the message about a stream on its way; raises ValueError if no time was counted."""
+        """Return the message about a stream on the way `way`; raises ValueError if no time was counted."""
         p50_s, p99_s = (self.percentile(share) / 1e9 for share in (0.5, 0.99))
         return Latency(
             way=way,
@@ -74,7 +74,7 @@ class Latencies:
         self._lock = threading.Lock()
 
     def add(self, way: str, stream: str, time_ns: int) -> None:
-        """Count one time of a stream on its way: `device to grant`, `grant to state` or `state to force`."""
+        """Count a time of a stream on a way: `device to grant`, `grant to state` or `state to force`."""
         with self._lock:
             histogram = self._histograms.get((way, stream))
             if histogram is None:

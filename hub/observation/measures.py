@@ -1,4 +1,4 @@
-"""Measures and score cards: what the summary says of the values of output ports during the run."""
+"""Measures and score cards: the summary's values of output ports during the run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Measures"]
 
 
 class _Meter:
-    """One measure: running statistics of a part of a vector."""
+    """A measure: running statistics of a part of a vector."""
 
     def __init__(self, measure: Measure, part: slice, period: float) -> None:
         self.live = measure.live
@@ -79,7 +79,7 @@ class _Meter:
 
 
 class Measures:
-    """All measures of a session; the values of one port must arrive in order."""
+    """All measures of a session; the values of a port must arrive in order."""
 
     def __init__(self, scenario: Scenario, plan: Plan) -> None:
         self._meters: dict[str, _Meter] = {}
@@ -100,16 +100,16 @@ class Measures:
 
     @property
     def ports(self) -> list[tuple[str, str]]:
-        """The (participant, port) pairs that are measured, those of score cards among them."""
+        """The measured (participant, port) pairs, including score cards."""
         return list(self.by_port)
 
     @property
     def cards(self) -> dict[str, ScoreCard]:
-        """The newest score card of each participant that publishes one."""
+        """The newest score card of each participant with published cards."""
         return dict(self._cards)
 
     def take(self, participant: str, port: str, value: Any, time_ns: int) -> None:
-        """Add the value of a signal port, or one message of an event port, at a time."""
+        """Add the value of a signal port, or a message of an event port, at a time."""
         if isinstance(value, ScoreCard):
             self._cards[participant] = value
             return
@@ -120,7 +120,7 @@ class Measures:
                 meter.take(value, time_ns)
 
     def live(self) -> Mapping[str, tuple[float, str]]:
-        """Return the current value and unit of each measure in the progress line that has a value yet."""
+        """Return the current value and unit of each measure of the progress line with a value."""
         return {
             name: (meter.now, meter.unit)
             for name, meter in self._meters.items()
@@ -128,5 +128,5 @@ class Measures:
         }
 
     def results(self) -> dict[str, float | None]:
-        """Return the result of every measure; None if its port had no value."""
+        """Return the result of every measure; None if the port had no value."""
         return {name: meter.result for name, meter in self._meters.items()}

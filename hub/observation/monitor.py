@@ -1,7 +1,7 @@
-"""What watches a run without taking part in it: it passes on to recorder, measures and energy books.
+"""Watches a run without taking part: feeds recorder, measures and energy books.
 
-What is recorded costs a step little more than the bytes that are there already: the vectors of a participant
-that are due together are handed to the recorder as one row of bytes.
+Recording costs a step little more than copying the bytes: the vectors of a participant due together are
+handed to the recorder as a single row of bytes.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ class _Watched:
     codec: PortCodec
     channel: int
     newest: tuple[int, int] = (INITIAL - 1, 0)
-    """Step and place in its batch of the last value."""
+    """Step of the last value, and place in the step's batch."""
     complete: int = INITIAL - 1
-    """The last step of which all values have arrived."""
+    """The last step with all values received."""
 
 
 class Monitor:
-    """Receives every grant, ack and output value of one run, from this process or from others."""
+    """Receives every grant, ack and output value of a run, from this process or from others."""
 
     def __init__(
         self, plan: Plan, keys: Keys, run: int, measures: Measures, recorder: Recorder | None
@@ -74,7 +74,7 @@ class Monitor:
         self._channels: dict[str, int] = {}
         self._ack_channels: dict[str, int] = {}
         self._unrecorded: list[Queued] = []
-        """What the step loop has passed on and the recorder does not have yet."""
+        """Messages passed on by the step loop, not yet with the recorder."""
         self._next_energy_ns = 0
         for planned in plan.participants.values():
             for port in planned.ports:
@@ -92,7 +92,7 @@ class Monitor:
 
     @property
     def away(self) -> dict[str, tuple[str, str]]:
-        """Participant and port of every output of another process that is recorded or measured, by key."""
+        """Participant and port of every recorded or measured output of another process, by key."""
         return {
             key: (w.planned.name, w.port.name)
             for key, w in self._watched.items()
@@ -104,7 +104,7 @@ class Monitor:
     def linked(self) -> bool:
         """Return whether the value at time 0 of every watched output of another process was received.
 
-        Those of participants that only look may come later.
+        Values of participants that only look may come later.
         """
         return all(
             self._watched[key].newest >= (INITIAL, 0)
@@ -115,10 +115,10 @@ class Monitor:
     def vectors_listener(
         self, planned: PlannedParticipant, ports: Sequence[Port]
     ) -> Callable[[int, int, bytes], None] | None:
-        """Return what receives vectors of a participant in this process.
+        """Return the receiver of a participant's vectors in this process.
 
-        It is called with step, time (ns) at which they are valid, and their bytes, one after the other. None:
-        nothing receives them.
+        The arguments are the step, the time (ns) of validity, and the bytes of the vectors in their order.
+        None: nothing receives the vectors.
         """
         watched = [self._output(planned, port) for port in ports]
         vectors = [(one.channel, one.codec.vector) for one in watched if one.codec.vector is not None]
@@ -143,9 +143,10 @@ class Monitor:
     def listener(
         self, planned: PlannedParticipant, codec: PortCodec
     ) -> Callable[[int, int, Any], None] | None:
-        """Return what receives a message or the events of a participant in this process.
+        """Return the receiver of a message or of the events of a participant in this process.
 
-        It is called with step, time (ns) at which the value is valid, and value. None: nothing receives it.
+        The arguments are the step, the time (ns) of validity, and the value. None: nothing receives the
+        value.
         """
         is_recorded, port = self._recorder is not None, codec.port
         is_measured = (planned.name, port.name) in self.measures.by_port
@@ -168,13 +169,13 @@ class Monitor:
     def received(self, end: int) -> bool:
         """Return whether all values of the steps before `end` have arrived from other processes.
 
-        A host with a link may acknowledge a step before Zenoh has delivered its values.
+        A host with a link may acknowledge a step before Zenoh has delivered the step's values.
         """
         watched = (self._watched[key] for key in self.away)
         return all(one.complete >= self._last_due(one, end) for one in watched if one.planned.in_step)
 
     def _last_due(self, watched: _Watched, end: int) -> int:
-        """Return the last step before `end` in which a watched output is published."""
+        """Return the last step before `end` with a publication of a watched output."""
         period = watched.planned.period
         stride = self._plan.stride(watched.planned.name, watched.port.name)
         steps = range((end - 1) // period * period, -1, -period)
@@ -206,14 +207,14 @@ class Monitor:
             self._recorder.write(watched.channel, tag.time_ns, payload)
 
     def watches(self, participant: str, port: str) -> bool:
-        """Return whether recorder or measures use an output; of a device, also one that enters nothing."""
+        """Return whether recorder or measures use an output, for a device even an unconnected output."""
         return self._recorder is not None or (participant, port) in self.measures.by_port
 
     def device(self, device: str, port: str, time_ns: int, payload: bytes, *, enters: bool) -> None:
         """Receive a message of a device from the wire.
 
-        One that enters the simulation is recorded with its grant. Raises MessageError if it is no message of
-        the port.
+        A message entering the simulation is recorded with its grant. Raises MessageError if the message does
+        not fit the port.
         """
         watched = self._measure(device, port, time_ns, payload, checked=enters)
         if self._recorder is not None and not enters:
@@ -222,7 +223,7 @@ class Monitor:
     def device_here(self, device: str, sample: Sample, time_ns: int, payload: bytes, *, enters: bool) -> None:
         """Receive a sample of a device in this process, and its bytes, in the thread of the step loop.
 
-        Otherwise it is as `device`.
+        Otherwise like `device`.
         """
         codec = self._by_port[device, sample.port].codec
         checked = enters or (isinstance(sample, VectorSample) and sample.is_of(codec.vector))
@@ -231,7 +232,7 @@ class Monitor:
             self._unrecorded.append((watched.channel, time_ns, payload))
 
     def _measure(self, device: str, port: str, time_ns: int, payload: bytes, *, checked: bool) -> _Watched:
-        """Measure a message of a device; raise MessageError if it is not `checked` and none of the port."""
+        """Measure a device's message; raise MessageError if it fails the check, unless already `checked`."""
         watched = self._by_port[device, port]
         measured = (device, port) in self.measures.by_port
         if measured or not checked:
@@ -241,7 +242,7 @@ class Monitor:
         return watched
 
     def grant(self, grant: Grant, payload: bytes) -> None:
-        """Receive a grant and the device samples in it."""
+        """Receive a grant and the grant's device samples."""
         if self._recorder is None:
             return
         time_ns = grant.start_ns
@@ -252,7 +253,7 @@ class Monitor:
                 self._unrecorded.append((watched.channel, time_ns, held.tobytes()))
 
     def ack(self, planned: PlannedParticipant, ack: Ack, time_ns: int, payload: bytes | None) -> None:
-        """Receive an ack; `payload` are its bytes if it is from the wire."""
+        """Receive an ack; `payload` holds the bytes of an ack from the wire."""
         self.energy.take(planned.name, ack)
         if self._recorder is not None:
             channel = self._ack_channels.get(planned.name)
@@ -262,13 +263,13 @@ class Monitor:
             self._unrecorded.append((channel, time_ns, pack_ack(ack) if payload is None else payload))
 
     def record(self, least: int = 1) -> None:
-        """Give the recorder what the step loop has passed on, if these are at least `least` messages."""
+        """Give the recorder the messages passed on by the step loop, if at least `least`."""
         if self._recorder is not None and len(self._unrecorded) >= least:
             self._recorder.write_all(self._unrecorded)
             self._unrecorded.clear()
 
     def books(self, time_ns: int) -> dict[str, bytes]:
-        """Return the energy book of each bond, in CDR, to be recorded; empty unless they are due."""
+        """Return the energy book of each bond, in CDR, for the recorder; empty unless due."""
         if time_ns < self._next_energy_ns:
             return {}
         self._next_energy_ns = time_ns + _ENERGY_PERIOD_NS
@@ -280,7 +281,7 @@ class Monitor:
         return books
 
     def status(self, status: SessionStatus) -> None:
-        """Record a status of the session, and all before it."""
+        """Record a status of the session, and all earlier messages."""
         if self._recorder is not None:
             channel = self._channel(self._keys.status, status.ros_type)
             self._unrecorded.append((channel, status.sim_time_ns, encode(status)))

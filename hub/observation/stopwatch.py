@@ -1,4 +1,4 @@
-"""Divides the time of a thread into phases, by timing methods of the objects that it uses."""
+"""Divides the time of a thread into phases, by timing methods of the objects in use."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 __all__ = ["Phase", "Stopwatch"]
 
 _SAMPLED_ROUNDS = 7
-"""The processor clock of the thread is read in one round of so many.
+"""Rounds per reading of the thread's processor clock.
 
-It is a call into the kernel, 0.3 to 5 us each. Arms publish every 5 or 10 steps, devices are met every 4: in
-seven times as many rounds all of these fall into the sample alike.
+A reading is a call into the kernel, 0.3 to 5 us. Arms publish every 5 or 10 steps, devices are met every 4: a
+sample every seven rounds meets all of these alike.
 """
 _FIRST_SAMPLED = 3
 """The first round is unlike all others: much is done for the first time."""
 
 
 class Phase:
-    """A part of a thread's work, and the time it has taken."""
+    """A part of a thread's work, and the time spent."""
 
     __slots__ = ("marked_ns", "name", "sampled_ns", "taker", "wall_ns")
 
@@ -36,12 +36,12 @@ class Phase:
 
 
 class Stopwatch:
-    """The phases of one thread; every moment belongs to one of them.
+    """The phases of a thread; every moment belongs to one phase.
 
-    A method that is timed is replaced on its object: an object that is not timed does not pay for it.
+    A timed method is replaced on its object: an object without timing has no cost.
 
     Args:
-        between: The phase of all that no timed method does.
+        between: The phase of the time outside of timed methods.
     """
 
     def __init__(self, between: Phase) -> None:
@@ -52,17 +52,17 @@ class Stopwatch:
         self._rounds, self._sampling = 0, False
 
     def phase(self, name: str, taker: str) -> Phase:
-        """Return the phase `name`, which belongs to `taker`."""
+        """Return the phase `name` of `taker`."""
         return self.phases.setdefault(name, Phase(name, taker))
 
     def time(self, method: Callable[..., Any], phase: Phase, *, then: Phase | None = None) -> None:
-        """Time a bound method: its calls are of `phase`; what follows is of `then`, by default as before."""
+        """Time a bound method: calls belong to `phase`; the time after, to `then`, by default as before."""
         self._replace(method, self._timed(method, phase, then))
 
     def time_by_result(self, method: Callable[..., Any], phase: Phase, named: Callable[[Any], Phase]) -> None:
-        """Time a bound method as `time` does, and let its result say of which phase the call was.
+        """Time a bound method like `time`, with a phase chosen by the result of the call.
 
-        Timed methods that it calls have phases of their own.
+        Timed methods called inside have phases of their own.
         """
 
         def naming(*arguments: Any) -> Any:
@@ -75,7 +75,7 @@ class Stopwatch:
         self._replace(method, self._timed(naming, phase, None))
 
     def time_returned(self, method: Callable[..., Callable[..., Any] | None], phase: Phase) -> None:
-        """Time the functions that a bound method returns: their calls are of `phase`."""
+        """Time the functions returned by a bound method: their calls belong to `phase`."""
 
         def returning(*arguments: Any) -> Callable[..., Any] | None:
             call = method(*arguments)
@@ -127,7 +127,7 @@ class Stopwatch:
         return {phase: phase.wall_ns - phase.marked_ns for phase in self.phases.values()}
 
     def restart(self) -> None:
-        """Forget all times; the calling thread is the one that is timed."""
+        """Forget all times, and time the calling thread."""
         for phase in self.phases.values():
             phase.reset()
         self._since_ns, self._core_ns = perf_counter_ns(), thread_time_ns()

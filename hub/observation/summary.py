@@ -1,4 +1,4 @@
-"""The progress of a run, and its summary at the end."""
+"""The progress of a run, and the summary at the end."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ class Progress:
 
     step: int
     steps: int | None
-    """Steps of the whole run; None if it continues until it is stopped."""
+    """Steps of the whole run; None for a run without an end."""
     sim_time_s: float
     real_time_factor: float
     late_steps: int
     live: Mapping[str, tuple[float, str]]
-    """Current value and unit of each measure that is shown live and has a value yet."""
+    """Current value and unit of each live measure with a value."""
 
 
 @dataclass(frozen=True)
 class Observed:
-    """What one observer, such as a camera in real time, has seen of a run."""
+    """The view of a run by an observer, such as a camera in real time."""
 
     states: int
-    """That it saw; a camera has drawn a picture of each."""
+    """Number of states seen; a camera has drawn a picture of each."""
     dropped: int
-    """States at its period that it did not see, because it was still busy."""
+    """States due at the observer's period but missed, because the observer was still busy."""
     rate: float
-    """States per second of wall time that it saw."""
+    """States seen per second of wall time."""
     attainable_rate: float
-    """States per second that it could have seen, by the time that one took on this machine."""
+    """Attainable states per second, from the time of a state on this machine."""
     lost: str | None
-    """Why it did not see the end; None if it did."""
+    """Why the observer missed the end; None if it did not."""
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The result of a run: how far and how fast it went, its state hash and its measures.
+    """The result of a run: progress and speed, state hash and measures.
 
     Examples:
         summary = trocar.run("table")
@@ -64,18 +64,18 @@ class Summary:
     latency: dict[str, dict[str, dict[str, float]]] = field(
         default_factory=dict[str, dict[str, dict[str, float]]]
     )
-    """By way (`device to grant`, `grant to state`, `state to force`, `state to picture`) and stream: count,
-    p50_s, p99_s, largest_s. In the device's clock: one that follows simulated time has simulated latencies.
+    """Count, p50_s, p99_s and largest_s by way (`device to grant`, `grant to state`, `state to force`, `state
+    to picture`) and stream. Times are in the device's clock: simulated for a device in simulated time.
     """
     observers: dict[str, Observed] = field(default_factory=dict[str, Observed])
-    """By name, the participants that looked on in their own time."""
+    """The participants that looked on in their own time, by name."""
     measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
     scores: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]])
-    """By participant, the last score card that it published (`hub/recording/scores.py`)."""
+    """The last published score card by participant (`hub/recording/scores.py`)."""
     ending: str | None = None
-    """Which participant has ended the session, at what simulated time and why; None if none has."""
+    """Participant, simulated time and reason of an end by a participant; else None."""
     profile: dict[str, Any] | None = None
-    """Where the time went, if that was asked for (`hub/recording/profiles.py`)."""
+    """Where the time went, if asked for (`hub/recording/profiles.py`)."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the summary as a flat mapping, with the measures beside the rest."""

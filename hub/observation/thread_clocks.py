@@ -1,7 +1,7 @@
-"""The processor time of each thread of this process, by what the thread is for.
+"""The processor time of each thread of this process, by purpose of the thread.
 
-Linux keeps it in nanoseconds (`/proc/self/task/TID/schedstat`, field 1; proc(5)). Elsewhere all of it counts
-as the main thread's.
+Linux counts nanoseconds (`/proc/self/task/TID/schedstat`, field 1; proc(5)). Elsewhere all time counts as the
+main thread's.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ class ThreadClocks:
     """Sums the processor time of all threads since `restart`.
 
     Args:
-        taker: Returns what a thread of Python is for, by its name.
-        native: What threads of libraries other than Zenoh are for.
+        taker: Returns the purpose of a Python thread, by the thread's name.
+        native: The purpose of threads of libraries except Zenoh.
     """
 
     def __init__(self, taker: Callable[[str], str], native: str) -> None:
@@ -43,15 +43,15 @@ class ThreadClocks:
         self._main_from_ns = _core_ns(self._main) or 0
 
     def main_ns(self) -> int:
-        """Return the processor time of the main thread; of all threads where it is not known."""
+        """Return the processor time of the main thread; of all threads where unknown."""
         now_ns = _core_ns(self._main)
         return process_time_ns() - self._process_from_ns if now_ns is None else now_ns - self._main_from_ns
 
     def other_ns(self, main_ns: int) -> dict[str, float]:
-        """Return the processor time of the other threads, by what they are for.
+        """Return the processor time of the other threads, by purpose.
 
-        `main_ns` is that of the main thread; what of the process' time belongs to no thread that was seen is
-        of `other threads`.
+        `main_ns` is the main thread's time; time of the process outside of the known threads belongs to
+        `other threads`.
         """
         times: dict[str, float] = {
             taker: total - self._from.get(taker, 0) for taker, total in self._totals().items()
@@ -61,7 +61,7 @@ class ThreadClocks:
         return {taker: time_ns for taker, time_ns in times.items() if time_ns > 0.0}
 
     def _totals(self) -> dict[str, int]:
-        """Return the processor time of every taker so far, with that of threads that have ended."""
+        """Return the processor time of every taker so far, including ended threads."""
         names = {thread.native_id: thread.name for thread in threading.enumerate()}
         with self._lock:
             seen: dict[int, tuple[str, int]] = {}
@@ -79,9 +79,9 @@ class ThreadClocks:
         return totals
 
     def _of(self, task: int, name: str | None, time_ns: int) -> str:
-        """Return what a thread is for: `name` is Python's, if Python has started it.
+        """Return the purpose of a thread; `name` is Python's name, if Python has started the thread.
 
-        Python forgets a thread shortly before it ends: then it is for what it was for.
+        Python forgets a thread shortly before the thread's end: then the last known purpose counts.
         """
         if name is not None:
             return self._taker(name)
@@ -96,7 +96,7 @@ class ThreadClocks:
 
 
 def _core_ns(task: int) -> int | None:
-    """Return the processor time of a thread; None if it has ended, or if this system does not tell."""
+    """Return the processor time of a thread; None if ended, or if the system does not tell."""
     try:
         return int((_TASKS / str(task) / "schedstat").read_bytes().split()[0])
     except (OSError, IndexError):
@@ -114,7 +114,7 @@ class CoreQueue:
             self._file = None
 
     def waited_ns(self) -> int:
-        """Return the time so far; 0 where it is not known."""
+        """Return the time so far; 0 where unknown."""
         return 0 if self._file is None else int(os.pread(self._file, 64, 0).split()[1])
 
     def close(self) -> None:

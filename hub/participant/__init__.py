@@ -1,4 +1,4 @@
-"""The interface that engines, controllers and devices build on. It knows neither processes nor Zenoh."""
+"""The interface of engines, controllers and devices, without processes and Zenoh."""
 
 from hub.participant.base import Outputs, Params, Participant, Value
 from hub.participant.bond import ForceSide, MotionSide

@@ -18,16 +18,16 @@ __all__ = ["Outputs", "Params", "Participant", "Value"]
 Value = Vector | Message | tuple[Message, ...]
 """The value of a port: a float64 vector of shape (size,), a message, or a tuple of messages.
 
-A signal with a fixed layout is a vector, any other signal a message, an event port a tuple of messages.
+A signal with a fixed layout is a vector, all other signals a message, an event port a tuple of messages.
 """
 
 
 Outputs = Mapping[str, Value]
-"""Port name to value. The arrays may be the same ones at every step, so copy a value to keep it."""
+"""Port name to value. The arrays may be the same at every step: copy a value to keep it."""
 
 
 class Params(BaseModel):
-    """Base of the parameters of a participant kind, as they stand in a scenario; in SI units once validated.
+    """Base of the parameters of a participant kind in a scenario; in SI units once validated.
 
         class SpringParams(Params):
             rest: Length = 0.08                                   # m; "80 mm" in a scenario
@@ -39,20 +39,21 @@ class Params(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     native_code: ClassVar[tuple[str, ...]] = ()
-    """Names of the parameters that are files of native code, such as a vendor's library.
+    """Names of the parameters for files of native code, such as a vendor's library.
 
-    A recording that gives such a parameter is re-simulated only with `--trust`.
+    A recording with such a parameter is re-simulated only with `--trust`.
     """
 
     open_to_pages: ClassVar[bool] = False
-    """Whether a page in the browser may change the numbers, switches and choices of this very model.
+    """Whether a page in the browser may change the numbers, switches and choices of this model.
 
-    Set it where none of them reaches a file, a device or a network. A derived model has to set it again.
+    Set to True where no parameter reaches a file, a device or a network. A derived model has to repeat the
+    value.
     """
 
 
 class Participant(ABC):
-    """What engines, controllers and devices have in common: a name, parameters and ports."""
+    """The common part of engines, controllers and devices: a name, parameters and ports."""
 
     params_model: ClassVar[type[Params]] = Params
     """The pydantic model of the kind's parameters."""
@@ -60,7 +61,7 @@ class Participant(ABC):
     def __init__(self, name: str, params: Any) -> None:
         """Store the participant's name and an instance of `params_model`.
 
-        Import no package of an extra here: scenarios are checked where those are not installed.
+        Import no package of an extra here: scenarios are checked without the extra's packages.
         """
         self.name = name
         self.params = params

@@ -1,10 +1,9 @@
 """The two sides of a power bond inside an engine's step: prediction, virtual coupling forces and work.
 
-The force side takes its sub-steps on the predicted motion of the other side and sums impulse and work; the
-motion side applies the wrench that it receives and sums the work it does. Frames (dof 6) use the convention
-pose (x, y, z, qx, qy, qz, qw), twist (linear, angular), wrench (force, torque), all expressed in the bond's
-frame. In the shapes `size` and `linear` are those of the `BondSide`. Scheme and rules:
-docs/decisions/0004-coupling.md.
+The force side makes its sub-steps on the predicted motion of the motion side and sums impulse and work; the
+motion side applies the received wrench and sums its work. Frames (dof 6) use the convention pose (x, y, z,
+qx, qy, qz, qw), twist (linear, angular), wrench (force, torque), all expressed in the bond's frame. In
+shapes, `size` and `linear` are fields of the `BondSide`. Scheme and rules: docs/decisions/0004-coupling.md.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ __all__ = ["ForceSide", "MotionSide"]
 
 
 class ForceSide:
-    """The force side of a bond: the predicted motion of the other side in a step, impulse and work.
+    """The force side of a bond: the predicted motion of the motion side in a step, impulse and work.
 
     Examples:
         side = ForceSide(self.bonds[0], setup.bonds["tip"])    # in configure
@@ -50,8 +49,8 @@ class ForceSide:
     def begin(self, inputs: Inputs, h: float) -> None:
         """Read the motion at the start of a step of `h` seconds.
 
-        Where the motion differs by d from the predicted one, the spring is displaced by d at once: it takes
-        the work F d + k d^2 / 2, with F its force at the end of the last step.
+        Where the motion differs by d from the prediction, the spring is displaced by d at once and receives
+        the work F d + k d^2 / 2, with the spring force F at the end of the last step.
         """
         x, v = inputs[self._position][: self._linear], inputs[self._velocity]
         if self._started:
@@ -79,7 +78,7 @@ class ForceSide:
     def add(self, spring: Vector, damper: Vector, tau: float, dt: float) -> None:
         """Add the forces of a sub-step of `dt` seconds around `tau`.
 
-        `spring`, `damper`: forces (N, N m; shape (size,)) with which the other side pushes.
+        `spring`, `damper`: forces (N, N m; shape (size,)) pushing from the motion side.
         """
         force = spring + damper
         self._impulse += dt * force
@@ -88,7 +87,7 @@ class ForceSide:
         self._work[0] += dt * float(moved.dot(self.velocity(tau)))
 
     def result(self, spring: Vector, damper: Vector) -> dict[str, Vector]:
-        """Return the outputs of the bond: the work, and the reaction on the other side.
+        """Return the outputs of the bond: the work, and the reaction on the motion side.
 
         The reaction is minus the mean force, or minus the force at the end. `spring`, `damper`: forces (N,
         N m; shape (size,)) at the end of the step, on the predicted motion.
@@ -122,7 +121,7 @@ class ForceSide:
 
 
 class MotionSide:
-    """The motion side of a bond: the force to apply in each sub-step, and the work that it does.
+    """The motion side of a bond: the force to apply in each sub-step, and the work done.
 
     Examples:
         side = MotionSide(self.bonds[0], setup.bonds["tip"])   # in configure
@@ -145,13 +144,13 @@ class MotionSide:
         return self._correction is None
 
     def begin(self, inputs: Inputs, position: Vector, velocity: Vector) -> None:
-        """Read the reaction for this step; `position` and `velocity` are the motion at its start."""
+        """Read the reaction for this step; `position` and `velocity` are the motion at the start."""
         self._reaction = inputs[self.force_port]
         if self._correction is not None:
             self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
 
     def force(self, tau: float, position: Vector, velocity: Vector) -> Vector:
-        """Return the force (N, N m; shape (size,)) on this side in the sub-step that starts at `tau` seconds.
+        """Return the force (N, N m; shape (size,)) on this side in the sub-step from `tau` seconds on.
 
         `position`, `velocity`: the motion of this side at the start of the sub-step.
         """
@@ -165,7 +164,7 @@ class MotionSide:
         return force
 
     def add(self, force: Vector, displacement: Vector) -> None:
-        """Add the work against `force` over `displacement` (m, rad; shape (size,)) of one sub-step."""
+        """Add the work against `force` over `displacement` (m, rad; shape (size,)) of a sub-step."""
         self._work[0] -= force.dot(displacement)
 
     def result(self, position: Vector, velocity: Vector) -> dict[str, Vector]:

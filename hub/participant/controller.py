@@ -1,4 +1,4 @@
-"""The base of stepped participants whose whole state is in records and arrays."""
+"""The base of stepped participants with the whole state in records and arrays."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ __all__ = ["Controller"]
 class Controller(Stepped):
     """A stepped participant without physics.
 
-    It names its records and arrays once, by `keep`, and is hashed, saved and restored by them.
+    Records and arrays are named once, by `keep`; hash, save and restore follow.
     """
 
     _kept: tuple[Record | Vector, ...] = ()
     _arrays: tuple[Vector, ...] = ()
 
     def keep(self, *state: Record | Vector) -> None:
-        """Declare the whole state, instead of what was declared before."""
+        """Declare the whole state, replacing an earlier declaration."""
         self._kept = state
         self._arrays = tuple(part.values if isinstance(part, Record) else part for part in state)
 
     def state_hash(self) -> int:
-        """Return the hash of all that is kept."""
+        """Return the hash of the whole state."""
         return state_hash(*self._arrays)
 
     def save(self) -> bytes:
-        """Return the bytes of all that is kept, in the order in which it was declared."""
+        """Return the bytes of the whole state, in the order of declaration."""
         return b"".join(array.tobytes() for array in self._arrays)
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state, bit for bit.
 
-        Raises StateError, and changes nothing, if its size is wrong or a field cannot have its value.
+        Raises StateError, and changes nothing, if the size is wrong or a field cannot have the value.
         """
         values = split_state(self.name, self._arrays, state)
         for part, saved in zip(self._kept, values, strict=True):

@@ -20,7 +20,7 @@ __all__ = ["Device", "Sample", "VectorSample"]
 
 @dataclass(frozen=True)
 class Sample:
-    """One message of a device, stamped in the clock of its port.
+    """A message of a device, stamped in the clock of the port.
 
     Examples:
         Sample("pose", PoseStamped(header=Header(stamp=Time.from_ns(t), frame_id="stylus_base")))
@@ -35,7 +35,7 @@ class Sample:
 
 
 class VectorSample(Sample):
-    """A sample of a signal as numbers, for devices that sample often: its message is made for who asks.
+    """A sample of a signal as numbers, for devices with a high sampling rate: the message is made on demand.
 
     Examples:
         VectorSample(VectorCodec(port), np.array([x, y, z, qx, qy, qz, qw]), t)
@@ -46,23 +46,23 @@ class VectorSample(Sample):
     _time_ns: int
 
     def __init__(self, codec: VectorCodec, value: Vector, time_ns: int) -> None:
-        """Take a value, shape (size,), of the codec's port, stamped in that port's clock.
+        """Store a value, shape (size,), of the codec's port, stamped in the port's clock.
 
-        Raises MessageError if it has another shape, or numbers that are not finite.
+        Raises MessageError for another shape, or for numbers that are not finite.
         """
         if value.shape != codec.neutral.shape or not isfinite(value.dot(value)):
             codec.checked(value)  # raises what is wrong, unless the numbers are only large
         vars(self).update(port=codec.port.name, _codec=codec, _value=value, _time_ns=time_ns)
 
     def __getattr__(self, name: str) -> Message:
-        """Return the message, which is made when it is first asked for."""
+        """Return the message, made at the first access."""
         if name != "message":
             raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
         made = vars(self)["message"] = self._codec.to_message(self._value, self._time_ns)
         return made
 
     def is_of(self, codec: VectorCodec | None) -> bool:
-        """Return whether it has the type, frame and names of the codec's port: its bytes need no check."""
+        """Return whether type, frame and names fit the codec's port: the sample's bytes need no check."""
         return codec is not None and self._codec.template == codec.template
 
     def encode(self) -> bytes:
@@ -71,7 +71,7 @@ class VectorSample(Sample):
 
 
 class Device(Participant):
-    """A participant that lives in wall time or, if all its outputs are stamped with it, in simulated time.
+    """A participant in wall time or, with all outputs stamped in simulated time, in simulated time.
 
         class Pedal(Device):
             ports = (Port(name="pressed", causality="output", type="std_msgs/msg/Float64", clock="wall"),)
@@ -92,9 +92,9 @@ class Device(Participant):
     """Default time between two reads in wall time: a haptic stylus is read and driven at 1 kHz."""
 
     use_period_ns: int = 0
-    """How often it uses the newest values of its signals, in wall time; 0: it uses each.
+    """Period at which the device uses the newest values of its signals, in wall time; 0: every value is used.
 
-    Of more values than one for each use not all are sent to it.
+    Surplus values within a period are not all sent to the device.
     """
 
     @abstractmethod
@@ -106,17 +106,18 @@ class Device(Participant):
         """Return the new samples up to `t` (ns since the session's start, wall or simulated time)."""
 
     def wait(self, seconds: float) -> bool:
-        """Wait until the next period, in the thread that reads.
+        """Wait until the next period, in the reading thread.
 
-        A device that knows when it has a new sample returns True at once, and is read then.
+        A device with knowledge of its next sample returns True as soon as the sample is there, to be read at
+        once.
         """
         sleep(seconds)
         return False
 
     def unused(self) -> Collection[str]:
-        """Return the signals whose values it does not need until further notice: they are not sent.
+        """Return the signals not needed until further notice: their values are not sent.
 
-        Asked after each `read`; the same collection as long as nothing has changed.
+        Called after each `read`; return the same collection as long as nothing has changed.
         """
         return ()
 

@@ -1,4 +1,4 @@
-"""What a stepped participant sees of its inputs in one step."""
+"""The inputs of a stepped participant in a step."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["Inputs"]
 
 
 class Inputs:
-    """The inputs of one participant in one step.
+    """The inputs of a participant in a step.
 
         force = inputs["force"]               # (size,), at the start of the step
         later = inputs.at("force", 0.5e-3)    # (size,), 0.5 ms into the step
 
-    `inputs["port"]` is the value at the start of the step; `at` follows it inside the step where the
-    connection is linear: between the source's last two values while it is ahead, beyond them while it is not.
-    The arrays belong to their producer: read, do not write.
+    `inputs["port"]` is the value at the start of the step; `at` gives a later value inside the step where the
+    connection is linear: between the source's last two values while the source is ahead, otherwise beyond the
+    last value. The arrays belong to their producer: read, do not write.
     """
 
     __slots__ = ("_events", "_rates", "_stale", "_values")
@@ -33,13 +33,13 @@ class Inputs:
         events: dict[str, tuple[Message, ...]] | None = None,
         stale: set[str] | None = None,
     ) -> None:
-        """Read from these containers, which the host keeps and writes to before each step.
+        """Read from these containers, written by the host before each step.
 
         Args:
-            values: The value of every signal input; at first the one at time 0.
-            rates: The slope (1/s) of every input whose connection is linear.
-            events: The messages of every event port that has any in this step.
-            stale: The inputs whose device is silent.
+            values: The value of every signal input; at first the value at time 0.
+            rates: The slope (1/s) of every input with a linear connection.
+            events: The messages of every event port with a message in this step.
+            stale: The inputs from a silent device.
         """
         self._values = values
         self._rates = {} if rates is None else rates
@@ -54,28 +54,28 @@ class Inputs:
             raise SessionError(f"no input port '{port}'.{did_you_mean(port, self._values)}") from None
 
     def message(self, port: str) -> Message | None:
-        """Return the newest message of a signal that has no vector form; None before the first."""
+        """Return the newest message of a signal without a vector form; None before the first."""
         return cast("Message | None", self._values[port])
 
     def at(self, port: str, tau: float) -> Vector:
         """Return the vector `tau` seconds after the start of the step, held or extrapolated.
 
-        The connection says which of the two: see `rate`.
+        The connection decides: see `rate`.
         """
         rate = self._rates.get(port)
         return self[port] if rate is None else self._values[port] + tau * rate
 
     def rate(self, port: str) -> Vector | None:
-        """Return the slope (1/s) with which the connection extrapolates; None if it holds."""
+        """Return the slope (1/s) of an extrapolating connection; None if the connection holds."""
         return self._rates.get(port)
 
     def events(self, port: str) -> tuple[Message, ...]:
-        """Return the messages that arrived on an event port since the last step, oldest first."""
+        """Return the messages received on an event port since the last step, oldest first."""
         return self._events.get(port, ())
 
     @property
     def event_ports(self) -> KeysView[str]:
-        """The event ports that have a message in this step; a step must not depend on their order."""
+        """The event ports with a message in this step; a step must not depend on their order."""
         return self._events.keys()
 
     @property
@@ -86,6 +86,6 @@ class Inputs:
     def stale(self, port: str) -> bool:
         """Return whether the device of this port is silent for longer than the port allows.
 
-        Also true before its first sample.
+        Also true before the first sample.
         """
         return port in self._stale

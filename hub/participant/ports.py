@@ -23,7 +23,7 @@ MessageType = type[Message] | str
 
 
 class EventFields(TypedDict, total=False):
-    """Fields that an event port may state; `Port` documents each."""
+    """Optional fields of an event port; `Port` documents each."""
 
     names: tuple[str, ...]
     unit: str
@@ -32,7 +32,7 @@ class EventFields(TypedDict, total=False):
 
 
 class SignalFields(EventFields, total=False):
-    """Fields that a signal may state; `Port` documents each."""
+    """Optional fields of a signal; `Port` documents each."""
 
     size: int
     shape: tuple[int, ...]
@@ -45,14 +45,14 @@ class SignalFields(EventFields, total=False):
 def signal_in(
     name: str, type_: MessageType = Float64MultiArray, description: str = "", **fields: Unpack[SignalFields]
 ) -> Port:
-    """Return an input with one value at a time."""
+    """Return an input with a single value at a time."""
     return Port(name=name, causality="input", type=_ros_type(type_), description=description, **fields)
 
 
 def signal_out(
     name: str, type_: MessageType = Float64MultiArray, description: str = "", **fields: Unpack[SignalFields]
 ) -> Port:
-    """Return an output with one value at a time."""
+    """Return an output with a single value at a time."""
     return Port(name=name, causality="output", type=_ros_type(type_), description=description, **fields)
 
 

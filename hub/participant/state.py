@@ -1,4 +1,4 @@
-"""State of participants: typed records that live in one float64 vector each, and the hash over such vectors.
+"""State of participants: typed records, each in a float64 vector of its own, and the hash over such vectors.
 
     class Trajectory(Record):
         position = array("n")
@@ -9,7 +9,7 @@
     state.position[:] = goal  # a view, written in place
     state.activity = Activity.MOVE
 
-The vector is what is hashed and saved: nothing has to be collected for it, and no field can be forgotten.
+The vector is hashed and saved: nothing has to be collected, and no field can be forgotten.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _MOST = 2**53
 
 
 def state_hash(*parts: bytes | Vector) -> int:
-    """Return a 64-bit hash of `parts`, the same on every machine that has the same bits.
+    """Return a 64-bit hash of `parts`, the same on every machine for the same bits.
 
     Examples:
         state_hash(self.position, self.velocity, b"grasped")
@@ -55,7 +55,7 @@ def state_hash(*parts: bytes | Vector) -> int:
 
 
 def restore_arrays(participant: str, arrays: Iterable[Vector], state: bytes) -> None:
-    """Write `state`, the bytes of `arrays` one after the other, back into them.
+    """Write `state`, the concatenated bytes of `arrays`, back into the arrays.
 
         state = position.tobytes() + velocity.tobytes()
         restore_arrays(self.name, [position, velocity], state)
@@ -68,7 +68,7 @@ def restore_arrays(participant: str, arrays: Iterable[Vector], state: bytes) -> 
 
 
 def split_state(participant: str, arrays: Sequence[Vector], state: bytes) -> list[Vector]:
-    """Return what `state` has for each of `arrays`, in their shapes; StateError if it does not fit."""
+    """Return the part of `state` for each of `arrays`, in their shapes; StateError if the size differs."""
     size = sum(array.nbytes for array in arrays)
     if len(state) != size:
         raise StateError(
@@ -83,7 +83,7 @@ def split_state(participant: str, arrays: Sequence[Vector], state: bytes) -> lis
 
 
 def array(*shape: int | str) -> Vector:
-    """Declare an array of float64, zero at first; a dimension that is a name is given to the record."""
+    """Declare an array of float64, zero at first; a named dimension is an argument of the record."""
     return cast("Vector", _Array(shape))
 
 
@@ -103,12 +103,12 @@ def integer(start: int = 0) -> int:
 
 
 def choice(start: E) -> E:
-    """Declare a member of the enumeration that `start` belongs to."""
+    """Declare a member of the enumeration of `start`."""
     return cast("E", _Choice(start))
 
 
 class _Field:
-    """One declared part of a record."""
+    """A declared part of a record."""
 
     start: float = 0.0
     allowed = "any number"
@@ -117,11 +117,11 @@ class _Field:
         return ()
 
     def is_valid(self, value: float) -> bool:  # noqa: ARG002
-        """Say whether `value` stands for something; 0 and -0 are not the same."""
+        """Return whether `value` stands for something; 0 and -0 are not the same."""
         return True
 
     def accessor(self, name: str, index: int) -> property:
-        """Return what reads and writes the field, which is number `index` of its record."""
+        """Return the property that reads and writes the field, number `index` of the record."""
         raise NotImplementedError
 
 
@@ -214,9 +214,9 @@ def _view(name: str) -> str:
 
 
 class Record:
-    """State with named fields, which the class body declares: `array`, `number`, `flag`, `integer`, `choice`.
+    """State with named fields, declared in the class body: `array`, `number`, `flag`, `integer`, `choice`.
 
-    They stand in `values` one after the other, in the order of their declaration.
+    The fields stand in `values` in the order of their declaration.
     """
 
     fields: ClassVar[Mapping[str, _Field]] = {}
@@ -232,7 +232,7 @@ class Record:
             setattr(cls, name, field.accessor(name, index))
 
     def __init__(self, **sizes: int) -> None:
-        """Give the dimensions that the declaration names."""
+        """Give the dimensions named in the declaration."""
         shapes = {name: field.shape(sizes) for name, field in self.fields.items()}
         lengths = [prod(shape) for shape in shapes.values()]
         self.values = np.zeros(sum(lengths))
@@ -248,13 +248,13 @@ class Record:
                 part[:] = field.start
 
     def part(self, name: str) -> Vector:
-        """Return the view of `values` that a field takes: shape (1,) of a number, as outputs have it."""
+        """Return a field's view of `values`: shape (1,) for a number, as in outputs."""
         index = list(self.fields).index(name)
         end = (*self.offsets[1:], self.values.size)[index]
         return self.values[self.offsets[index] : end]
 
     def check(self, values: Vector) -> None:
-        """Raise StateError if `values`, shape (size,), cannot be those of this record."""
+        """Raise StateError if `values`, shape (size,), cannot be values of this record."""
         for (name, field), offset in zip(self.fields.items(), self.offsets, strict=True):
             if not isinstance(field, _Array) and not field.is_valid(value := float(values[offset])):
                 raise StateError(f"{type(self).__name__}.{name} = {value:g}, allowed are {field.allowed}")

@@ -30,37 +30,37 @@ class Correction:
 
 @dataclass(frozen=True)
 class BondPlan:
-    """How one bond of a participant is coupled; passed on to its `ForceSide` or `MotionSide`.
+    """The coupling of a participant's bond; passed on to the `ForceSide` or `MotionSide`.
 
     Examples:
         BondPlan(prediction="velocity", mean=True)     # algorithm `impulse`
     """
 
     prediction: str
-    """The motion that the force side assumes inside a step.
+    """The motion assumed by the force side inside a step.
 
     `hold`, `velocity` (x + v t) or `slope` (x + v t + a t^2/2).
     """
     mean: bool
-    """The force side returns its mean force over the step; otherwise the force at its end."""
+    """The force side returns the mean force over the step; otherwise the force at the end."""
     correction: Correction | None = None
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What `Stepped.configure` receives: step, directory, and what of the participant is connected."""
+    """Arguments of `Stepped.configure`: step, directory, and the participant's connected inputs and bonds."""
 
     period_ns: int
-    """Its step, in nanoseconds."""
+    """Step of the participant, in nanoseconds."""
     directory: Path
     """Where relative paths of the scenario start."""
     bonds: Mapping[str, BondPlan] = field(default_factory=dict[str, BondPlan])
     connected: frozenset[str] = frozenset()
-    """The inputs that have a source; any other keeps its start value."""
+    """The inputs with a source; an input without a source keeps the start value."""
 
 
 class Stepped(Participant):
-    """An engine or a controller: it advances when, and as far as, the hub grants.
+    """An engine or a controller, advanced when, and as far as, the hub grants.
 
         class Counter(Stepped):
             ports = (Port(name="count", causality="output"),)
@@ -85,29 +85,30 @@ class Stepped(Participant):
     observer: ClassVar[bool] = False
     """The kind only looks, as a camera does: none of its outputs is part of the simulated world.
 
-    In pace `realtime` such a participant lives in its own time, unless one in simulated time reads it: it is
-    stepped with the newest inputs, `t` being theirs, may miss any but the first, and the session does not
-    wait for it.
+    In pace `realtime` such a participant lives in its own time, unless a participant in simulated time reads
+    its outputs: each step has the newest inputs and their time `t`, all but the first inputs may be missed,
+    and the session does not wait.
     """
 
     unread: frozenset[str] = frozenset()
-    """Outputs that are not used in this step: no reader, no measure, no recorder, no subscriber.
+    """Outputs not used in this step: no reader, no measure, no recorder, no subscriber.
 
-    The host notes them before the step. What they would be computed from must not be forgotten: somebody may
-    use them in the next step. They need not be computed, and no state may depend on them.
+    The host sets the names before the step. Unread outputs need not be computed, and no state may depend on
+    the set. The data for their computation must not be forgotten: somebody may use the outputs in the next
+    step.
     """
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """The bonds that may be connected; after `configure` with their effective masses."""
+        """The bonds available for connection; after `configure` with their effective masses."""
         return ()
 
     @property
     def ended(self) -> str:
-        """Why this participant ends the session, in one clause with the time; empty while it goes on.
+        """Why this participant ends the session, in a clause with the time; empty before the end.
 
-        It is read when a grant is done: the session then ends in good order, with state `done`. Until there
-        the participant is stepped on and returns outputs as ever.
+        Read after each grant: the session then ends in good order, with state `done`. Until then the
+        participant is stepped on and returns outputs as ever.
         """
         return ""
 
@@ -119,13 +120,13 @@ class Stepped(Participant):
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance from `t` to `t + h`, both in nanoseconds, and return the outputs at `t + h`.
 
-        The work of a bond since the start (J) is returned as a float vector of one element under
+        The work of a bond since the start (J) is returned as a float vector of a single element under
         `<bond>/work`.
         """
 
     @abstractmethod
     def state_hash(self) -> int:
-        """Return 64 bits that differ whenever any bit of the state differs; equal runs have equal hashes."""
+        """Return 64 bits, different for any different bit of the state; equal runs have equal hashes."""
 
     def save(self) -> bytes:
         """Return the whole state. Raises StateError where the participant cannot."""

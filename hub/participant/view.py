@@ -1,7 +1,7 @@
-"""What a page draws of a participant: bodies with meshes, moved by its outputs, and soft surfaces.
+"""A page's view of a participant: bodies with meshes, moved by outputs, and soft surfaces.
 
-A kind offers it by an entry point of the group `trocar.scenes`, which names a function or class that takes
-the participant's validated parameters (its `Params`) and returns a `Scene`.
+A kind offers a view by an entry point of the group `trocar.scenes`: a function or class with the
+participant's validated parameters (`Params`) as argument and a `Scene` as result.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Rgb = tuple[float, float, float]
 
 
 class Part(NamedTuple):
-    """A mesh of one colour on one body."""
+    """A mesh of a single colour on a body."""
 
     body: int
     """Index of the body."""
@@ -34,29 +34,29 @@ class Part(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """A frame worth showing, such as that of a tip."""
+    """A frame worth showing, such as the frame of a tip."""
 
     name: str
     body: int
     pose: Sequence[float]
-    """In the body: position (m) and quaternion (x, y, z, w)."""
+    """Pose in the body: position (m) and quaternion (x, y, z, w)."""
 
 
 class Camera(NamedTuple):
-    """A camera that a body carries, which looks along its own z with y down."""
+    """A camera on a body, looking along the camera's own z with y down."""
 
     name: str
     body: int
     pose: Sequence[float]
-    """Of the optical frame in the body: position (m) and quaternion (x, y, z, w)."""
+    """Pose of the optical frame in the body: position (m) and quaternion (x, y, z, w)."""
     field_of_view: float
     """Horizontal, rad."""
     baseline: float
-    """Distance of its eyes, m, of which each is half as far along x; 0: it has one."""
+    """Distance of the two eyes, m, each half of the distance along x from the centre; 0: a single eye."""
 
 
 class Scene(Protocol):
-    """The bodies of one participant and where they are."""
+    """The bodies of a participant and their poses."""
 
     @property
     def bodies(self) -> Sequence[str]:
@@ -70,7 +70,7 @@ class Scene(Protocol):
 
     @property
     def frames(self) -> Sequence[Frame]:
-        """The frames that are worth showing."""
+        """The frames worth showing."""
         ...
 
     @property
@@ -85,12 +85,12 @@ class Scene(Protocol):
 
     @property
     def inputs(self) -> Sequence[str]:
-        """The outputs of the participant that `poses` needs; empty if nothing moves."""
+        """The outputs of the participant needed by `poses`; empty if nothing moves."""
         ...
 
     def poses(self, values: Mapping[str, Vector]) -> NDArray[np.float32]:
         """Return the pose of each body in the world, shape (bodies, 7): m and quaternion (x, y, z, w).
 
-        `values`: the newest value of each of `inputs`. Raises MessageError if one has another shape.
+        `values`: the newest value of each of `inputs`. Raises MessageError for another shape.
         """
         ...

@@ -1,1 +1,1 @@
-"""From a scenario file to a plan: who runs where, and every connection and bond resolved."""
+"""From a scenario file to a plan: each participant has a host, and every connection and bond is resolved."""

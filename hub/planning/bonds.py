@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 
 def plan_bond(scenario: Scenario, participants: Mapping[str, Stepped | Device], index: int) -> PlannedBond:
-    """Return the bond at `index` with the two sides that its participants declare.
+    """Return the bond at `index` with the two sides declared by the participants.
 
     Raises ScenarioError if a side is missing, the sides do not fit, or the algorithm needs more.
     """
@@ -79,7 +79,7 @@ def check_bonds(plan: Plan, bonds: Mapping[str, Sequence[BondSide]]) -> None:
 
     Args:
         plan: The session's plan.
-        bonds: By participant, its bonds as it declares them after `configure`, with effective masses.
+        bonds: Bond sides of each participant as declared after `configure`, with effective masses.
 
     Raises:
         ScenarioError: A rule is broken; a bond with `check: warn` logs a warning instead.

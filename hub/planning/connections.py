@@ -1,4 +1,4 @@
-"""The connections of a session, those of its bonds included, resolved to ports and checked."""
+"""The connections of a session, including connections of bonds, resolved to ports and checked."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class Connections:
             self._rank.setdefault(name, index)
         self._ports = {name: {port.name: port for port in one.ports} for name, one in participants.items()}
         self._sources: dict[tuple[str, str], list[str]] = {}
-        """By participant and input port: what feeds it."""
+        """Sources of each input, keyed by participant and input port."""
         self.stepped: list[PlannedConnection] = []
         self.from_devices: list[ConnectionFromDevice] = []
         self.to_devices: list[ConnectionToDevice] = []
 
     def connect(self, connection: Connection, path: Path) -> None:
-        """Add a connection without a wildcard, which stands at `path` in the scenario."""
+        """Add a connection without a wildcard, at `path` in the scenario."""
         one, other = connection.source, connection.target
         source, target = self._port(one, "output", path), self._port(other, "input", path)
         if problem := misfit(one, source, other, target):
@@ -69,7 +69,7 @@ class Connections:
             self.stepped.append(PlannedConnection(**ends, fresh=fresh, linear=linear))
 
     def couple(self, index: int, planned: PlannedBond) -> None:
-        """Add the connections of the bond at `index`: motion one way, force the other."""
+        """Add the connections of the bond at `index`: motion in one direction, force in the other."""
         bond = planned.bond
         *motion, force = zip(bond_ports(planned.motion), bond_ports(planned.force), strict=True)
         for here, there in motion:
@@ -83,7 +83,7 @@ class Connections:
         self.stepped.append(PlannedConnection(**_ends(source, target), fresh=fresh, linear=False))
 
     def check_inputs(self) -> None:
-        """Reject a signal input of a stepped participant that has neither a source nor a start value."""
+        """Reject a signal input of a stepped participant without a source and without a start value."""
         for name, planned in self._participants.items():
             for port in planned.ports if planned.role != "device" else ():
                 needs_source = (port.causality, port.variability, port.start) == ("input", "signal", None)
@@ -109,7 +109,7 @@ class Connections:
         return port
 
     def _feed(self, end: PortReference, source: str, path: Path, *, shared: bool = False) -> None:
-        """Note the source of an input; one that is `shared` may have several different ones."""
+        """Note the source of an input; a `shared` input may have several different sources."""
         before = self._sources.setdefault((end.participant, end.port), [])
         if before and (not shared or source in before):
             raise ScenarioError(f"input '{end}' is fed twice, by '{before[0]}' and by '{source}'", path=path)

@@ -16,18 +16,18 @@ __all__ = ["bond_plans", "is_fresh", "stable_step_problem"]
 
 _RULE_SHARE = 0.5
 """With this factor the rules of impulse and impulse-linearised hold in all of 108 linear cases
-(`bench/stable_step.py`), those of held inputs in half of them: only the tool's own damping dissipates the
-energy that held inputs create, and a bond does not know that damping.
+(`bench/stable_step.py`), the rules of held inputs in half of the cases: only the tool's own damping
+dissipates the energy created by held inputs, and the bond does not know this damping.
 """
 
 _ENERGY_SHARE = 0.25
-"""A press and release creates energy of 0.13 H^2 k_contact / m of what it exchanges
+"""A press and release creates 0.13 H^2 k_contact / m of the exchanged energy
 (`tests/engines/bullet/press_and_release.py`): 0.8 % with this factor.
 """
 
 
 def is_fresh(bond: Bond, source_side: str) -> bool:
-    """Return whether the other side receives the outputs of `source_side` within the same step.
+    """Return whether the opposite side receives the outputs of `source_side` within the same step.
 
     `source_side` is `motion` or `force`.
     """
@@ -58,8 +58,8 @@ def linearised_gain(
 ) -> float:
     """Return g = S / (k H^2/6 + b H/2) with S = m_p [1 - (1 - min(1, b h / m_p)) exp(-(H - h) sqrt(k/m_p))].
 
-    S is the mass that the proxy alone reflects to the tool within a step: small for short steps, all of m_p
-    for long ones. An explicit damper takes its share b h / m_p at once, in the first sub-step h of the proxy.
+    S is the mass reflected by the proxy alone to the tool within a step: small for short steps, all of m_p
+    for long steps. An explicit damper adds the share b h / m_p at once, in the first sub-step h of the proxy.
     """
     first = min(proxy_step_s, step_s)
     left = 1.0 - min(1.0, damping * first / proxy_mass)
@@ -73,12 +73,12 @@ def stable_step_problem(bond: Bond, motion: BondSide, force: BondSide, step_s: f
     The rules:
         impulse: H <= 0.5 m / b.
         impulse-linearised: H <= 0.5 sqrt(m (1/k + 1/k_contact)) and m >= 0.5 m_proxy.
-        Both: H <= 0.25 sqrt(m / k_contact), above which a press and release creates more than 1 % of the
-        energy it exchanges (docs/decisions/0015-contact-force.md).
+        Both: H <= 0.25 sqrt(m / k_contact), or a press and release creates more than 1 % of the exchanged
+        energy (docs/decisions/0015-contact-force.md).
         gauss-seidel and jacobi with held inputs: H <= 0.5 m / b and H <= 0.5 sqrt(m / k), the sampling limits
         of a held damper and a held spring.
 
-    m: effective mass of the motion side; k, b: virtual coupling. A number that a side does not state is not
+    m: effective mass of the motion side; k, b: virtual coupling. Numbers not stated by a side are not
     checked.
     """
     mass = motion.effective_mass
@@ -109,7 +109,7 @@ def stable_step_problem(bond: Bond, motion: BondSide, force: BondSide, step_s: f
 
 
 def _limits(bond: Bond, force: BondSide, mass: float) -> dict[str, float]:
-    """Return the longest step (s) that each rule of the bond's algorithm allows a tool of `mass` (kg)."""
+    """Return the longest step (s) allowed by each rule of the bond's algorithm for a tool of `mass` (kg)."""
     stiffness, damping, contact = force.stiffness, force.damping, force.contact_stiffness
     limits: dict[str, float] = {}
     if bond.algorithm == "impulse-linearised":

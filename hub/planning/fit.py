@@ -11,7 +11,7 @@ __all__ = ["misfit"]
 
 
 def misfit(one: PortReference, source: Port, other: PortReference, target: Port) -> str | None:
-    """Return why output `source` at `one` does not fit input `target` at `other`; None if it does."""
+    """Return why output `source` at `one` does not fit input `target` at `other`; None if both fit."""
     if source.type != target.type:
         return f"'{one}' gives {source.type}, '{other}' takes {target.type}"
     if (source.variability, target.variability) == ("event", "signal"):

@@ -1,4 +1,4 @@
-"""The code that a scenario names beside installed kinds: classes on PYTHONPATH, and files of native code."""
+"""The code named by a scenario beside installed kinds: classes on PYTHONPATH, and files of native code."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ __all__ = ["foreign_code", "names_class"]
 
 
 def names_class(kind: str) -> bool:
-    """Return whether a kind is a `module:Class`, which is imported, and not one of an installed package."""
+    """Return whether a kind is a `module:Class` to import, not a kind of an installed package."""
     return ":" in kind and kind not in registry.kinds()
 
 
 def foreign_code(specs: Iterable[Mapping[str, Any]], scene: object) -> list[str]:
-    """Return the classes and the files that participants name, without importing any of them.
+    """Return the classes and the files named by participants, without an import of any.
 
     Args:
         specs: The participants, each with a kind.
-        scene: The scene of the scenario, which may have parameters for them.
+        scene: The scene of the scenario; may have parameters for participants.
     """
     shared = cast("dict[str, Any]", scene) if isinstance(scene, dict) else {}
     code: set[str] = set()

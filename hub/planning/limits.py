@@ -1,7 +1,7 @@
-"""What a scenario may contain at most, so that any file is accepted or rejected within seconds.
+"""The upper limits of a scenario, so that any file is accepted or rejected within seconds.
 
-The largest scenario that comes with Trocar has 4.5 kB, 300 values and 6 levels. One value takes about
-40 us to parse, so the limits keep the time of reading below 2 s and its memory below 50 MB.
+The largest of Trocar's own scenarios has 4.5 kB, 300 values and 6 levels. A value takes about 40 us to parse,
+so the limits keep the time of reading below 2 s and the memory below 50 MB.
 """
 
 from __future__ import annotations
@@ -21,34 +21,34 @@ __all__ = [
 ]
 
 MAX_BYTES = 512 * 1024
-"""Of the file with its comments: room for `MAX_PARTICIPANTS` of 500 bytes each."""
+"""Bytes of the file with comments: room for `MAX_PARTICIPANTS` of 500 bytes each."""
 
 MAX_DEPTH = 32
-"""Of mappings and lists in one another: the reader, the validation and the messages recurse."""
+"""Levels of nested mappings and lists: the reader, the validation and the messages recurse."""
 
 MAX_VALUES = 20_000
 """Keys and values of the file, with aliases (`*name`) written out: 0.8 s to parse."""
 
 MAX_ITEMS = 5_000
-"""Of one list or mapping: five connections for each of `MAX_PARTICIPANTS`."""
+"""Items of a list or mapping: five connections for each of `MAX_PARTICIPANTS`."""
 
 MAX_TEXT = 4_096
-"""Characters of one text: the longest path that Linux accepts (PATH_MAX)."""
+"""Characters of a text: the longest path on Linux (PATH_MAX)."""
 
 MAX_NUMBER = 80
-"""Characters of one number: a binary integer of 64 bits takes 66, a float 24."""
+"""Characters of a number: a binary integer of 64 bits takes 66, a float 24."""
 
 MAX_PARTICIPANTS = 1_000
-"""Of a session: `trocar check` of a chain of 1000 takes about 5 s."""
+"""Participants of a session: `trocar check` of a chain of 1000 takes about 5 s."""
 
 MAX_SCENE_VALUES = 100_000
-"""Values that the participants get from `scene` together: each participant validates its own copy."""
+"""Values copied from `scene` to all participants together: each participant validates its own copy."""
 
 MAX_KIND = 200
-"""Characters of the name of a kind, with the name of its module."""
+"""Characters of the name of a kind, with the name of the module."""
 
 MAX_PROBLEMS = 20
-"""Reported at once: each takes a search for similar names, and the first ones often cause the others."""
+"""Problems reported at once: each takes a search for similar names, and the first often cause the rest."""
 
 
 def shown(text: str, length: int = 200) -> str:

@@ -1,4 +1,4 @@
-"""The output ports that a scenario measures."""
+"""The measured output ports of a scenario."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["check_measures", "measured_port"]
 
 
 def check_measures(scenario: Scenario, participants: Mapping[str, PlannedParticipant]) -> None:
-    """Raise ScenarioError if a measure is of an output or a field that does not exist."""
+    """Raise ScenarioError if a measure names a missing output or field."""
     for name, measure in scenario.measure.items():
         path, of = ("measure", name, "of"), measure.of
         if of.participant not in participants:
@@ -30,10 +30,10 @@ def check_measures(scenario: Scenario, participants: Mapping[str, PlannedPartici
 def measured_port(
     planned: PlannedParticipant, text: str, path: tuple[str | int, ...] = ()
 ) -> tuple[Port, slice]:
-    """Return the output port and the part of its vector that `port` or `port.field` means.
+    """Return the output port and the part of the vector named by `port` or `port.field`.
 
     Raises ScenarioError, about `path`, if there is no such output with a vector form, or no such field. An
-    event port is measured if each message is one number; the sizes of others may change.
+    event port is measured if each message is a single number; the sizes of larger messages may change.
     """
     outputs = {
         port.name: port

@@ -1,6 +1,6 @@
-"""Which participants only look on in a session, and why others of their kinds are in lock-step.
+"""The choice of observers, the participants that only look, and the reasons for lock-step.
 
-In real time a camera draws at its own rate, and no participant waits for it (docs/decisions/0041).
+In real time a camera draws at its own rate, and no participant waits for the camera (docs/decisions/0041).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ def with_observers(
     planned: Mapping[str, PlannedParticipant],
     connections: Sequence[Connection],
 ) -> dict[str, PlannedParticipant]:
-    """Return `planned` in which each participant that only looks is an observer, or has the reason why not.
+    """Return `planned` with every participant that only looks as observer, or with its reason for lock-step.
 
-    `connections` have no wildcards. An observer shares its process with other observers alone.
+    `connections` have no wildcards. An observer shares its process with observers alone.
     """
     result = dict(planned)
     for name, made in participants.items():
@@ -48,7 +48,7 @@ def _reasons(
     connections: Sequence[Connection],
     one: PlannedParticipant,
 ) -> Iterator[str]:
-    """Yield why a participant that only looks is to be in lock-step; the ends may not exist."""
+    """Yield the reasons for lock-step of a participant that only looks; the ends may not exist."""
     if scenario.pace != "realtime":
         yield f"pace {scenario.pace}"
     if one.bonds:

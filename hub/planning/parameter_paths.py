@@ -1,4 +1,4 @@
-"""The paths among the parameters of a participant, before they are validated: to validate may read them."""
+"""The paths among the parameters of a participant, found before validation: validation may read files."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ __all__ = ["parameter_paths"]
 _Schema = Mapping[str, Any]
 
 _FORMATS = ("path", "file-path", "directory-path")
-"""Of `Path`, `FilePath` and `DirectoryPath` of pydantic, in a JSON schema."""
+"""Formats of `Path`, `FilePath` and `DirectoryPath` of pydantic in a JSON schema."""
 
 
 def parameter_paths(model: type[Params], values: Mapping[str, Any]) -> set[str]:
-    """Return every text in `values` that stands where the model has a path, as it is written."""
+    """Return every text in `values` at the place of a path in the model, as written."""
     schema = model.model_json_schema()
     return set(_paths(schema, values, schema.get("$defs", {})))
 
 
 def _paths(schema: _Schema, value: Any, definitions: _Schema) -> Iterator[str]:
-    """Yield the paths in `value`; where the schema has alternatives, those of each."""
+    """Yield the paths in `value`; of schemas with alternatives, the paths of each."""
     if isinstance(value, str) and schema.get("format") in _FORMATS:
         yield value
     if "$ref" in schema:
@@ -35,7 +35,7 @@ def _paths(schema: _Schema, value: Any, definitions: _Schema) -> Iterator[str]:
 
 
 def _parts(schema: _Schema, value: Any) -> Iterator[tuple[_Schema, Any]]:
-    """Yield the entries of a mapping or a list, each with its schema, if there is one."""
+    """Yield the entries of a mapping or a list, each with its schema, if any."""
     if isinstance(value, dict):
         known = schema.get("properties", {})
         others = (schema.get("additionalProperties"), *schema.get("patternProperties", {}).values())

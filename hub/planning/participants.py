@@ -1,4 +1,4 @@
-"""The plan of one participant: its host, its period, and all of its ports."""
+"""The plan of a participant: host, period and all ports."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from schemas.scenario import ParticipantSpec, Scenario
 __all__ = ["plan_participant"]
 
 _LEAST_READ_NS = 100_000
-"""A loop in Python that polls a device more often keeps a core busy without getting more samples."""
+"""A Python loop with a shorter polling period keeps a core busy without getting more samples."""
 
 
 def plan_participant(
     scenario: Scenario, participant: Stepped | Device, role: Role, bonds: Sequence[PlannedBond]
 ) -> PlannedParticipant:
-    """Return the plan of a participant; `bonds` are its own.
+    """Return the plan of a participant; `bonds` are the participant's bonds.
 
-    Raises ScenarioError if what the scenario says of it does not fit what it declares.
+    Raises ScenarioError if the scenario does not fit the participant's declarations.
     """
     name = participant.name
     spec, path = scenario.participants[name], ("participants", name)

@@ -30,7 +30,7 @@ class _Part(BaseModel):
 
 
 class PlannedParticipant(_Part):
-    """One participant: its host, its period, and its ports, with those of its connected bonds."""
+    """A participant: host, period, and ports, including the ports of its connected bonds."""
 
     name: str
     kind: str
@@ -38,19 +38,19 @@ class PlannedParticipant(_Part):
     host: str
     """`hub`, the name of a process, or `remote/<participant>`."""
     period: int = Field(gt=0)
-    """In communication steps; 1 for a device in wall time."""
+    """Period in communication steps; 1 for a device in wall time."""
     read_ns: int = 0
     """For a device in wall time: the time between two reads."""
     use_ns: int = 0
-    """For a device in wall time: the time between two uses of its signals; 0: it uses every value."""
+    """For a device in wall time: the time between two uses of its signals; 0: every value is used."""
     network_link: NetworkLinkSpec | None = None
-    """For a device: the emulated network between it and the hub."""
+    """For a device: the emulated network between device and hub."""
     rate_limit: float = 2000.0
-    """For a device: messages per second that are accepted on each of its ports."""
+    """For a device: messages per second accepted on each port."""
     observer: bool = False
-    """It only looks, in its own time: it is not in the order, and the session never waits for it."""
+    """The participant only looks, in its own time: it has no place in the order and is never waited for."""
     lock_step: str = ""
-    """Why one that only looks is in lock-step nevertheless, in words; empty for all others."""
+    """Reason for lock-step of a participant that only looks, in words; empty for all others."""
     ports: tuple[Port, ...]
     bonds: tuple[BondSide, ...] = ()
     bond_plans: dict[str, BondPlan] = {}
@@ -61,7 +61,7 @@ class PlannedParticipant(_Part):
 
     @property
     def simulated_time(self) -> bool:
-        """Whether this is a device that lives in simulated time; any other device lives in wall time."""
+        """Whether the participant is a device in simulated time; any other device lives in wall time."""
         return self.role == "device" and has_simulated_time(self.ports)
 
     @property
@@ -76,20 +76,20 @@ class PlannedParticipant(_Part):
 
 
 class PlannedConnection(_Part):
-    """A connection from a stepped participant to another one, or to a device in simulated time."""
+    """A connection from a stepped participant to another participant, or to a device in simulated time."""
 
     source: str
     source_port: str
     target: str
     target_port: str
     fresh: bool
-    """The target reads the output of the same step; otherwise that of the last communication point."""
+    """The target reads the output of the same step; otherwise the output of the last communication point."""
     linear: bool
-    """The target extrapolates inside its step."""
+    """The target extrapolates inside the target's step."""
 
 
 class ConnectionFromDevice(_Part):
-    """A connection from a device, through its inlet, to a stepped participant."""
+    """A connection from a device, through an inlet, to a stepped participant."""
 
     source: str
     source_port: str
@@ -108,7 +108,7 @@ class ConnectionToDevice(_Part):
 
 
 class PlannedBond(_Part):
-    """A bond and its two declared sides."""
+    """A bond and the two declared sides."""
 
     bond: Bond
     motion: BondSide
@@ -116,11 +116,11 @@ class PlannedBond(_Part):
 
 
 class Plan(_Part):
-    """Everything that hosts need to know about a session."""
+    """The plan of a session, complete for hosts."""
 
     step_ns: int = Field(gt=0)
     order: tuple[str, ...]
-    """The participants in lock-step, in the order in which they step."""
+    """The participants in lock-step, in the order of stepping."""
     participants: dict[str, PlannedParticipant]
     connections: tuple[PlannedConnection, ...]
     from_devices: tuple[ConnectionFromDevice, ...]
@@ -137,7 +137,7 @@ class Plan(_Part):
             raise ValueError(f"not a plan ({type(error).__name__}: {error})") from error
 
     def contradiction(self) -> str:
-        """Return what in a plan of unknown origin refers to something that it lacks; empty if nothing."""
+        """Return the first reference of a plan of unknown origin to a missing part; empty if nothing."""
         if any(name != planned.name for name, planned in self.participants.items()):
             return "a participant has two names"
         if sorted(self.order) != sorted(
@@ -158,7 +158,7 @@ class Plan(_Part):
         return tuple(planned for planned in self.participants.values() if planned.observer)
 
     def connected(self, participant: str) -> frozenset[str]:
-        """Return the inputs of a participant that have a source."""
+        """Return the inputs of a participant with a source."""
         every = (*self.connections, *self.from_devices, *self.to_devices)
         return frozenset(one.target_port for one in every if one.target == participant)
 
@@ -168,9 +168,9 @@ class Plan(_Part):
         return max(planned.period, planned.port(port).period_ns // self.step_ns)
 
     def meetings(self) -> tuple[PlannedParticipant, ...]:
-        """Return the devices in simulated time that a grant must stop at in each of their periods.
+        """Return the devices in simulated time with a forced end of a grant in each of their periods.
 
-        These are the ones that are written to or sit behind a network link.
+        These are the devices with inputs, and the devices behind a network link.
         """
         written = {connection.target for connection in self.connections}
         return tuple(
@@ -180,18 +180,19 @@ class Plan(_Part):
         )
 
     def stops(self) -> list[int]:
-        """Return the periods, in steps, at whose multiples a grant must end, in ascending order.
+        """Return the periods, in steps, with a forced end of a grant at every multiple, in ascending order.
 
-        Inside a grant, no participant that reads a device may start a step, or it would miss the newest
-        samples; and no device may be due that is written what the others have computed.
+        Inside a grant, no reader of a device may start a step, or the reader would miss the newest samples;
+        and no device may be due with inputs from participants of the same grant.
         """
         reading = {self.participants[inlet.target].period for inlet in self.from_devices}
         return sorted(reading | {device.period for device in self.meetings()})
 
     def seen_from(self, host: str) -> Plan:
-        """Return the part of the plan that another machine needs to run host `host`.
+        """Return the part of the plan needed by another machine to run host `host`.
 
-        That is its participants, and of the others the ports that share a connection with them.
+        The part is the host's participants, and of the remaining participants the ports connected to the
+        host.
         """
         own = {name for name, planned in self.participants.items() if planned.host == host}
         connections = tuple(k for k in self.connections if {k.source, k.target} & own)
@@ -225,7 +226,7 @@ class Plan(_Part):
 def has_simulated_time(ports: Sequence[Port]) -> bool:
     """Return whether a device with these ports lives in simulated time.
 
-    It does if it has outputs and all of them are stamped with simulated time.
+    True if there are outputs and all outputs are stamped with simulated time.
     """
     outputs = [port for port in ports if port.causality == "output"]
     return bool(outputs) and all(port.clock == "simulated" for port in outputs)

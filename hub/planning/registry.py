@@ -1,7 +1,7 @@
-"""The kinds of participants that are installed, found by entry points and loaded by name.
+"""The installed kinds of participants, found by entry points and loaded by name.
 
-A package adds its own kinds with entry points in the groups `trocar.engines`, `trocar.controllers` and
-`trocar.devices`. If it has an extra with the name of a kind, the kind needs the packages of that extra.
+A package adds kinds with entry points in the groups `trocar.engines`, `trocar.controllers` and
+`trocar.devices`. If the package has an extra with the name of a kind, the kind needs the extra's packages.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ GROUPS: dict[str, Role] = {
 """Entry-point group to role."""
 
 UNPACKAGED = "PYTHONPATH"
-"""In place of a distribution, for a kind that is named `module:Class`."""
+"""Stands for the distribution of a kind named `module:Class`."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of participant as its package declares it, without importing the package."""
+    """A kind of participant as declared by the package, without an import of the package."""
 
     name: str
     role: Role
@@ -61,7 +61,7 @@ class Kind:
 
 @cache
 def kinds() -> dict[str, Kind]:
-    """Return every installed kind by name. Raises ScenarioError if two distributions have the same one."""
+    """Return every installed kind by name. Raises ScenarioError if two distributions share a kind."""
     found: dict[str, Kind] = {}
     for group, role in GROUPS.items():
         for entry in sorted(entry_points(group=group), key=lambda e: (e.name, e.value)):
@@ -79,14 +79,14 @@ def kinds() -> dict[str, Kind]:
 
 @cache
 def _name(dist: Distribution) -> str:
-    """Return the name of a distribution, whose metadata are parsed anew each time that it is asked."""
+    """Return the name of a distribution; the metadata are parsed anew at each call."""
     return dist.name
 
 
 def find(name: str) -> Kind:
-    """Return the kind called `name`: an installed one, or `module:Class` for a class on PYTHONPATH.
+    """Return the kind called `name`: an installed kind, or `module:Class` for a class on PYTHONPATH.
 
-    Raises ScenarioError if there is none, or if that class cannot be imported.
+    Raises ScenarioError if there is no such kind, or if the class cannot be imported.
     """
     if name in kinds():
         return kinds()[name]
@@ -110,7 +110,7 @@ def find(name: str) -> Kind:
 def load(name: str) -> Participant:
     """Return the class of kind `name`.
 
-    Raises ScenarioError if there is no such kind or its package cannot be imported.
+    Raises ScenarioError if there is no such kind or the package cannot be imported.
     """
     kind = find(name)
     loaded = _import(kind)
@@ -159,17 +159,17 @@ def require_extra(name: str) -> None:
 
 
 def extra_packages(name: str) -> list[str]:
-    """Return the names of the packages in the extra of kind `name`; empty for one without an extra."""
+    """Return the names of the packages in the extra of kind `name`; empty without an extra."""
     return sorted({requirement.name for requirement in _requirements(find(name).entry.dist, name)})
 
 
 def missing_packages(dist: Distribution | None, extra: str) -> list[str]:
-    """Return the packages of `extra` of a distribution that are not installed here."""
+    """Return the packages of `extra` of a distribution not installed here."""
     return [f"{r.name}{r.specifier}" for r in _requirements(dist, extra) if not _installed(r)]
 
 
 def installed_packages(dist: Distribution, extra: str) -> list[str]:
-    """Return the packages of `extra` of a distribution that are installed here, with their versions."""
+    """Return the packages of `extra` of a distribution installed here, with their versions."""
     return [f"{r.name} {distribution(r.name).version}" for r in _requirements(dist, extra) if _installed(r)]
 
 
@@ -192,7 +192,7 @@ def _all_requirements(dist: Distribution) -> tuple[Requirement, ...]:
 
 @cache
 def _parsed(texts: tuple[str, ...]) -> tuple[Requirement, ...]:
-    """Return requirements; each group of entry points has an object of its own for one distribution."""
+    """Return parsed requirements; each group of entry points has a separate object for a distribution."""
     return tuple(Requirement(text) for text in texts)
 
 

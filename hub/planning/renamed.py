@@ -21,15 +21,15 @@ SCENARIOS = {"ros-paper": "ros-vrep"}
 _KINDS = {"console": "dvrk-console", "paper": "vrep"}
 _PARTICIPANT_KEYS = {"link": "network_link"}
 _PARAMETER_VALUES = {"profile": {"paper": "vrep"}}
-"""By parameter: the old value and the new one, for every kind that accepts only the new one."""
+"""Old and new value by parameter, for every kind with only the new value."""
 _EARLIER_DEFAULTS = {"0.1.0": {"bullet": {"sub_grid": False, "standstill": False}}}
-"""By version and kind: what a parameter that came later is to be, so that a recording is verified."""
+"""Values for parameters of later versions, by version and kind, so that an old recording verifies."""
 _EVENT_PORTS = {"mirror": ("distance", "lag")}
-"""By kind: the last parts of the names of ports that were signals, and whose values are events now."""
+"""Last parts of the names of former signal ports, now event ports, by kind."""
 
 
 def replace_old_names(source: Source) -> None:
-    """Replace the old names in a scenario, and log one warning for each place where one is written."""
+    """Replace the old names in a scenario, and log a warning for each place of an old name."""
     participants = source.tree.get("participants")
     warned: set[str] = set()
     for name, spec in cast("dict[str, Any]", participants if isinstance(participants, dict) else {}).items():
@@ -56,7 +56,7 @@ def _replace_in(source: Source, name: str, spec: dict[str, Any], warned: set[str
 
 
 def _new_values(spec: dict[str, Any]) -> dict[str, str]:
-    """Return the new value of every parameter of a participant that has an old one."""
+    """Return the new value of every parameter of a participant with an old value."""
     found: dict[str, str] = {}
     for parameter, values in _PARAMETER_VALUES.items():
         old = spec.get(parameter)
@@ -78,7 +78,7 @@ def _warn(source: Source, path: Location, renamed: str, warned: set[str], *, key
 
 
 def current_names(scenario: dict[str, Any], version: str = "") -> dict[str, Any]:
-    """Return a scenario that Trocar of `version` recorded, in the names of this version."""
+    """Return a scenario recorded by Trocar `version`, in the names of this version."""
     defaults = _EARLIER_DEFAULTS.get(version, {})
     participants = {
         name: defaults.get(spec["kind"], {}) | _current_participant(spec)

@@ -1,4 +1,4 @@
-"""Changes of parameters at a step: the difference between a fork and its parent."""
+"""Changes of parameters at a step: the difference between a fork and the parent."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Renewal(BaseModel):
     @field_validator("before")
     @classmethod
     def _has_parameters_alone(cls, before: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        """A kind or a host among them would take the place of the participant's own."""
+        """A kind or a host among the parameters would replace the participant's own."""
         for name, params in before.items():
             if other := sorted(params.keys() & set(ParticipantSpec.RESERVED)):
                 raise ValueError(f"participant '{name}': {', '.join(other)} is no parameter of a kind")

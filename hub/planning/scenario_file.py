@@ -1,4 +1,4 @@
-"""Scenario files: find, read, override and validate them; every error names its line and column."""
+"""Scenario files: find, read, override and validate; every error has a line and column."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ScenarioFile:
-    """A valid scenario, the validated parameters of its participants by name, and its text."""
+    """A valid scenario, the validated parameters of the participants by name, and the text."""
 
     scenario: Scenario
     params: Mapping[str, Params]
@@ -40,14 +40,14 @@ class ScenarioFile:
 
 
 def installed_scenarios() -> dict[str, Path]:
-    """Return the scenarios that come with Trocar, by name."""
+    """Return the scenarios of the Trocar package, by name."""
     return {file.stem: file for file in sorted(Path(str(files("configs"))).glob("*.yaml"))}
 
 
 def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
-    """Return the installed scenario of a name, or the one in a file, with overrides `a.b.c=value` applied.
+    """Return the installed scenario of a name, or a scenario file, with overrides `a.b.c=value` applied.
 
-    Raises ScenarioError with one line for each problem.
+    Raises ScenarioError with a line for each problem.
     """
     return validated(read(_find(name_or_path)), overrides)
 
@@ -55,7 +55,7 @@ def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
 def validated(source: Source, overrides: Sequence[str] = ()) -> ScenarioFile:
     """Return the scenario in `source`, with overrides `a.b.c=value` applied.
 
-    Raises ScenarioError with one line for each problem.
+    Raises ScenarioError with a line for each problem.
     """
     for override in overrides:
         source.override(override)
@@ -78,7 +78,7 @@ def validated(source: Source, overrides: Sequence[str] = ()) -> ScenarioFile:
 
 
 def located(error: ScenarioError, source: Source) -> ScenarioError:
-    """Return `error` with the place of its value in front of the message, if it names a value."""
+    """Return `error` with the place of the value in front of the message, if the error names a value."""
     return ScenarioError(source.line(error.path, str(error))) if error.path else error
 
 
@@ -115,7 +115,7 @@ def _check_number(source: Source) -> None:
 
 
 def _log_code(source: Source) -> None:
-    """Log what is about to be imported or loaded that is not an installed kind."""
+    """Log the code about to be imported or loaded beyond installed kinds."""
     code = foreign_code(_specs(source).values(), source.tree.get("scene"))
     if code:
         more = f" and {len(code) - MAX_PROBLEMS} more" if len(code) > MAX_PROBLEMS else ""
@@ -124,7 +124,7 @@ def _log_code(source: Source) -> None:
 
 
 def _specs(source: Source) -> dict[str, dict[str, Any]]:
-    """Return the participants that name a kind; the validation of the scenario reports the others."""
+    """Return the participants with a kind; the validation of the scenario reports the rest."""
     participants = source.tree.get("participants")
     given = cast("dict[str, Any]", participants if isinstance(participants, dict) else {})
     specs = {name: cast("dict[str, Any]", spec) for name, spec in given.items() if isinstance(spec, dict)}
@@ -132,7 +132,7 @@ def _specs(source: Source) -> dict[str, dict[str, Any]]:
 
 
 def _models(source: Source) -> dict[str, type[Params]]:
-    """Return the model of the parameters of every participant whose kind can be loaded."""
+    """Return the model of the parameters of every participant with a loadable kind."""
     models: dict[str, type[Params]] = {}
     for name, spec in _specs(source).items():
         with suppress(ScenarioError):  # `_all_params` reports it
@@ -141,7 +141,7 @@ def _models(source: Source) -> dict[str, type[Params]]:
 
 
 def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
-    """Return the parameters of every participant, and append what is wrong with them to `found`."""
+    """Return the parameters of every participant, and append the problems to `found`."""
     params: dict[str, Params] = {}
     present: set[str] = set()
     for name, spec in _specs(source).items():
@@ -156,10 +156,10 @@ def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
 
 
 def _params(at: Location, spec: dict[str, Any], source: Source, present: set[str]) -> Params:
-    """Return the validated parameters of one participant.
+    """Return the validated parameters of a participant.
 
-    `present` collects the kinds whose packages are installed, which takes 10 ms to find out.
-    Raises ScenarioError if they are invalid, or if it runs here and a package that it needs is not installed.
+    `present` collects the kinds with installed packages: the check takes 10 ms. Raises ScenarioError if the
+    parameters are invalid, or if the participant runs here and a required package is not installed.
     """
     kind = spec["kind"]
     try:

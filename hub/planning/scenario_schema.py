@@ -12,11 +12,11 @@ __all__ = ["scenario_schema"]
 
 _PORT = r"\s*[A-Za-z][A-Za-z0-9_]*\.\S+\s*"
 _TEXT_FORMS = {"PortReference": rf"^{_PORT}$", "Connection": rf"^{_PORT}->{_PORT}$"}
-"""Parts of a scenario that may also be written as one line of text."""
+"""Parts of a scenario with an alternative form, a line of text."""
 
 
 def scenario_schema() -> str:
-    """Return the schema as JSON text, a definition in a line. A kind that cannot be loaded is left out."""
+    """Return the schema as JSON text, a definition in a line. Kinds that cannot be loaded are left out."""
     schema = Scenario.model_json_schema()
     definitions: dict[str, Any] = schema["$defs"]
     for name, pattern in _TEXT_FORMS.items():
@@ -33,10 +33,10 @@ def _compact(value: Any) -> str:
 
 
 def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of a participant: one branch for each kind, so that an editor reports against it.
+    """Return the schema of a participant: a branch for each kind, so that an editor reports against the kind.
 
-    Parameters may be missing or null, as the scene may have them or be kept out: `trocar check` reports those
-    that a participant lacks in the end.
+    Parameters may be missing or null: the scene may set a parameter, or null may keep it out. `trocar check`
+    reports parameters still missing in the end.
     """
     broken = registry.broken()
     kinds = [kind for name, kind in sorted(registry.kinds().items()) if name not in broken]
@@ -63,7 +63,7 @@ def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[st
 
 
 def _or_null(schema: dict[str, Any]) -> dict[str, Any]:
-    """Return a schema that also allows null; unlike with `anyOf`, errors point into the value."""
+    """Return a schema with null also allowed; unlike with `anyOf`, errors point into the value."""
     shown = {key: schema[key] for key in ("description", "default") if key in schema}
     rest = {key: value for key, value in schema.items() if key not in shown}
     return shown | {"if": {"type": "null"}, "then": True, "else": rest}

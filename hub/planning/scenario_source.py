@@ -1,4 +1,4 @@
-"""The text of a scenario: its YAML tree, the place of each value in the file, and overrides on top of it."""
+"""The text of a scenario: YAML tree, place of each value in the file, and overrides."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ _Mark = tuple[int, int]
 
 @dataclass(frozen=True)
 class Source:
-    """The tree of a scenario, and where in its file or on the command line each value is written."""
+    """The tree of a scenario, and the place of each value in the file or on the command line."""
 
     file: Path
     tree: dict[str, Any]
     marks: dict[Location, tuple[_Mark, _Mark]]
-    """Line and column, counted from 1, of each key (for a list item: of the item) and of its value."""
+    """Line and column, counted from 1, of each key (for a list item: of the item) and of the value."""
     text: str = ""
-    """What is in the file."""
+    """Contents of the file."""
     overrides: dict[Location, str] = field(default_factory=dict[Location, str])
-    """The values set on the command line, each with the text that sets it."""
+    """The values set on the command line, each with the text of the override."""
     _written: dict[Location, Location] = field(default_factory=dict[Location, Location])
-    """Of values that are copied from another part of the scenario: where that part stands."""
+    """The source part of values copied from another part of the scenario."""
 
     @property
     def directory(self) -> Path:
@@ -43,14 +43,14 @@ class Source:
         return self.file.resolve().parent
 
     def line(self, path: Location, message: str, *, key: bool = False) -> str:
-        """Return `FILE:LINE:COL: path: message` about the value at `path`, or about its key."""
+        """Return `FILE:LINE:COL: path: message` about the value at `path`, or about the key."""
         where = shown(".".join(map(str, path))) or "scenario"
         return f"{self.place(path, key=key)}: {where}: {shown(message, 2000)}"
 
     def place(self, path: Location, *, key: bool = False) -> str:
-        """Return `FILE:LINE:COL`, or the override, that writes the value at `path`, or its key.
+        """Return `FILE:LINE:COL`, or the override, of the value at `path`, or of the key.
 
-        The place of a missing value is that of the mapping or list in which it is missing.
+        The place of a missing value is the place of the enclosing mapping or list.
         """
         for length in range(len(path), -1, -1):
             for known in self._copies(path[:length]):
@@ -62,18 +62,18 @@ class Source:
         return str(self.file)
 
     def _copies(self, path: Location) -> Iterator[Location]:
-        """Yield `path`, then the places from which a value there may be copied."""
+        """Yield `path`, then the possible sources of a copied value at `path`."""
         yield path
         for length in range(len(path), 0, -1):
             if (written := self._written.get(path[:length])) is not None:
                 yield from self._copies((*written, *path[length:]))
 
     def override(self, text: str) -> None:
-        """Apply `a.b.c=value`. Missing mappings on the way are created; the validation judges them later.
+        """Apply `a.b.c=value`. Missing mappings on the way are created; validated later.
 
         `participants.` may be left out before a participant's name.
 
-        Raises ScenarioError if the text has another form, or names a part of something that has no parts.
+        Raises ScenarioError if the text has another form, or names a part of a value without parts.
         """
         dotted, equals, value_text = text.partition("=")
         if len(dotted) > MAX_TEXT or dotted.count(".") >= MAX_DEPTH:
@@ -109,14 +109,14 @@ class Source:
             parent = cast("dict[Any, Any]", parent)[part]
 
     def stands_also_at(self, written: Location, path: Location) -> None:
-        """Give the values below `path` the places of those below `written` if they have none of their own."""
+        """Give the values below `path` without places the places of the values below `written`."""
         self._written[path] = written
 
 
 def read(file: Path) -> Source:
     """Return the scenario text in `file`.
 
-    Raises ScenarioError if it cannot be read or is not one YAML mapping.
+    Raises ScenarioError if the file cannot be read or is not a single YAML mapping.
     """
     try:
         text = _text(file)
@@ -140,7 +140,7 @@ def read(file: Path) -> Source:
 
 
 def _text(file: Path) -> str:
-    """Return the text of a file, of which no more is read than a scenario may have."""
+    """Return the text of a file, read up to the size limit of a scenario."""
     with file.open("rb") as opened:
         data = opened.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
@@ -154,7 +154,7 @@ def _key_or_index(part: str) -> str | int:
 
 
 def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tuple[_Mark, _Mark]]]:
-    """Yield the place of each value below a YAML node; of two for the same path, the last one counts."""
+    """Yield the place of each value below a YAML node; of two for the same path, the last counts."""
     if value.id == "mapping":
         for other in _merged_nodes(value):  # first: a mapping's own keys replace those it merges
             yield from _marks(key, other, path)
@@ -171,7 +171,7 @@ def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tup
 
 
 def _merged_nodes(mapping: Any) -> Iterator[Any]:
-    """Yield the nodes that `<<` merges into a mapping, the one with the highest priority last."""
+    """Yield the nodes merged by `<<` into a mapping, the highest priority last."""
     for name, child in mapping.value:
         if name.tag == MERGE:
             # YAML gives the first of several mappings priority
@@ -179,14 +179,14 @@ def _merged_nodes(mapping: Any) -> Iterator[Any]:
 
 
 def _copied(value: Any) -> Any:
-    """Return a YAML tree without shared parts, so that an override changes one place only."""
+    """Return a YAML tree without shared parts, so that an override changes a single place."""
     if isinstance(value, dict):
         return {key: _copied(part) for key, part in cast("dict[Any, Any]", value).items()}
     return [_copied(part) for part in cast("list[Any]", value)] if isinstance(value, list) else value
 
 
 def merged(value: Any, over: Any) -> Any:
-    """Return `over`, and if both are mappings, also the entries of `value` that it lacks, at any depth."""
+    """Return `over`, and if both are mappings, also the entries missing in `over`, at any depth."""
     if not (isinstance(value, dict) and isinstance(over, dict)):
         return over
     below, above = cast("dict[str, Any]", value), cast("dict[str, Any]", over)

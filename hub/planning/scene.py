@@ -14,14 +14,14 @@ __all__ = ["spread_scene"]
 
 
 def spread_scene(source: Source, models: Mapping[str, type[Params]]) -> Iterator[ScenarioError]:
-    """Give every participant the parts of `scene` that its kind has as parameters; yield what is wrong.
+    """Give every participant the parts of `scene` named like parameters of the kind; yield the problems.
 
     A participant's own value has priority over the scene's; mappings are merged entry by entry, and an own
     value of null keeps a part of the scene out.
 
     Args:
-        source: The scenario; its `scene` is removed.
-        models: The parameters of each participant's kind; a participant whose kind is unknown is left out.
+        source: The scenario; `scene` is removed.
+        models: The parameters of each participant's kind; a participant of an unknown kind is left out.
     """
     scene = source.tree.pop("scene", None)
     if scene is None:

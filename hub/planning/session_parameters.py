@@ -18,7 +18,7 @@ from schemas.scenario import Scenario
 __all__ = ["SessionParameters", "Successors"]
 
 Successors = Mapping[str, Sequence[tuple[int, Stepped]]]
-"""Successors of each participant, each with the step of its takeover, the earliest first."""
+"""Successors of each participant, each with the step of the takeover, the earliest first."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class SessionParameters:
         )
 
     def make(self, name: str) -> tuple[Stepped | Device, list[tuple[int, Stepped]]]:
-        """Return a participant as it starts, and its successors, each with its first step.
+        """Return a participant of the start, and the successors, each with its first step.
 
         Raises ScenarioError if the kind cannot be loaded or parameters are invalid.
         """
@@ -70,11 +70,11 @@ class SessionParameters:
         return {name: dict(self.last[name]) for name in names}, [one.of(names) for one in self.renewals]
 
     def stages(self, name: str) -> list[Mapping[str, Any]]:
-        """Return the parameters of a participant over the session, the last ones at the end."""
+        """Return the parameters of a participant over the session, the last parameters at the end."""
         return [*(one.before[name] for one in self._renewals_of(name)), self.last[name]]
 
     def at(self, step: int) -> SessionParameters:
-        """Return the parameters as they are at `step`, and the renewals before it."""
+        """Return the parameters at `step`, and the earlier renewals."""
         last = dict(self.last)
         for one in sorted(self.renewals, key=lambda one: one.step, reverse=True):
             last |= one.before if one.step >= step else {}

@@ -1,4 +1,4 @@
-"""The order in which the participants of a session step."""
+"""The step order of the participants of a session."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ __all__ = ["check_order", "reads_this_step", "step_order"]
 
 
 def check_order(scenario: Scenario, participants: Mapping[str, PlannedParticipant]) -> None:
-    """Raise ScenarioError if the scenario's `order` names something that is no participant.
+    """Raise ScenarioError if the scenario's `order` names no participant.
 
-    A device that it names does not step: it stands where a controller was that it takes the place of.
+    A device in `order` does not step: the name stands for the controller replaced by the device.
     """
     stepped = {name: None for name, planned in participants.items() if planned.role != "device"}
     for index, name in enumerate(scenario.order or ()):
@@ -41,9 +41,9 @@ def step_order(
     participants: Mapping[str, PlannedParticipant],
     connections: Sequence[PlannedConnection],
 ) -> tuple[str, ...]:
-    """Return the participants in lock-step in an order in which every fresh connection leads forward.
+    """Return the participants in lock-step in an order with every fresh connection leading forward.
 
-    Where the connections leave a choice, the scenario's `order` decides, then the order of its participants.
+    Where the connections leave a choice, the scenario's `order` decides, then the order of the participants.
     Raises ScenarioError if fresh connections form a cycle.
     """
     rank = {name: index for index, name in enumerate(scenario.order or ())}

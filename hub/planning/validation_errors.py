@@ -1,4 +1,4 @@
-"""Errors of pydantic as messages for the author of a scenario: what, where, what was allowed."""
+"""Errors of pydantic as messages for the author of a scenario: fault, place, allowed values."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def problems(
     *,
     other_keys: Iterable[str] = (),
 ) -> Iterator[str]:
-    """Yield one line for each of the first errors that `model`, at `prefix` in the scenario, has found.
+    """Yield a line for each of the first errors of `model`, at `prefix` in the scenario.
 
     `other_keys` are allowed at `prefix` beside the fields of the model.
     """
@@ -64,9 +64,9 @@ def _json_schema(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _known_keys(model: type[BaseModel], loc: Iterable[str | int]) -> set[str]:
-    """Return the keys that `model` allows at `loc`.
+    """Return the keys allowed by `model` at `loc`.
 
-    They are read from its JSON schema, where unions and nested models look alike.
+    The source is the model's JSON schema, where unions and nested models look alike.
     """
     root = _json_schema(model)
     here = list(_branches(root, root))

@@ -14,9 +14,9 @@ __all__ = ["expand"]
 def expand(
     connection: Connection, ports: Mapping[str, Sequence[Port]], path: tuple[str | int, ...]
 ) -> tuple[Connection, ...]:
-    """Return the single connections for which `connection`, at `path` in the scenario, stands.
+    """Return the single connections of `connection`, a connection with wildcards at `path` in the scenario.
 
-    `ports` are those of every participant. Raises ScenarioError if a wildcard connects nothing.
+    `ports` are the ports of every participant. Raises ScenarioError if a wildcard connects nothing.
     """
     one, other = connection.source, connection.target
     if not connection.is_wildcard:

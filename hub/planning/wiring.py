@@ -1,4 +1,4 @@
-"""The plan of a scenario: its connections, bonds and measures checked against what participants declare."""
+"""The plan of a scenario: connections, bonds and measures checked against the participants' declarations."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ __all__ = ["make_plan"]
 def make_plan(
     scenario: Scenario, participants: Mapping[str, Stepped | Device], roles: Mapping[str, Role]
 ) -> Plan:
-    """Return the plan of `scenario` for its `participants`, which need not be configured or open yet.
+    """Return the plan of `scenario` for `participants`, not necessarily configured or open yet.
 
-    Raises ScenarioError, with the place in the scenario, about the first thing that does not fit.
+    Raises ScenarioError, with the place in the scenario, about the first mismatch.
     """
     bonds = [plan_bond(scenario, participants, index) for index in range(len(scenario.bonds))]
     own: defaultdict[str, list[PlannedBond]] = defaultdict(list)

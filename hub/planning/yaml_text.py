@@ -1,4 +1,4 @@
-"""YAML text within limits: they are checked while the text is parsed, before anything is built from it."""
+"""YAML text within limits: checked during parsing, before any value is built."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ __all__ = ["MERGE", "LimitError", "compose", "construct"]
 MERGE = "tag:yaml.org,2002:merge"
 _STRING, _NUMBERS = "tag:yaml.org,2002:str", ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
-"""Control characters other than tab and line end, and halves of surrogate pairs: no file, key or terminal
-takes them.
+"""Control characters except tab and line end, and halves of surrogate pairs: no file, key or terminal accepts
+these.
 """
 
 
 class LimitError(MarkedYAMLError):
-    """Valid YAML that a scenario must not contain: too long, too deep, or not a text."""
+    """Valid YAML not allowed in a scenario: too long, too deep, or not a text."""
 
     def __init__(self, problem: str, mark: Any) -> None:
         parent: Any = super()
@@ -39,7 +39,7 @@ class LimitError(MarkedYAMLError):
 
 
 def compose(text: str) -> Any:
-    """Return the root node of a YAML text, or None if it is empty. Raises YAMLError, of which LimitError."""
+    """Return the root node of a YAML text, or None if empty. Raises YAMLError, including LimitError."""
     size = len(text.encode(errors="replace"))
     if size > MAX_BYTES:
         raise LimitError(f"the text has {size} bytes; at most {MAX_BYTES} are allowed", None)
@@ -55,7 +55,7 @@ def compose(text: str) -> Any:
 
 
 def construct(root: Any) -> Any:
-    """Return the value of a node that `compose` returned. Raises YAMLError."""
+    """Return the value of a node from `compose`. Raises YAMLError."""
     return None if root is None else _yaml().constructor.construct_document(root)
 
 
@@ -66,17 +66,17 @@ def _yaml() -> Any:
 
 
 class _BoundedParser(Parser):
-    """Checks each event before a node is built from it."""
+    """Checks each event before a node is built."""
 
     def __init__(self, loader: Any) -> None:
         parent: Any = super()
         parent.__init__(loader)
         self._values = 0
         self._left: list[int] = []
-        """Of each open list or mapping: how many more nodes it may have."""
+        """Further nodes allowed in each open list or mapping."""
 
     def get_event(self) -> Any:
-        """Return the next event. Raises LimitError if it is one too many, too deep or too long."""
+        """Return the next event. Raises LimitError if the event is too many, too deep or too long."""
         parent: Any = super()
         event: Any = parent.get_event()
         if isinstance(event, NodeEvent):
@@ -108,7 +108,7 @@ class _BoundedParser(Parser):
 
 
 class _Constructor(SafeConstructor):
-    """Reports a value that does not fit its tag, such as `!!int x` or the date 2001-99-99, with its place."""
+    """Reports a value that does not fit the tag, such as `!!int x` or the date 2001-99-99, with the place."""
 
     def construct_object(self, node: Any, deep: bool = False) -> Any:
         """Return the value of `node`. Raises ConstructorError."""
@@ -135,7 +135,7 @@ def _check_text(event: Any) -> None:
 
 @dataclass(frozen=True)
 class _Extent:
-    """Of a node with its aliases written out."""
+    """Size of a node with aliases written out."""
 
     values: int
     characters: int
@@ -143,7 +143,7 @@ class _Extent:
 
 
 def _measure(node: Any, known: dict[int, _Extent | None]) -> _Extent:
-    """Return the extent of `node`, and raise LimitError if it or a key in it is not allowed.
+    """Return the extent of `node`, and raise LimitError if the node or a key inside is not allowed.
 
     `known` holds the extents by the identity of the node, None while a node is being measured. Anchors come
     before their aliases, so the recursion is never deeper than the text.

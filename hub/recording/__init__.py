@@ -1,1 +1,1 @@
-"""Everything that reads or writes recordings and ROS bags."""
+"""Readers and writers of recordings and ROS bags."""

@@ -1,4 +1,4 @@
-"""Reads MCAP recordings of ROS 2 messages: our own, and those of ROS tools. Nothing in them is trusted."""
+"""Reads MCAP recordings of ROS 2 messages, of Trocar and ROS tools. Nothing in the files is trusted."""
 
 from __future__ import annotations
 
@@ -46,12 +46,13 @@ __all__ = [
 ]
 
 MAX_RECORD_BYTES = 64 * 2**20
-"""A longer MCAP record is not read: chunks have 192 KiB and a step, or one image."""
+"""A longer MCAP record is not read: chunks have 192 KiB and a step, or a single image."""
 
 _MAX_RECORDS = 2**18
 """Records of a chunk: ours have some thousands; the smallest take 9 bytes, and each costs a reader 200."""
 _MAX_TOPIC_RATIO, _FREE_TOPIC_BYTES = 32, 2**29
-"""Bytes of one topic in memory at once: a multiple of those of the file, or the second number if greater."""
+"""Bytes of a single topic in memory at once: a multiple of the file's size, or the second number if greater.
+"""
 
 _RECORD = struct.Struct("<BQ")
 """Opcode and length of a record."""
@@ -65,13 +66,13 @@ https://mcap.dev/spec#message-op0x05
 MESSAGE_HEADER_BYTES = _MESSAGE.size
 
 _MESSAGE_INDEX = struct.Struct("<BQHI")
-"""Opcode, length, channel, bytes of the entries that follow (https://mcap.dev/spec#message-index-op0x07)."""
+"""Opcode, length, channel, bytes of the following entries (https://mcap.dev/spec#message-index-op0x07)."""
 
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 
 
 class BagMessage(NamedTuple):
-    """One recorded message."""
+    """A recorded message."""
 
     topic: str
     type: str
@@ -80,9 +81,9 @@ class BagMessage(NamedTuple):
 
 
 def bag_file(path: Path) -> Path:
-    """Return the MCAP file at `path`, which is the file itself or a rosbag2 directory.
+    """Return the MCAP file at `path`: the file itself, or the file in a rosbag2 directory.
 
-    Raises RecordingError if there is not exactly one.
+    Raises RecordingError if there is not exactly one file.
     """
     if path.is_dir():
         files = sorted(file for file in path.glob("*.mcap") if file.is_file())  # a pipe would never end
@@ -98,9 +99,9 @@ def bag_file(path: Path) -> Path:
 
 
 def default_output(path: Path) -> Path:
-    """Return `path`, where the output of a recording goes that the user has not named.
+    """Return `path`, the output beside a recording for which the user has given no name.
 
-    Raises RecordingError if it is a link: what is beside a stranger's recording may be the stranger's, and
+    Raises RecordingError if `path` is a link: a file beside a stranger's recording may be the stranger's, and
     lead to any file of the user.
     """
     if path.is_symlink():
@@ -110,7 +111,7 @@ def default_output(path: Path) -> Path:
 
 @contextmanager
 def reading(file: Path) -> Generator[None]:
-    """Turn what the parsers raise at damaged bytes into a RecordingError that names `file`."""
+    """Turn the parsers' errors at damaged bytes into a RecordingError with the name of `file`."""
     try:
         yield
     except (RecordingError, GeneratorExit):
@@ -126,7 +127,7 @@ def reading(file: Path) -> Generator[None]:
 
 @contextmanager
 def locating(bag: Bag, topic: str, time_ns: int) -> Generator[None]:
-    """Turn a MessageError into a RecordingError that says where the message is."""
+    """Turn a MessageError into a RecordingError with the place of the message."""
     try:
         yield
     except MessageError as error:
@@ -134,13 +135,14 @@ def locating(bag: Bag, topic: str, time_ns: int) -> Generator[None]:
 
 
 class Bag:
-    """A recording: its topics, messages and attachments."""
+    """A recording: topics, messages and attachments."""
 
     def __init__(self, path: str | Path, *, unfinished: bool = False) -> None:
         """Open a rosbag2 directory or an MCAP file.
 
-        `unfinished`: one that was cut short, or is being written, as far as it goes. Raises RecordingError if
-        it is neither, is cut short, or holds messages that are not in CDR.
+        `unfinished`: a file cut short, or still being written, is read as far as possible. Raises
+        RecordingError if the file is no recording, is cut short, or holds messages in another encoding than
+        CDR.
         """
         self.file = bag_file(Path(path))
         self.grown = 0
@@ -153,7 +155,7 @@ class Bag:
         self._known = 0
         """Number of channels in `_by_topic`."""
         self._unpacked: tuple[int, bytes] = (-1, b"")
-        """Place and records of the chunk that was read last: many topics begin in the same chunk."""
+        """Place and records of the chunk read last: many topics begin in the same chunk."""
         try:
             with reading(self.file):
                 self._summary = self._read_summary()
@@ -167,7 +169,7 @@ class Bag:
         self._read_topics()
 
     def _require_bounded(self) -> None:
-        """Raise RecordingError for a bomb: a file whose chunks state that they unpack to far more."""
+        """Raise RecordingError for a bomb: a file with chunks far larger unpacked, by their own statement."""
         size = self.file.stat().st_size
         stated = sum(index.uncompressed_size for index in self._summary.chunk_indexes)
         if stated > (most := most_unpacked(size)):
@@ -178,13 +180,13 @@ class Bag:
 
     @property
     def finished(self) -> bool:
-        """Whether the file was whole when it was opened."""
+        """Whether the file was whole when opened."""
         return self._unfinished is None
 
     def grow(self) -> bool:
-        """Read on in a file that was not finished when it was opened; return whether there is more.
+        """Read on in a file opened before the end of its recording; return whether there is more.
 
-        Raises RecordingError if it is damaged.
+        Raises RecordingError if the file is damaged.
         """
         if self._unfinished is None:
             return False
@@ -235,9 +237,9 @@ class Bag:
         return found
 
     def messages(self, *topics: str) -> Iterator[BagMessage]:
-        """Yield the messages of `topics`, or all, in the order in which they were written.
+        """Yield the messages of `topics`, or all, in the order of writing.
 
-        Raises RecordingError for a topic that is not there.
+        Raises RecordingError for a missing topic.
         """
         for topic in topics:
             if topic not in self.topics:
@@ -253,7 +255,7 @@ class Bag:
                 )
 
     def column(self, topic: str) -> tuple[NDArray[np.int64], list[bytes]]:
-        """Return the times (ns), shape (n,), and the payloads of one topic, in the order of `messages`."""
+        """Return the times (ns), shape (n,), and the payloads of a topic, in the order of `messages`."""
         times: list[int] = []
         payloads: list[bytes] = []
         left = max(_FREE_TOPIC_BYTES, _MAX_TOPIC_RATIO * self.file.stat().st_size)
@@ -270,11 +272,11 @@ class Bag:
 
     @property
     def chunks(self) -> list[ChunkIndex]:
-        """The chunks in the order in which they are in the file."""
+        """The chunks, in the order of the file."""
         return sorted(self._summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
 
     def chunks_with(self, topic: str) -> list[ChunkIndex]:
-        """Return the chunks that may hold messages of `topic`, in the order in which they are in the file."""
+        """Return the chunks that may hold messages of `topic`, in the order of the file."""
         ids = self._ids(topic)
         return [
             index
@@ -283,7 +285,7 @@ class Bag:
         ]
 
     def chunk(self, index: ChunkIndex) -> bytes:
-        """Return the uncompressed records of a chunk; raises RecordingError if they are damaged."""
+        """Return the uncompressed records of a chunk; raises RecordingError for damaged bytes."""
         with reading(self.file), self.file.open("rb") as stream:
             return self._records_of(index, stream)
 
@@ -298,7 +300,7 @@ class Bag:
     def message_index(self, index: ChunkIndex, topic: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return times (ns) and places of the messages of `topic` in a chunk, shape (n,) each.
 
-        Raises RecordingError if its index is damaged.
+        Raises RecordingError if the index is damaged.
         """
         ids, places = self._ids(topic), index.message_index_offsets
         if not places:  # another writer's: the chunk itself says it
@@ -348,7 +350,7 @@ class Bag:
         return summary
 
     def _located(self, wanted: set[int]) -> Iterator[tuple[bytes, list[LocatedMessage]]]:
-        """Yield, in file order, the records of each chunk that holds `wanted`, and where its messages are."""
+        """Yield, in file order, the records of each chunk with `wanted` channels, and the places."""
         indexes = sorted(self._summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
         with self.file.open("rb") as stream:
             for index in indexes:
@@ -366,7 +368,7 @@ class Bag:
 
 
 class LocatedMessage(NamedTuple):
-    """The place of one message in the records of a chunk."""
+    """The place of a message in the records of a chunk."""
 
     channel: int
     time_ns: int
@@ -400,7 +402,7 @@ def _message_at(records: bytes, offset: int, channels: set[int]) -> LocatedMessa
 def chunk_records(chunk: Chunk) -> bytes:
     """Return the uncompressed records of `chunk`, checked against its size and checksum.
 
-    Raises ValueError if it is not what it states or too large, and what the decompressors raise.
+    Raises ValueError if size or checksum differ or the chunk is too large, and the decompressors' errors.
     """
     size = chunk.uncompressed_size
     if size > MAX_CHUNK_BYTES:
@@ -416,7 +418,7 @@ def chunk_records(chunk: Chunk) -> bytes:
 def located_messages(records: bytes) -> Iterator[LocatedMessage]:
     """Find the messages in the records of a chunk.
 
-    Raises ValueError or struct.error if records do not end where they say, or if there are too many.
+    Raises ValueError or struct.error if records do not end at their stated length, or if there are too many.
     """
     for opcode, at, end in _heads(records):
         if opcode == Opcode.MESSAGE:
@@ -425,7 +427,7 @@ def located_messages(records: bytes) -> Iterator[LocatedMessage]:
 
 
 def declarations(records: bytes) -> Iterator[Schema | Channel]:
-    """Yield the schemas and channels in the records of a chunk; raises what `located_messages` raises."""
+    """Yield the schemas and channels in the records of a chunk; raises the errors of `located_messages`."""
     for opcode, at, end in _heads(records):
         if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             stream = ReadDataStream(BytesIO(records[at + _RECORD.size : end]))
@@ -447,10 +449,10 @@ def _heads(records: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def output_port(name: str, type_name: str, payload: bytes) -> Port:
-    """Return the output port that would write messages such as `payload`.
+    """Return the output port for messages such as `payload`.
 
-    Types with a fixed layout are signals, with frame, joint names and sizes as in `payload`; all others
-    events. Raises MessageError.
+    Types with a fixed layout are signals, with frame, joint names and sizes as in `payload`; all remaining
+    types events. Raises MessageError.
     """
     model = message_type(type_name)
     if not has_vector(type_name):

@@ -1,6 +1,6 @@
-"""Bounds for `rosbags`: it unpacks chunks and messages of a bag whole, whatever their unpacked size.
+"""Bounds for `rosbags`: the library unpacks chunks and messages of a bag whole, whatever their unpacked size.
 
-Our decompressors take the places of its own, and refuse large results.
+Our decompressors take the places of the library's, and refuse large results.
 """
 
 from __future__ import annotations

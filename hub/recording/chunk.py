@@ -1,6 +1,6 @@
-"""The messages of one chunk of an MCAP file, laid out by `_chunk.c` or, where it is missing, by numpy.
+"""The messages of a chunk of an MCAP file, laid out by `_chunk.c` or, without the C module, by numpy.
 
-The record types are those of the `mcap` package. Its `Writer` takes messages one by one, at two to three
+The record types come from the `mcap` package. The package's `Writer` adds messages singly, at two to three
 times the cost (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop.
 """
 
@@ -37,12 +37,12 @@ messages); where messages begin in an entry's records, shape (messages,).
 """
 
 Queued = tuple[int, int, bytes]
-"""Number, time (ns) and bytes: of a channel a message, of a block its vectors one after the other."""
+"""Number, time (ns) and bytes: a channel's message, or a block's vectors in their order."""
 
 
 @dataclass(frozen=True)
 class ChunkData:
-    """The records of one chunk, uncompressed, and the channel, time and offset of each message.
+    """The uncompressed records of a chunk, and the channel, time and offset of each message.
 
     The arrays have the shape (messages,).
     """
@@ -54,7 +54,7 @@ class ChunkData:
 
 
 def chunk_data(queued: list[Queued], blocks: Sequence[VectorBlock] = ()) -> ChunkData:
-    """Return what was queued, in this order, as the records of one chunk.
+    """Return the queued messages and vectors, in this order, as the records of a chunk.
 
     Raises ValueError if bytes are no vectors of their block, and OverflowError for a negative time.
     """
@@ -105,7 +105,7 @@ def _located(
 
 
 def _headers(queued: Sequence[Queued]) -> tuple[list[bytes], NDArray[np.int64]]:
-    """Return what is in front of the payload of each message, which stands alone, and the bytes of both."""
+    """Return the bytes in front of the payload of each single message, and the bytes of both."""
     channels, times, payloads = zip(*queued, strict=True)
     sizes = np.fromiter(map(len, payloads), np.int64, len(payloads)) + MESSAGE.itemsize
     headers = np.zeros(len(payloads), MESSAGE)

@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Member:
-    """A recording, and its distance from the root of its tree."""
+    """A recording, and the distance from the root of the tree."""
 
     file: Path
     depth: int
@@ -30,9 +30,8 @@ class Member:
 def family(places: Iterable[Path]) -> Iterator[Member]:
     """Yield the recordings in and below `places`, each followed by its forks, the earliest fork first.
 
-    Of one that is being written, or was cut short, there is what is whole. What is no recording of a
-    session, or cannot be read, is passed over with a line in the log. A fork whose parent is not there stands
-    by itself.
+    An unfinished recording counts with its whole part. Files other than sessions, and unreadable files, are
+    passed over with a line in the log. A fork without its parent here stands by itself.
     """
     found: dict[str, Member] = {}
     for file in sorted({file for place in places for file in _files(place)}):

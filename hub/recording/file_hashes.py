@@ -1,4 +1,4 @@
-"""The hashes of the files that a session reads: a re-simulation compares them with those in the recording."""
+"""The hashes of the files read by a session: a re-simulation compares them with the recorded hashes."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["file_hashes"]
 
 
 def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
-    """Return the SHA-256 of every file that a `Path` in `params` names, by its full path.
+    """Return the SHA-256 of every file named by a `Path` in `params`, keyed by full path.
 
-    Relative paths start at `directory`. A directory stands for all files directly in it.
+    Relative paths start at `directory`. A directory stands for all files directly inside.
     """
     files: set[Path] = set()
     for named in _paths(list(params)):

@@ -1,4 +1,4 @@
-"""The origin of a fork: its parent, the instant, and the changes."""
+"""The origin of a fork: parent, instant and changes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ ATTACHMENT = "fork.json"
 
 
 class ForkOrigin(BaseModel):
-    """The origin of a fork, as its recording states it.
+    """The origin of a fork, as stated in the recording.
 
-    Up to `step` the recording repeats the grants of the parent, so it is complete in itself.
+    Up to `step` the recording repeats the grants of the parent, and so is complete in itself.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -31,13 +31,13 @@ class ForkOrigin(BaseModel):
     changes: tuple[str, ...] = ()
     """Overrides `a.b.c=value`, as given."""
     renewals: tuple[Renewal, ...] = ()
-    """Renewals of the whole session, with those of its ancestors."""
+    """Renewals of the whole session, with the renewals of the ancestors."""
 
 
 def fork_origin(recording: Recording) -> ForkOrigin | None:
-    """Return where a recorded session was forked; None if it was not.
+    """Return the origin of a recorded session; None if the session is no fork.
 
-    Raises RecordingError if what is recorded of it cannot be read.
+    Raises RecordingError if the recorded origin cannot be read.
     """
     text = recording.attachments.get(ATTACHMENT)
     if text is None:

@@ -1,7 +1,7 @@
-"""Writes MCAP files of ROS 2 messages, a whole chunk at a time, and the rosbag2 metadata beside them.
+"""Writes MCAP files of ROS 2 messages, a whole chunk at a time, and the rosbag2 metadata beside the file.
 
-The records are those of the `mcap` package; the many index entries of a chunk are made together. Format:
-https://mcap.dev/spec; rosbag2 metadata version 9 as ROS 2 Jazzy writes it.
+The record types come from the `mcap` package; the many index entries of a chunk are made together. Format:
+https://mcap.dev/spec; rosbag2 metadata version 9, as ROS 2 Jazzy writes.
 """
 
 from __future__ import annotations
@@ -40,11 +40,12 @@ from schemas.errors import RecordingError
 __all__ = ["McapFile", "create_bag", "write_rosbag2_metadata"]
 
 _CHUNK = struct.Struct("<BQQQQII3sQ")
-"""What is in front of a chunk's compressed records (https://mcap.dev/spec#chunk-op0x06)."""
+"""The bytes in front of a chunk's compressed records (https://mcap.dev/spec#chunk-op0x06)."""
 _COPIED_BYTES = 2**20
-"""Of the chunks' indexes at once, when a file is finished."""
+"""Bytes of the chunks' indexes copied at once, when a file is finished."""
 _INDEX_BYTES = 2**16
-"""Of the chunks' indexes in memory: for each call of the system the recorder waits for the interpreter."""
+"""Bytes of the chunks' indexes in memory: for each call of the system the recorder waits for the interpreter.
+"""
 
 
 class McapFile:
@@ -54,7 +55,7 @@ class McapFile:
     """
 
     def __init__(self, path: Path) -> None:
-        """Create the file. Raises OSError if it exists or cannot be written."""
+        """Create the file. Raises OSError if the file exists or cannot be written."""
         self.path = path
         self.schemas: list[Schema] = []
         self.channels: list[Channel] = []
@@ -67,7 +68,7 @@ class McapFile:
         self._index: BinaryIO = TemporaryFile(dir=path.parent, buffering=0)  # noqa: SIM115 - closed in `close`
         self._index_size = 0
         self._indexes_in_memory: list[bytes] = []
-        """Those that are not in the file of indexes yet."""
+        """Indexes not yet in the file of indexes."""
         self._append(MCAP0_MAGIC + _bytes_of(Header("ros2", "trocar")))
 
     def attach(self, name: str, data: bytes) -> None:
@@ -78,14 +79,14 @@ class McapFile:
         self._attachments.append(index)
 
     def declare(self, schema: Schema, channel: Channel) -> None:
-        """Add a channel and, if it is new, its schema, before the first message that uses them."""
+        """Add a channel and, if new, the schema, before the first of the messages."""
         new = schema not in self.schemas
         self._append(_bytes_of(schema, channel) if new else _bytes_of(channel))
         self.schemas += [schema] if new else []
         self.channels.append(channel)
 
     def add_chunk(self, data: ChunkData) -> None:
-        """Compress and append one chunk with its message indexes. Raises OSError with nothing appended."""
+        """Compress and append a chunk with message indexes. Raises OSError with nothing appended."""
         compressed = lz4.frame.compress(data.records)
         start, end = int(data.times_ns.min()), int(data.times_ns.max())
         size, checksum = len(data.records), zlib.crc32(data.records)
@@ -112,7 +113,7 @@ class McapFile:
 
     @property
     def statistics(self) -> Statistics:
-        """Counts and times of what is in the file."""
+        """Counts and times of the file's messages."""
         return Statistics(
             len(self._attachments),
             len(self.channels),
@@ -175,7 +176,7 @@ class McapFile:
         self._index.close()
 
     def _append(self, data: bytes) -> int:
-        """Write `data` at the end and return its offset."""
+        """Write `data` at the end and return the offset."""
         try:
             _write(self._file, data)
         except OSError:
@@ -185,14 +186,14 @@ class McapFile:
         return offset
 
     def _cut(self, size: int) -> None:
-        """Remove all that stands after `size` bytes."""
+        """Remove everything after `size` bytes."""
         self._file.truncate(size)
         self._file.seek(size)
         self.size = size
 
 
 def _write(file: BinaryIO, data: bytes) -> None:
-    """Write all of `data`; one call of an unbuffered file may write less."""
+    """Write all of `data`; a single call of an unbuffered file may write less."""
     rest = memoryview(data)
     while rest:
         rest = rest[file.write(rest) :]
@@ -206,9 +207,9 @@ def _bytes_of(*records: McapRecord) -> bytes:
 
 
 def create_bag(directory: Path) -> McapFile:
-    """Create `directory` and in it the file of a one-file bag.
+    """Create `directory` and, inside, the file of a one-file bag.
 
-    Raises RecordingError if it holds something or cannot be written.
+    Raises RecordingError if the directory holds something or cannot be written.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -225,7 +226,7 @@ def create_bag(directory: Path) -> McapFile:
 
 
 def write_rosbag2_metadata(file: McapFile) -> None:
-    """Write `metadata.yaml` beside `file`, which makes its directory a rosbag2 bag."""
+    """Write `metadata.yaml` beside `file`: the directory becomes a rosbag2 bag."""
     statistics = file.statistics
     types = {schema.id: schema.name for schema in file.schemas}
     when: dict[str, Any] = {

@@ -1,7 +1,7 @@
 """Where the messages of each channel are in a chunk, as records of an MCAP file.
 
-A session has up to two hundred channels, each with an index in every chunk: they are made together.
-Format: https://mcap.dev/spec#message-index-op0x07, https://mcap.dev/spec#chunk-index-op0x08.
+A session has up to two hundred channels, each with an index in every chunk: all are made together. Format:
+https://mcap.dev/spec#message-index-op0x07, https://mcap.dev/spec#chunk-index-op0x08.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ class MessageIndex(NamedTuple):
     counts: NDArray[np.int64]
     """How many messages each channel has."""
     offsets: NDArray[np.int64]
-    """Of each channel's record in `records`."""
+    """Offset of each channel's record in `records`."""
 
 
 def message_index(data: ChunkData) -> MessageIndex:
-    """Return the message index records of a chunk, one of each channel."""
+    """Return the message index records of a chunk, a record for each channel."""
     if compiled is None:
         return _by_numpy(data)
     columns = (data.channels, data.times_ns, data.offsets)
@@ -69,9 +69,9 @@ def _by_numpy(data: ChunkData) -> MessageIndex:
 def chunk_index(
     data: ChunkData, index: MessageIndex, at: int, chunk_bytes: int, compressed_bytes: int
 ) -> bytes:
-    """Return the chunk index record of a chunk, compressed with lz4, that is in the file at `at`.
+    """Return the chunk index record of a chunk, compressed with lz4, in the file at `at`.
 
-    `chunk_bytes` is the length of its record, after which `index` follows.
+    `chunk_bytes` is the length of the chunk's record; `index` follows after the record.
     """
     places = np.empty(len(index.channels), _PLACE)
     places["channel"], places["offset"] = index.channels, index.offsets + (at + chunk_bytes)

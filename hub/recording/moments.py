@@ -1,7 +1,8 @@
-"""The newest message of a topic before an instant, found by the indexes of the file and not by reading it.
+"""The newest message of a topic before an instant, found by the indexes of the file.
 
-The chunk indexes of the summary say between which times the messages of a chunk lie and which channels it
-holds; the message index behind a chunk, where those of one channel are (https://mcap.dev/spec#message-index-op0x07).
+Nothing else of the file is read. The chunk indexes of the summary state the channels of a chunk and the time
+span of the messages; the message index behind a chunk, the places of a channel's messages
+(https://mcap.dev/spec#message-index-op0x07).
 """
 
 from __future__ import annotations
@@ -20,18 +21,18 @@ from schemas.errors import RecordingError, did_you_mean
 __all__ = ["Moments"]
 
 _BYTES_KEPT = 64 * 2**20
-"""Chunks that stay uncompressed, 64 KiB or one picture each: neighbouring instants read the same ones."""
+"""Bytes of chunks kept uncompressed, 64 KiB or a picture each: neighbouring instants read the same chunks."""
 _INDEXES_KEPT = 1024
 
 
 class _Chunks(NamedTuple):
-    """The chunks that may hold messages of a topic, by the time at which they begin."""
+    """The chunks that may hold messages of a topic, by their first time."""
 
     indexes: list[ChunkIndex]
     starts_ns: NDArray[np.int64]
     """Shape (n,), ascending."""
     ends_ns: NDArray[np.int64]
-    """Shape (n,): the latest end of all chunks up to this one."""
+    """Shape (n,): the latest end of all chunks up to this chunk."""
 
 
 class Moments:
@@ -55,9 +56,9 @@ class Moments:
         return min(one.message_start_time for one in found), max(one.message_end_time for one in found)
 
     def newest(self, topic: str, time_ns: int) -> BagMessage | None:
-        """Return the message of `topic` with the greatest time up to `time_ns`, of equal ones the last.
+        """Return the message of `topic` with the greatest time up to `time_ns`; of equal times, the last.
 
-        None if there is none by then. Raises RecordingError for a topic that is not there, or damaged bytes.
+        None if there is none by then. Raises RecordingError for a missing topic or damaged bytes.
         """
         if topic not in self._bag.topics:
             raise RecordingError(

@@ -1,4 +1,4 @@
-"""The numbers of a profile: who takes how much of a core, what a step is made of, why steps were late."""
+"""The numbers of a profile: shares of a core, parts of a step, causes of late steps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from schemas.trocar_msgs import Profile
 __all__ = ["profile_numbers", "profile_tables"]
 
 _LEAST = 0.001
-"""Of a core, or of a step: smaller parts are not in tables."""
+"""Share of a core, or of a step: smaller parts are not in tables."""
 
 _Table = tuple[tuple[str, ...], list[tuple[str, ...]]]
 """The heads of the columns, and the rows."""
@@ -20,7 +20,7 @@ _Table = tuple[tuple[str, ...], list[tuple[str, ...]]]
 def profile_numbers(profile: Profile) -> dict[str, Any]:
     """Return the numbers of a profile, for a summary.
 
-    `core_s_per_sim_s` is the time of processor cores in a simulated second, `by_taker` its parts, the largest
+    `core_s_per_sim_s` is the time of processor cores in a simulated second, `by_taker` the parts, the largest
     first. `step` is the mean step of the stepping thread of each host: the wall time (s) of each of its
     phases, the time of a core (s), and the share of the phase; the hub's phases are the critical path.
     `late_causes` counts the late steps, `worst_steps` are the longest.
@@ -53,7 +53,7 @@ def profile_numbers(profile: Profile) -> dict[str, Any]:
 
 
 def profile_tables(numbers: Mapping[str, Any]) -> Iterator[_Table]:
-    """Yield what `profile_numbers` returns as tables: who takes what, the mean step, late steps."""
+    """Yield the result of `profile_numbers` as tables: shares of a core, the mean step, late steps."""
     parts = {"all": numbers["core_s_per_sim_s"], **numbers["by_taker"]}
     yield (
         ("time of", "core-seconds per simulated second"),

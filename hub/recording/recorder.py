@@ -1,9 +1,9 @@
-"""Records a session to a rosbag2 directory without slowing its steps.
+"""Records a session to a rosbag2 directory without slowing the steps.
 
-`write` puts a message into a bounded queue, or many vectors at once; a thread builds chunks of them,
-compresses and writes these (docs/decisions/0005-recorder.md, docs/decisions/0049-recorder-by-blocks.md).
-Nothing is lost silently: a message that does not fit into the queue, or arrives when the disk is full, is
-counted, logged once, and marks the recording as incomplete.
+`write` puts a message into a bounded queue, or many vectors at once; a thread builds, compresses and writes
+chunks (docs/decisions/0005-recorder.md, docs/decisions/0049-recorder-by-blocks.md). Nothing is lost silently:
+a message too large for the rest of the queue, or arrives when the disk is full, is counted, logged once, and
+marks the recording as incomplete.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ calls were two fifths of the cost (docs/decisions/0061-fewer-calls.md).
 """
 
 MOST_CHUNK_BYTES = 256 * 2**10
-"""What was queued until the thread had its turn goes into the same chunk, up to this much."""
+"""Messages queued until the thread's turn go into the same chunk, up to this size."""
 
 CHUNK_AGE_S = 1.0
 """A chunk is written after this much wall time at the latest."""
@@ -50,7 +50,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class RecorderSummary:
-    """What a recorder did."""
+    """Counts, size and errors of a recording."""
 
     path: Path
     """The rosbag2 directory."""
@@ -59,20 +59,20 @@ class RecorderSummary:
     messages: int
     """Messages in the file."""
     dropped: int
-    """Messages that are not in the file."""
+    """Messages missing in the file."""
     bytes: int
     """Size of the file."""
     error: str | None
-    """Why recording stopped, if it did."""
+    """Why recording stopped early, else None."""
 
 
 class Recorder:
     """Writes channels of CDR messages, all stamped in simulated nanoseconds, to a rosbag2 directory."""
 
     def __init__(self, directory: Path, *, attachments: Mapping[str, bytes]) -> None:
-        """Create the directory and write the attachments, which come first so that they survive a crash.
+        """Create the directory and write the attachments: first, so that a crash does not lose them.
 
-        Raises RecordingError if the directory holds something, or if it cannot be written.
+        Raises RecordingError if the directory holds something, or cannot be written.
         """
         self.directory = directory
         self._file = create_bag(directory)
@@ -97,7 +97,7 @@ class Recorder:
         self._thread.start()
 
     def channel(self, topic: str, type_name: str) -> int:
-        """Return the number under which messages of `topic` are written.
+        """Return the number of the messages of `topic` for `write`.
 
         Raises RecordingError for an unknown type.
         """
@@ -112,20 +112,20 @@ class Recorder:
             return self._channels.index((topic, type_name)) + 1
 
     def block(self, vectors: Sequence[tuple[int, VectorCodec]]) -> int:
-        """Return the number under which vectors, each of a channel, are written together, as their bytes."""
+        """Return the number for `write` of vectors written together as bytes; each vector has its channel."""
         with self._lock:
             self._blocks.append(VectorBlock(vectors))
             return FIRST_BLOCK + len(self._blocks) - 1
 
     def write(self, number: int, time_ns: int, content: bytes) -> None:
-        """Queue the message of a channel, or the vectors of a block, one after the other.
+        """Queue the message of a channel, or the vectors of a block in their order.
 
         Never waits for the disk; may be called from any thread.
         """
         self.write_all([(number, time_ns, content)])
 
     def write_all(self, queued: Sequence[Queued]) -> None:
-        """Queue messages and vectors, all or none of them, as `write` does one."""
+        """Queue messages and vectors, all or none of them, like `write`."""
         size = sum(self._sizes(queued))
         with self._lock:
             before = self._queued_bytes
@@ -138,7 +138,7 @@ class Recorder:
             self._wake.set()
 
     def _sizes(self, queued: Iterable[Queued]) -> list[int]:
-        """Return the bytes of each of what was queued, as records."""
+        """Return the size of each queued message or block as records, bytes."""
         blocks = self._blocks
         return [
             MESSAGE_HEADER_BYTES + len(content) if number < FIRST_BLOCK else blocks[number - FIRST_BLOCK].size
@@ -153,7 +153,7 @@ class Recorder:
         )
 
     def close(self) -> RecorderSummary:
-        """Write what is queued, the summary section and `metadata.yaml`. May be called twice."""
+        """Write the rest of the queue, the summary section and `metadata.yaml`. May be called twice."""
         with self._lock:
             self._closing = self._refusing = True
         self._wake.set()
@@ -204,7 +204,7 @@ class Recorder:
                 self._dropped += self._messages(queue[written:])
 
     def _chunks(self, queue: list[Queued], queued_bytes: int) -> Iterator[list[Queued]]:
-        """Cut `queue` into parts of at most `MOST_CHUNK_BYTES`, each with at least one message."""
+        """Cut `queue` into parts of at most `MOST_CHUNK_BYTES`, each with at least a message."""
         if 0 < queued_bytes <= MOST_CHUNK_BYTES:
             yield queue
             return
@@ -218,7 +218,7 @@ class Recorder:
             yield queue[start:]
 
     def _declare(self, channels: Sequence[tuple[str, str]]) -> None:
-        """Write the channels that are not in the file yet."""
+        """Write the channels still missing in the file."""
         for number, (topic, type_name) in enumerate(
             channels[len(self._file.channels) :], len(self._file.channels) + 1
         ):

@@ -1,4 +1,4 @@
-"""A recorded session: its scenario, grants, acks and values.
+"""A recorded session: scenario, grants, acks and values.
 
 Topics are the session's keys without `trocar/<session>`.
 """
@@ -34,7 +34,7 @@ from schemas.trocar_msgs import AckMessage, CouplingEnergy, GrantMessage, Profil
 __all__ = ["ENERGY_PREFIX", "GRANT_TOPIC", "STATUS_TOPIC", "Recording"]
 
 _OUTPUT = re.compile(r"/(?:engine|device)/([^/]+)/out/(.+)")
-"""A topic that is an output port: participant, port."""
+"""Topic of an output port: participant, port."""
 
 M = TypeVar("M", bound=Message)
 
@@ -46,7 +46,7 @@ ENERGY_PREFIX = topic(_KEYS.energy(""))
 
 
 class Recording(Bag):
-    """The recording of one session, read from a rosbag2 directory or an MCAP file.
+    """The recording of a session, read from a rosbag2 directory or an MCAP file.
 
     Examples:
         ```python
@@ -59,19 +59,19 @@ class Recording(Bag):
 
     @cached_property
     def ports(self) -> dict[str, str]:
-        """The recorded outputs, `participant.port`, each with its ROS type."""
+        """The recorded outputs, `participant.port`, each with the ROS type."""
         return {name: self.topics[topic] for name, topic in sorted(self._ports.items())}
 
     @property
     def participants(self) -> tuple[str, ...]:
-        """Names of all participants that are recorded, in alphabetical order."""
+        """Names of all participants recorded, in alphabetical order."""
         parts = [name.split("/") for name in self.topics]
         return tuple(sorted({part[2] for part in parts if len(part) > 3 and part[1] in ("engine", "device")}))
 
     def __getitem__(self, port: str) -> Series:
-        """Return what an output port published: `participant.port`, or a topic such as `/hub/energy/tip`.
+        """Return the values of an output port: `participant.port`, or a topic such as `/hub/energy/tip`.
 
-        Raises RecordingError if it is not recorded; the message names the nearest one.
+        Raises RecordingError if the port is not recorded; the message names the nearest recorded port.
         """
         topic_name = port if port.startswith("/") else self._ports.get(port)
         if topic_name not in self.topics:
@@ -93,7 +93,7 @@ class Recording(Bag):
         )
 
     def _repr_html_(self) -> str:
-        """Return the table that a notebook shows."""
+        """Return the table shown by a notebook."""
         counts = self.counts
         rows = "".join(
             f"<tr><td>{escape(name)}</td><td>{escape(kind)}</td><td>{counts[self._ports[name]]:,}</td></tr>"
@@ -106,7 +106,7 @@ class Recording(Bag):
         )
 
     def _ipython_key_completions_(self) -> list[str]:
-        """Return what a notebook offers after `recording[`."""
+        """Return a notebook's completions after `recording[`."""
         return list(self.ports)
 
     @cached_property
@@ -121,7 +121,7 @@ class Recording(Bag):
 
     @cached_property
     def _declared(self) -> dict[str, Port]:
-        """The ports as the participants declared them; empty if that is not recorded."""
+        """The ports as the participants declared them; empty if not recorded."""
         if "plan.json" not in self.attachments:
             return {}
         participants = self.plan().participants
@@ -134,7 +134,7 @@ class Recording(Bag):
         return self.file.stem
 
     def scenario(self) -> Scenario:
-        """Return the resolved scenario. Raises RecordingError if the recording is not one of a session."""
+        """Return the resolved scenario. Raises RecordingError if the recording is not of a session."""
         if "scenario.json" not in self.attachments:
             raise RecordingError(f"'{self.file}' holds no scenario: it was not recorded by `trocar run`")
         cannot = f"'{self.file}': this version cannot read the scenario in it{self.made_by_newer()}"
@@ -149,7 +149,7 @@ class Recording(Bag):
             raise RecordingError(f"{cannot}: {type(error).__name__}: {error}") from error
 
     def made_by_newer(self) -> str:
-        """Return a remark if a newer Trocar than the installed one has made the recording; else empty."""
+        """Return a remark if a Trocar newer than the installed version made the recording; else empty."""
         try:
             recorded, own = Version(self.versions().get("trocar", "0")), Version(version("trocar"))
         except (InvalidVersion, RecordingError, PackageNotFoundError):
@@ -159,11 +159,11 @@ class Recording(Bag):
         )
 
     def versions(self) -> dict[str, str]:
-        """Return the version of each installed package at that time; empty if not recorded."""
+        """Return the version of each package installed at the time; empty if not recorded."""
         return self._table("versions.json")
 
     def files(self) -> dict[str, str]:
-        """Return the SHA-256 of each file that the participants read, by path; empty if not recorded."""
+        """Return the SHA-256 of each file read by the participants, keyed by path; empty if not recorded."""
         return self._table("files.json")
 
     def _table(self, name: str) -> dict[str, str]:
@@ -176,7 +176,7 @@ class Recording(Bag):
     def plan(self) -> Plan:
         """Return the plan of the session.
 
-        Raises RecordingError if the recording is not one of a session, or if its plan contradicts itself.
+        Raises RecordingError if the recording is not of a session, or if the plan contradicts itself.
         """
         try:
             plan = Plan.model_validate_json(self.attachments["plan.json"])
@@ -194,9 +194,9 @@ class Recording(Bag):
         return plan
 
     def directory(self) -> Path:
-        """Return the directory in which relative paths of the scenario started.
+        """Return the start directory of the scenario's relative paths.
 
-        Raises RecordingError if the recording is not one of a session.
+        Raises RecordingError if the recording is not of a session.
         """
         origin = self._table("origin.json")
         if "directory" not in origin:
@@ -204,9 +204,9 @@ class Recording(Bag):
         return Path(origin["directory"])
 
     def started_ns(self) -> int:
-        """Return the wall time (ns since 1970) at which the session was started; 0 if not recorded.
+        """Return the wall time of the session's start (ns since 1970); 0 if not recorded.
 
-        Raises RecordingError if what is recorded is no time.
+        Raises RecordingError if the recorded value is no time.
         """
         started = self._table("origin.json").get("started_ns", "0")
         try:
@@ -223,11 +223,11 @@ class Recording(Bag):
         return self.scenario().name if status is None else status[1].session
 
     def grants(self) -> Iterator[GrantMessage]:
-        """Yield the grants in the order in which they were given."""
+        """Yield the grants in their order."""
         return (grant for _, grant in self._decoded(GRANT_TOPIC, GrantMessage))
 
     def last_grant(self) -> GrantMessage | None:
-        """Return the grant that was given last, found by the index; None if there is none."""
+        """Return the grant given last, found by the index; None if there is none."""
         if GRANT_TOPIC not in self.topics:
             return None
         moments = Moments(self)
@@ -246,11 +246,11 @@ class Recording(Bag):
         return self._decoded(ENERGY_PREFIX + bond, CouplingEnergy)
 
     def statuses(self) -> Iterator[tuple[int, SessionStatus]]:
-        """Yield the status that the session published, with the simulated time (ns)."""
+        """Yield the session's published statuses, with the simulated time (ns)."""
         return self._decoded(STATUS_TOPIC, SessionStatus)
 
     def profile(self) -> Profile | None:
-        """Return where the time of the whole run went; None if that was not measured."""
+        """Return where the time of the whole run went; None if not measured."""
         profiles = [profile for _, profile in self._decoded(_PROFILE_TOPIC, Profile)]
         return profiles[-1] if profiles else None
 

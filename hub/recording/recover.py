@@ -1,4 +1,4 @@
-"""Saves the complete part of a recording that was cut short: attachments, channels and whole chunks."""
+"""Saves the complete part of a recording cut short: attachments, channels and whole chunks."""
 
 from __future__ import annotations
 
@@ -32,25 +32,25 @@ __all__ = ["RecoverSummary", "recover"]
 
 @dataclass(frozen=True)
 class RecoverSummary:
-    """What was saved."""
+    """Counts of the saved and the damaged part."""
 
     path: Path
     """The new rosbag2 directory."""
     cut_short: bool
-    """The file had no footer, so it was not closed."""
+    """The file had no footer: the recorder did not close the file."""
     attachments: int
     chunks: int
     messages: int
     damaged_chunks: int
-    """Chunks that stand whole in the file but whose checksum is wrong; they are left out."""
+    """Chunks whole in the file but with a wrong checksum; left out of the copy."""
     end_ns: int
-    """Simulated time of the last message that was saved."""
+    """Simulated time of the last message saved."""
 
 
 def recover(path: Path, output: Path | None = None) -> RecoverSummary:
     """Write the complete part of the recording at `path` to the new rosbag2 directory `output`.
 
-    By default it has the name of the recording with `-recovered` appended. Raises RecordingError if `path` is
+    The default is the name of the recording with `-recovered` appended. Raises RecordingError if `path` is
     not a recording, or if `output` is not empty or cannot be written.
     """
     source = bag_file(path)
@@ -86,13 +86,13 @@ def recover(path: Path, output: Path | None = None) -> RecoverSummary:
 
 
 def _whole(reader: StreamReader) -> Iterator[McapRecord]:
-    """Yield records until the first that is not whole; one may state any length."""
+    """Yield the records up to the first incomplete record; a record may state any length."""
     with suppress(McapError, struct.error, ValueError, OverflowError, MemoryError):
         yield from reader.records
 
 
 class _Copy:
-    """Takes the records of the damaged file over into the new one."""
+    """Copies the records of the damaged file to the new file."""
 
     def __init__(self, target: McapFile) -> None:
         self.target = target
@@ -102,7 +102,7 @@ class _Copy:
         self._declared: set[int] = set()
 
     def add(self, record: McapRecord) -> None:
-        """Copy one record; those of the summary are written anew."""
+        """Copy a record; the records of the summary are written anew."""
         if isinstance(record, Attachment):
             self.target.attach(record.name, record.data)
         elif isinstance(record, Schema):

@@ -1,4 +1,4 @@
-"""Publishes a recorded session again, so that consoles see it as if it were live."""
+"""Publishes a recorded session again, so that consoles show the session as if live."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ __all__ = ["ReplaySummary", "is_replayed", "replay"]
 
 @dataclass(frozen=True)
 class ReplaySummary:
-    """What was published again."""
+    """Counts and times of the messages published again."""
 
     session: str
     messages: int
     by_topic: dict[str, int]
     """Messages published of each topic."""
     sim_time_s: float
-    """Simulated time between the first and the last of them."""
+    """Simulated time between the first and the last message."""
     wall_time_s: float
     interrupted: bool
     """Stopped before the end."""
 
 
 def is_replayed(topic: str) -> bool:
-    """Say whether `topic` is published again: outputs, energy books and the status.
+    """Return whether `topic` is published again: outputs, energy books and the status.
 
-    Grants and acks are not, as they would drive participants.
+    Grants and acks are not: both would drive participants.
     """
     role, _, rest = topic[1:].partition("/")
     return (
@@ -53,10 +53,10 @@ def replay(
     name: str | None = None,
     stop: Event | None = None,
 ) -> ReplaySummary:
-    """Publish the recorded values on the keys of session `name`, by default the recorded one.
+    """Publish the recorded values on the keys of session `name`, by default the recorded name.
 
-    `rate` is simulated seconds per wall second; 0 is as fast as it goes. Ctrl-C, or `stop` set by another
-    thread, ends it early. Raises RecordingError if the recording has no outputs, or if `name` is not
+    `rate` is simulated seconds per wall second; 0 is as fast as possible. Ctrl-C, or `stop` set by another
+    thread, ends the replay early. Raises RecordingError if the recording has no outputs, or if `name` is not
     a session name.
     """
     name = recording.session() if name is None else name
@@ -97,7 +97,7 @@ def replay(
 
 
 class _Player:
-    """Publishes the messages of a recording at its pace, and counts them."""
+    """Publishes the messages of a recording at the recorded pace, and counts."""
 
     def __init__(self, recording: Recording, rate: float, stop: Event) -> None:
         self._recording, self._rate, self._stop = recording, rate, stop
@@ -108,7 +108,7 @@ class _Player:
         self.sim_time_ns = 0
 
     def play(self, publishers: dict[str, zenoh.Publisher]) -> bool:
-        """Publish every message of the topics; return False if it was stopped before the end."""
+        """Publish every message of the topics; return False if stopped before the end."""
         start_ns, begin = None, time.monotonic()
         for message in self._recording.messages(*publishers):
             start_ns = message.time_ns if start_ns is None else start_ns

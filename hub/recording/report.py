@@ -1,4 +1,4 @@
-"""One self-contained HTML page about a recorded session."""
+"""A self-contained HTML page about a recorded session."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ __all__ = ["report"]
 
 
 def report(recording: Recording, output: Path) -> None:
-    """Write the page about `recording` to the file `output`; it loads nothing from anywhere.
+    """Write the page about `recording` to the file `output`; the page loads nothing from anywhere.
 
-    Raises MissingExtraError without matplotlib, RecordingError if the recording is not one of a session or
+    Raises MissingExtraError without matplotlib, RecordingError if the recording is not of a session or
     `output` cannot be written.
     """
     scenario = recording.scenario()
@@ -80,7 +80,7 @@ def _trace(recording: Recording, bond: Bond) -> BondTrace | None:
 
 
 def _first(recording: Recording, bond: str, names: Iterable[str]) -> Series | None:
-    """Return the first of the ports `names` of one side of a bond that is recorded."""
+    """Return the first recorded port among the ports `names` of a side of a bond."""
     return next((recording[f"{bond}/{name}"] for name in names if f"{bond}/{name}" in recording), None)
 
 
@@ -173,7 +173,7 @@ def _profile(recording: Recording) -> str:
 
 
 def _notes(scenario: Scenario) -> str:
-    """Return the section about how far what was computed holds; empty if no participant has notes."""
+    """Return the section about the validity of the results; empty if no participant has notes."""
     rows = list(noted(scenario))
     if not rows:
         return ""

@@ -1,4 +1,4 @@
-"""The canvas of a report's plots: SVG that takes its colours and its width from the page."""
+"""The canvas of a report's plots: SVG with the colours and the width of the page."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _VARIABLES = {
     _GRID: "var(--grid)",
     **{colour: f"var(--series-{i})" for i, colour in enumerate(SERIES)},
 }
-"""Colours that stand for the page's own, which follow the reader's light or dark theme."""
+"""Stand-ins for the page's own colours, light or dark with the reader's theme."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One plot of the page."""
+    """A plot of the page."""
 
     title: str
     svg: str
@@ -40,12 +40,12 @@ class Figure:
 
 
 class Canvas:
-    """What was drawn."""
+    """The drawing."""
 
     text = ""
 
     def svg(self, label: str) -> str:
-        """Return the SVG element, with `label` for those who do not see it."""
+        """Return the SVG element, with `label` for readers without the picture."""
         body = self.text[self.text.index("<svg") :]
         body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
         for colour, variable in _VARIABLES.items():
@@ -119,7 +119,7 @@ def legend(axes: Any) -> None:
 
 
 def thin(x: Vector, y: Vector) -> Sequence[Vector]:
-    """Leave out points of y over x that a page cannot show, but keep the extremes of y."""
+    """Leave out points of y over x too dense for a page, but keep the extremes of y."""
     if len(x) <= _POINTS:
         return x, y
     parts = np.array_split(np.arange(len(x)), _POINTS // 2)

@@ -21,11 +21,12 @@ __all__ = [
 ]
 
 CONTACT_SHARE = 0.05
-"""In contact is where the force exceeds this share of its peak; a virtual coupling that is moved through air
-shows 2 % in the palpation scenario."""
+"""Share of the peak force above which there is contact; a virtual coupling moved through air shows 2 % in the
+palpation scenario.
+"""
 
 _POINTS = 1200
-"""Points of a line of which none is left out for its height."""
+"""Points of a line, all kept whatever their height."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class BondTrace:
 
 
 def press_figure(trace: BondTrace) -> Figure:
-    """Force against depth, one line per contact."""
+    """Force against depth, a line per contact."""
     episodes = trace.episodes()
     depth_mm, magnitude = trace.depth * 1e3, trace.magnitude
     with axes_of("depth (mm)", "force (N)") as (axes, result):
@@ -115,7 +116,7 @@ def force_figure(trace: BondTrace) -> Figure:
 
 
 def motion_figure(trace: BondTrace) -> Figure:
-    """Position over time, from where it started."""
+    """Position over time, from the start position."""
     moved_mm = (trace.position - trace.position[:1]) * 1e3
     with axes_of("time (s)", "displacement (mm)") as (axes, result):
         for i, name in zip(range(moved_mm.shape[1]), "xyz", strict=False):
@@ -129,7 +130,7 @@ def motion_figure(trace: BondTrace) -> Figure:
 
 
 def energy_figures(bond: str, times_s: Vector, motion_j: Vector, force_j: Vector) -> list[Figure]:
-    """The energy book of a bond: works (J, since the start), and what the coupling created or lost."""
+    """The energy book of a bond: works (J since the start), and energy created or lost by the coupling."""
     residual_uj = (force_j - motion_j) * 1e6
     with axes_of("time (s)", "work (mJ)") as (axes, book):
         for i, (label, values, style) in enumerate(
@@ -159,7 +160,7 @@ def energy_figures(bond: str, times_s: Vector, motion_j: Vector, force_j: Vector
 def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) -> list[Figure]:
     """Compute times per step, as a distribution and over time.
 
-    `compute`: of each participant, the times (s) of its steps and their compute times (s), shape (n,).
+    `compute`: for each participant, the times (s) of the steps and the compute times (s), shape (n,).
     """
     caption = "Time a participant computes per step of its own, by the wall clock. " + "; ".join(
         f"{name}: median {np.median(spent) * 1e6:.0f} µs, 99 % below {np.percentile(spent, 99) * 1e6:.0f} µs"

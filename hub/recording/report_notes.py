@@ -1,4 +1,4 @@
-"""What participants have to say in a report about the validity of what they computed, by kind."""
+"""Notes of participants in a report about the validity of their results, by kind."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from schemas.scenario import Scenario
 __all__ = ["GROUP", "noted"]
 
 GROUP = "trocar.notes"
-"""Entry points by kind: functions that take the parameters (a mapping, as the scenario states them) and
-return pairs of what is noted and the text.
+"""Entry points by kind: functions with the parameters (a mapping, as in the scenario) as argument. The result
+is pairs of a subject and a text.
 """
 
 
 def noted(scenario: Scenario) -> Iterator[tuple[str, str, str]]:
-    """Yield participant, what is noted of it, and the text, of kinds that are installed and have notes."""
+    """Yield participant, subject and text of the notes of installed kinds."""
     for name, spec in scenario.participants.items():
         for entry in entry_points(group=GROUP, name=spec.kind):
             try:

@@ -20,7 +20,7 @@ _MM = 1e3
 
 
 def scored(recording: Recording) -> dict[str, ScoreCard]:
-    """Return the last score card of each participant that published one."""
+    """Return the last score card of each participant with a published card."""
     found: dict[str, ScoreCard] = {}
     for port, kind in recording.ports.items():
         if kind == ScoreCard.ros_type:
@@ -31,7 +31,7 @@ def scored(recording: Recording) -> dict[str, ScoreCard]:
 
 
 def score_table(name: str, card: ScoreCard) -> str:
-    """Return the tables of a card as HTML, with bars beside what can be compared."""
+    """Return the tables of a card as HTML, with bars beside comparable values."""
     numbers = score_numbers(card)
     bars = _bars(numbers["metrics"])
     tables: list[str] = []
@@ -52,9 +52,9 @@ def score_table(name: str, card: ScoreCard) -> str:
 
 
 def _bars(metrics: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Return a bar for each metric that has something to be compared with.
+    """Return a bar for each metric with a value to compare.
 
-    Times are shown by the longest, which is the trial's; what each arm has, by the larger of the arms.
+    Times are relative to the longest, the time of the trial; values of an arm, to the larger of the arms.
     """
     groups: dict[str, dict[str, float]] = {}
     for name, one in metrics.items():
@@ -70,12 +70,12 @@ def _bars(metrics: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
 
 
 def _worded(text: str) -> str:
-    """Return a text as HTML, with what stands between backticks as code."""
+    """Return a text as HTML, with parts between backticks as code."""
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def score_figures(recording: Recording, name: str) -> Iterator[Figure]:
-    """Yield the time line of the events of task `name`, and the path of each tip that it watches."""
+    """Yield the time line of the events of task `name`, and the path of each watched tip."""
     events = [
         (time_s, event)
         for port, kind in recording.ports.items()
@@ -114,7 +114,7 @@ def _subject(event: TaskEvent) -> str:
 
 
 def _path(recording: Recording, source: str, arm: str, events: list[tuple[float, TaskEvent]]) -> Figure:
-    """Where a tip went, in its arm's own base, from above and from the front, with the events on it."""
+    """Path of a tip in the frame of the arm's base, from above and from the front, with the events on it."""
     series = recording[source]
     position = (series["position"] - series["position"][:1]) * _MM
     with axes_of("x (mm)", "y, z (mm)") as (axes, result):

@@ -12,14 +12,14 @@ from hub.recording.report_canvas import Figure, axes_of, legend, line_of, thin
 __all__ = ["tissue_figures"]
 
 _LINES = 8
-"""Of insertions: more would look the same."""
+"""Number of insertions drawn: more would look the same."""
 
 
 def tissue_figures(recording: Recording) -> Iterator[Figure]:
     """Yield the figures of every participant with ports of these names.
 
-    `insertion` (m) and `tip_force` (N) give the force on the tip over its way, a line for each time that it
-    went in; `trauma` (m^2) the area between needle and channel.
+    `insertion` (m) and `tip_force` (N) give the tip force over depth, a line for each insertion; `trauma`
+    (m^2) the area between needle and channel.
     """
     for port in recording.ports:
         name, _, kind = port.partition(".")

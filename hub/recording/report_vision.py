@@ -1,4 +1,4 @@
-"""The part of a report about controllers that see: paths of features, and the camera's velocity."""
+"""The part of a report about controllers with a camera: paths of features, and the camera's velocity."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def vision_figures(recording: Recording) -> Iterator[Figure]:
 
     `features` and `features_goal` (x and y of points, px) give their paths in the picture and their distances
     from the goal, `camera_velocity` the velocity, `pose_error` and `pose_deviation` (position in m, rotation
-    vector in rad) the error of an estimate within its own bounds.
+    vector in rad) the error of an estimate within the estimator's bounds.
     """
     for port in recording.ports:
         name, _, kind = port.partition(".")

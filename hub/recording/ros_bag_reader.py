@@ -1,6 +1,6 @@
 """ROS bags, read through `rosbags`: rosbag2 directories, .mcap and .db3 files, .bag files of ROS 1.
 
-Their contents are untrusted: damaged bytes raise RecordingError, or are returned as the error of one message.
+Their contents are untrusted: damaged bytes raise RecordingError, or are returned as the error of a message.
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ __all__ = ["BagTopic", "RosBag"]
 _ZSTD = b"\x28\xb5\x2f\xfd"
 """How a file compressed by Zstandard begins (RFC 8878, 3.1.1)."""
 _SKIPPABLE, _SKIPPABLE_FIRST = b"\x2a\x4d\x18", 5
-"""How a frame that is skipped begins, in front of others: 0x50 to 0x5F, then these (RFC 8878, 3.1.2)."""
+"""How a frame skipped begins, in front of others: 0x50 to 0x5F, then these (RFC 8878, 3.1.2)."""
 _PIECE = 2**20
 _SHARE = 0.5
-"""Of the free space for temporary files: `rosbags` unpacks a bag of compressed files there."""
+"""Share of the free space for temporary files: `rosbags` unpacks a bag of compressed files there."""
 
 
 class BagTopic(NamedTuple):
-    """One topic of a bag."""
+    """A topic of a bag."""
 
     type: str
-    """As ROS 2 writes it, whichever ROS has recorded it: `sensor_msgs/msg/JointState`."""
+    """ROS 2 type, also of a ROS 1 bag: `sensor_msgs/msg/JointState`."""
     messages: int
 
 
 class RosBag:
-    """A bag that is open for reading.
+    """A bag open for reading.
 
-    Messages are read with the definitions that the bag contains, or with ours if it contains none.
+    Messages are read with the definitions in the bag, or with ours if the bag has none.
     """
 
     def __init__(self, path: Path) -> None:
-        """Open a bag. Raises RecordingError if it cannot be read."""
+        """Open a bag. Raises RecordingError if the bag cannot be read."""
         self.path = path
         with _reading(path):
             bound_rosbags()
@@ -70,7 +70,7 @@ class RosBag:
     def messages(self, topics: Collection[str], start_ns: int) -> Iterator[tuple[str, int, object]]:
         """Yield topic, time (ns) and message since `start_ns`, in the order of time.
 
-        The message is as `rosbags` has it, or the exception that decoding it raised. Raises RecordingError.
+        The message is an object of `rosbags`, or the exception of a failed decoding. Raises RecordingError.
         """
         connections: list[Connection] = [one for one in self._reader.connections if one.topic in topics]
         if not connections:
@@ -99,7 +99,7 @@ class RosBag:
 
 
 def _require_bounded(bag: Path) -> None:
-    """Raise RecordingError if a file of a bag is none, or if it is a bomb or does not fit on the disk."""
+    """Raise RecordingError if a file of a bag is none, or is a bomb or does not fit on the disk."""
     space = int(shutil.disk_usage(tempfile.gettempdir()).free * _SHARE)
     for file in sorted(bag.iterdir()) if bag.is_dir() else (bag,):
         if file.is_dir() or not file.exists():  # what is missing is reported by its reader
@@ -130,7 +130,7 @@ def _require_bounded(bag: Path) -> None:
 
 
 def _unpacked_size(file: Path, most: int) -> int:
-    """Return the unpacked size of a file, or a size above `most` as soon as it is known to be larger."""
+    """Return the unpacked size of a file, or a size above `most` once known to be larger."""
     size = 0
     with (
         file.open("rb") as packed,
@@ -143,7 +143,7 @@ def _unpacked_size(file: Path, most: int) -> int:
 
 @contextmanager
 def _reading(path: Path) -> Generator[None]:
-    """Turn every exception that damaged bytes raise in the parsers into a RecordingError."""
+    """Turn every exception of the parsers at damaged bytes into a RecordingError."""
     try:
         yield
     except (RecordingError, GeneratorExit):

@@ -1,4 +1,4 @@
-"""Writes rosbag2 directories (MCAP, profile ros2), as `ros2 bag play` reads them."""
+"""Writes rosbag2 directories (MCAP, profile ros2) for `ros2 bag play`."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from schemas.message import Message
 __all__ = ["BagWriter", "write_bag"]
 
 _METADATA_VERSION = 9
-"""As ROS 2 Jazzy writes it."""
+"""Version of the metadata of ROS 2 Jazzy."""
 _FOREVER = QosTime(9223372036, 854775807)
-"""The largest duration (ns in 64 bits): rosbag2 writes it where there is no deadline, lifespan or lease."""
+"""The largest duration (ns in 64 bits): rosbag2's value for no deadline, no lifespan and no lease."""
 
 
 class BagWriter:
-    """A bag that is being written; when an exception leaves its `with` block, the directory is removed."""
+    """A bag being written; when an exception leaves the `with` block, the directory is removed."""
 
     def __init__(self, directory: Path) -> None:
-        """Create `directory`. Raises RecordingError if it exists or cannot be written."""
+        """Create `directory`. Raises RecordingError if the directory exists or cannot be written."""
         self.directory, self.messages = directory, 0
         self._connections: dict[str, Connection] = {}
         try:
@@ -52,17 +52,17 @@ class BagWriter:
 
     @property
     def topics(self) -> int:
-        """Number of topics with at least one message."""
+        """Number of topics with at least a message."""
         return len(self._connections)
 
     def write(self, topic: str, type_: str, time_ns: int, payload: bytes, *, latched: bool) -> None:
-        """Write one message.
+        """Write a message.
 
         Args:
-            topic: absolute name; type and quality of service are those of its first message.
+            topic: absolute name; type and quality of service are from the first message.
             type_: ROS 2 type: `sensor_msgs/msg/JointState`.
             time_ns: wall time of the message.
-            payload: the message in CDR, with its encapsulation header.
+            payload: the message in CDR, with encapsulation header.
             latched: whether late joiners get the last message of the topic.
 
         Raises:
@@ -93,13 +93,13 @@ class BagWriter:
 
 
 def write_bag(directory: str | Path, rows: Iterable[tuple[str, int, Message]]) -> None:
-    """Write messages as a new rosbag2 directory (MCAP), which `scripted`, `ros-bag` and ROS tools play.
+    """Write messages as a new rosbag2 directory (MCAP), for `scripted`, `ros-bag` and ROS tools.
 
         trocar.write_bag("hand", [("/pose", 0, PoseStamped()), ("/pose", 4_000_000, PoseStamped())])
 
     Args:
-        directory: It must not exist.
-        rows: Topic, time (ns) and message, oldest first. Topics keep one type.
+        directory: Must not exist.
+        rows: Topic, time (ns) and message, oldest first. A topic keeps its type.
 
     Raises:
         RecordingError: The directory exists or cannot be written.
@@ -118,7 +118,7 @@ def write_bag(directory: str | Path, rows: Iterable[tuple[str, int, Message]]) -
 
 
 def _new_writer(directory: Path) -> Writer:
-    """Return the writer of a new directory. Raises WriterError if it exists."""
+    """Return the writer of a new directory. Raises WriterError if the directory exists."""
     writer = Writer(directory, version=_METADATA_VERSION, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     return writer

@@ -39,7 +39,7 @@ def _by_name(values: Iterable[ScoreValue]) -> dict[str, dict[str, Any]]:
 
 
 def score_tables(name: str, numbers: Mapping[str, Any]) -> Iterator[_Table]:
-    """Yield what `score_numbers` returns as tables: metrics of the task `name`, scores, what has no value."""
+    """Yield the result of `score_numbers` as tables: metrics of the task `name`, scores, missing values."""
     groups = {"": numbers["metrics"], **numbers["rules"]}
     without: dict[str, list[str]] = {}
     for group, values in groups.items():

@@ -1,4 +1,4 @@
-"""What one port of a recorded session published, as arrays, messages or a data frame."""
+"""The published values of a port of a recorded session, as arrays, messages or a data frame."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["Series"]
 
 
 class Series:
-    """All values of one recorded port, read when they are first used.
+    """All values of a recorded port, read at their first use.
 
         joints = recording["robot.PSM1/measured_js"]
         joints.time                 # (n,), s, simulated
@@ -33,13 +33,13 @@ class Series:
         joints["position.insertion"]    # (n,), m
 
     Attributes:
-        name: The port, `participant.port`, or the topic, where it is not a port.
-        topic: The topic that holds it.
-        type: The ROS type of its messages.
+        name: The port, `participant.port`, or the topic of a message without a port.
+        topic: The topic in the file.
+        type: The ROS type of the messages.
     """
 
     def __init__(self, bag: Bag, topic: str, name: str, declared: Port | None = None) -> None:
-        """Wrap a topic of `bag`; `declared` is the port as its participant declared it, if known."""
+        """Wrap a topic of `bag`; `declared` is the port as declared by the participant, if known."""
         self.name, self.topic, self.type = name, topic, bag.topics[topic]
         self._bag, self._declared = bag, declared
 
@@ -50,7 +50,7 @@ class Series:
 
     @property
     def frame(self) -> str:
-        """The frame in which the values are expressed; empty if it has none."""
+        """The frame of the values; empty without a frame."""
         return self._port.frame
 
     @property
@@ -91,7 +91,7 @@ class Series:
     def messages(self) -> Iterator[tuple[float, Message]]:
         """Yield simulated time (s) and message, oldest first, of any type.
 
-        Raises RecordingError for a message that is not valid.
+        Raises RecordingError for an invalid message.
         """
         model = message_type(self.type)
         for time_ns, payload in zip(self._times_ns.tolist(), self._content[1], strict=True):
@@ -100,9 +100,9 @@ class Series:
             yield time_ns / 1e9, message
 
     def to_frame(self) -> DataFrame:
-        """Return a pandas data frame with the index `time` (s) and one column for each of `columns`.
+        """Return a pandas data frame with the index `time` (s) and a column for each of `columns`.
 
-        Raises MissingExtraError without pandas, and what `values` raises.
+        Raises MissingExtraError without pandas, and the errors of `values`.
         """
         try:
             from pandas import DataFrame, Index
@@ -113,7 +113,7 @@ class Series:
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """Return a part, shape (n, width) or of a matrix (n, *shape), or a column, shape (n,).
 
-        Raises RecordingError for a name that is in neither `fields` nor `columns`.
+        Raises RecordingError for a name in neither `fields` nor `columns`.
         """
         if name in self._blocks:
             part = self.values[:, self._blocks[name]]
@@ -161,7 +161,7 @@ class Series:
 
     @cached_property
     def _port(self) -> Port:
-        """The port as its first message shows it, else as it was declared."""
+        """The port as in the first message, else as declared."""
         codec = self._codec if has_vector(self.type) else None
         if codec is not None:
             return codec.port

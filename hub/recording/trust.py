@@ -1,6 +1,6 @@
 """The trust check of a recording: without trust, installed kinds and files with recorded contents only.
 
-Anyone may have made a recording. Its scenario, its plan and the renewals of a fork can name any class,
+Anyone may have made a recording. The scenario, the plan and the renewals of a fork can name any class,
 library, FMU or file of this machine; building a participant would run or read it.
 """
 
@@ -33,10 +33,10 @@ def trusted_parameters(
     """Return kinds and parameters of participants, checked before any import and any reading.
 
     Args:
-        recording: The recording; its plan, its scenario and its renewals need not fit together.
+        recording: The recording; plan, scenario and renewals need not fit together.
         names: The participants to be made or drawn.
         directory: The start of relative paths, by default the recorded directory.
-        trust: Allow classes that are not installed, native code, and files with other contents, each with a
+        trust: Allow classes not installed, native code, and files with changed contents, each with a
             line in the log.
 
     Raises TrustError with the list of all demands, RecordingError if plan, scenario and renewals contradict
@@ -111,7 +111,7 @@ def _check_kind(recording: Recording, planned: PlannedParticipant, kind: str) ->
 
 
 def _unseen(kind: str, params: Mapping[str, Any], directory: Path) -> Iterator[str]:
-    """Yield demands refused unseen: a look at a class imports it, a look at a network path signs in there."""
+    """Yield demands refused unseen: a look at a class imports it, a look at a network path signs on there."""
     if names_class(kind):
         yield f"the class '{shown(kind)}', which no installed package has as a kind"
     for text in (str(directory), *_texts(params)):
@@ -120,7 +120,7 @@ def _unseen(kind: str, params: Mapping[str, Any], directory: Path) -> Iterator[s
 
 
 def _asked(kind: str, params: Mapping[str, Any], directory: Path, recorded: set[str]) -> Iterator[str]:
-    """Yield the native code of a participant of an installed kind, and its files with other contents."""
+    """Yield the native code of a participant of an installed kind, and the files with changed contents."""
     model = registry.load(kind).params_model
     code = {str(params[name]) for name in model.native_code if params.get(name) is not None}
     for path in sorted(code | parameter_paths(model, params)):

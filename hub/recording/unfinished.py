@@ -1,4 +1,4 @@
-"""The summary of a recording that has none: it is being written, or was cut short."""
+"""The summary of a recording without a summary: still being written, or cut short."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class _Place(NamedTuple):
 
 
 class Unfinished:
-    """Makes the summary of a file from the heads of its records, and adds to it what is written later.
+    """Makes the summary of a file from the heads of the records, and adds records written later.
 
-    What is not whole yet is left for the next look. Of the last chunk the index may be half written, so it is
-    left out, and readers take the chunk itself.
+    An incomplete record is left for the next look. The index of the last chunk may be half written: the index
+    is left out, and readers read the chunk itself.
     """
 
     def __init__(self, file: Path) -> None:
@@ -48,9 +48,9 @@ class Unfinished:
         self.summary = Summary()
 
     def grow(self) -> bool:
-        """Add what was written since the last look, and return whether there was anything.
+        """Add the records written since the last look, and return whether there were any.
 
-        Raises what the parser raises at damaged bytes.
+        Raises the parser's errors at damaged bytes.
         """
         before, last = len(self.summary.chunk_indexes), None
         with self._file.open("rb") as stream:
@@ -73,7 +73,7 @@ class Unfinished:
         return len(chunks) > before
 
     def _settle(self, stream: BinaryIO, chunk: ChunkIndex | None) -> None:
-        """Take over a chunk after which another record has begun, so that its index is whole."""
+        """Accept a chunk after the beginning of another record: the index is whole."""
         if chunk is None:
             return
         self._chunks = [*self._chunks, chunk]
@@ -101,7 +101,7 @@ class Unfinished:
 
 
 def _whole(stream: BinaryIO, at: int) -> Iterator[_Place]:
-    """Yield the records from a place on, up to the first that is not whole or belongs to the file's end."""
+    """Yield the records from a place on, up to the first incomplete record or the file's end section."""
     size = stream.seek(0, 2)
     while at + _RECORD.size <= size:
         stream.seek(at)
@@ -114,7 +114,7 @@ def _whole(stream: BinaryIO, at: int) -> Iterator[_Place]:
 
 
 def _chunk(stream: BinaryIO, place: _Place) -> ChunkIndex:
-    """Return the index of a chunk, without its channels."""
+    """Return the index of a chunk, without channels."""
     stream.seek(place.start + _RECORD.size)
     start_ns, end_ns, size, _ = _CHUNK.unpack(stream.read(_CHUNK.size))
     reader = ReadDataStream(stream)
@@ -139,7 +139,7 @@ def _index(stream: BinaryIO, place: _Place, chunk: ChunkIndex) -> None:
 
 
 def _statistics(chunks: list[ChunkIndex], counts: dict[int, int]) -> Statistics:
-    """Return times and counts; those of a last chunk without index are not counted."""
+    """Return times and counts; a last chunk without index is not counted."""
     return Statistics(
         attachment_count=0,
         channel_count=0,

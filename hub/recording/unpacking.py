@@ -10,14 +10,15 @@ import zstandard
 __all__ = ["MAX_CHUNK_BYTES", "most_unpacked", "unpack"]
 
 MAX_CHUNK_BYTES = 64 * 2**20
-"""Unpacked size of a chunk or message: ours have 256 KiB, those of ROS and Foxglove some MiB or a picture."""
+"""Unpacked size of a chunk or message: ours have 256 KiB, chunks of ROS and Foxglove some MiB or a picture.
+"""
 
 _RATIO = 255
 """Greatest ratio of lz4: a byte of a match stands for 255 bytes at most (lz4_Block_format.md)."""
 _FREE_BYTES = 256 * 2**20
 """Unpacked size of a file with any ratio."""
 _MAX_WINDOW_BYTES = 2**27
-"""Memory for one zstd frame, as the program `zstd` allows by default (ZSTD_WINDOWLOG_LIMIT_DEFAULT)."""
+"""Memory for a zstd frame, as the program `zstd` allows by default (ZSTD_WINDOWLOG_LIMIT_DEFAULT)."""
 
 
 def most_unpacked(packed_bytes: int) -> int:
@@ -26,10 +27,10 @@ def most_unpacked(packed_bytes: int) -> int:
 
 
 def unpack(compression: str, packed: bytes, most: int = MAX_CHUNK_BYTES) -> bytes:
-    """Return uncompressed bytes; no more than one above `most` are ever in memory.
+    """Return uncompressed bytes; at most `most` + 1 bytes are ever in memory.
 
-    Raises ValueError if there are more or fewer than a whole frame, or for an unknown compression; and what
-    the decompressors raise.
+    Raises ValueError if there are more or fewer than a whole frame, or for an unknown compression; and the
+    decompressors' errors.
     """
     if compression == "lz4":
         frame = lz4.frame.LZ4FrameDecompressor()

@@ -1,8 +1,8 @@
-"""Vectors that are recorded together: of many steps, their bytes become message records at once.
+"""Vectors recorded together: the bytes of many steps become message records at once.
 
-A message of a vector has a fixed length and layout, so all that differs from step to step are times and
-numbers. Where each byte of the records comes from is worked out once; then one call of numpy, which lets go
-of the interpreter, makes the records of many steps.
+A message of a vector has a fixed length and layout, so only times and numbers differ from step to step. The
+source of each byte of the records is worked out once; then a single call of numpy, without the interpreter's
+lock, makes the records of many steps.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ MESSAGE = np.dtype(
         ("publish_time", "<u8"),
     ]
 )
-"""What is in front of a message's payload (https://mcap.dev/spec)."""
+"""Header in front of a message's payload (https://mcap.dev/spec)."""
 RECORD_HEADER_BYTES = 9
-"""Opcode and length, which the length does not count."""
+"""Opcode and length, not counted by the length."""
 
 _TIME = np.dtype([("ns", "<u8"), ("sec", "<i4"), ("nanosec", "<u4")])
-"""A time as MCAP has it, and as a stamp in CDR."""
+"""A time in MCAP, and a stamp in CDR."""
 
 
 _Span = tuple[int, int, int]
-"""Of a part of the vectors its place in the records, its place in the vectors, and its bytes."""
+"""Place of a span in the records, place in the vectors, and length, bytes."""
 Layout = tuple[bytes, int, bytes, bytes, bytes, bytes]
 """Records without times and numbers, the bytes of all vectors, and tables of i64.
 
@@ -46,7 +46,7 @@ vectors, bytes), and messages (channel, place).
 
 
 class VectorBlock:
-    """The records of vectors that are valid at the same time, one after the other.
+    """The records of vectors valid at the same time, in their order.
 
     Args:
         vectors: Channel and codec of each.
@@ -54,18 +54,18 @@ class VectorBlock:
 
     def __init__(self, vectors: Sequence[tuple[int, VectorCodec]]) -> None:
         self.channels = np.array([channel for channel, _ in vectors])
-        """Of each message, shape (vectors,)."""
+        """Channel of each message, shape (vectors,)."""
         sizes = np.array([MESSAGE.itemsize + len(codec.template) for _, codec in vectors])
         ends = np.cumsum(sizes)
         self.offsets: NDArray[np.int64] = ends - sizes
-        """Of each message in the records of one step, shape (vectors,)."""
+        """Offset of each message in the records of a step, shape (vectors,)."""
         self.size = int(ends[-1])
-        """Bytes of the records of one step."""
+        """Bytes of the records of a step."""
         self._template = b"".join(_header(channel, codec) + codec.template for channel, codec in vectors)
         self._vectors = slice(self.size, self.size + sum(8 * codec.size for _, codec in vectors))
         times, stamps, spans = self._tables(vectors)
         self._sources = self._places(times, stamps, spans)
-        """For each byte of the records, its place in template, vectors and time, one after the other."""
+        """For each byte of the records, the place in the concatenated template, vectors and time."""
         self._rows = self._new_rows(0)
         """Template, vectors and time of each step, shape (steps, bytes); the template stays."""
         messages = np.stack((self.channels, self.offsets), axis=1)
@@ -114,7 +114,7 @@ class VectorBlock:
         return rows
 
     def records(self, times_ns: NDArray[np.int64], vectors: Sequence[bytes]) -> list[bytes]:
-        """Return the records of each step: of its time, and the bytes of its vectors one after the other."""
+        """Return the records of each step, from the time and the bytes of the vectors in their order."""
         steps = len(vectors)
         if len(self._rows) < steps:
             self._rows = self._new_rows(steps)

@@ -1,1 +1,1 @@
-"""Connections to hubs, also on other machines: to query their sessions, and to host a device for them."""
+"""Connections to hubs, also on other machines: to query sessions, and to host a device."""

@@ -1,4 +1,4 @@
-"""A process that hosts one device: it joins a session, and joins again when the hub returns."""
+"""The host process of a device: joins a session, and joins again when the hub returns."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _POLL_S = 0.2
 
 
 class DeviceHost:
-    """Keeps one device open, and takes part with it in one run of a session after the other."""
+    """Keeps a device open, and takes part in one run of a session after the other."""
 
     def __init__(
         self,
@@ -52,11 +52,11 @@ class DeviceHost:
         """Prepare a host.
 
         Args:
-            name: Of the device.
+            name: Name of the device.
             connect: Opens a Zenoh session with the hub.
-            keys: Of the session to join, or of `*` for any session of the hub.
-            request: The request with which it joins.
-            directory: Where relative paths start; None: where they do for the hub.
+            keys: Keys of the session to join, or of `*` for any session of the hub.
+            request: The request to join.
+            directory: Where relative paths start; None: in the hub's directory.
         """
         self._name, self._connect, self._keys = name, connect, keys
         self._request, self._directory = request, directory
@@ -69,9 +69,9 @@ class DeviceHost:
         """The run is over: the hub is gone, or the device has failed."""
 
     def serve(self, check: Callable[[], None]) -> None:
-        """Take part in one run after the other, until an error; `check` raises an interrupt that was lost.
+        """Take part in one run after the other, until an error; `check` raises a lost interrupt.
 
-        Raises ConnectError or MessageError if the first one cannot be joined, and ParticipantError if the
+        Raises ConnectError or MessageError if the first run cannot be joined, and ParticipantError if the
         device fails.
         """
         joined, logged = False, ""
@@ -101,7 +101,7 @@ class DeviceHost:
                 self._loop.close()
 
     def _take_part(self, session: zenoh.Session, reply: JoinReply, check: Callable[[], None]) -> None:
-        """Take part in a run until it is over."""
+        """Take part in a run until the end."""
         keys, planned = Keys(reply.session), reply.plan.participants[self._name]
         self._over.clear()
         run = RunInfo(reply.plan, keys, reply.run, reply.admission, reply.live_from_ns)

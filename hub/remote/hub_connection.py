@@ -1,4 +1,4 @@
-"""Connecting to a hub, on this machine or another one, and finding out why that fails."""
+"""Connecting to a hub, on this machine or another, and finding the cause of a failure."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["listens", "obstacle", "reach"]
 _TIMEOUT_S = 3.0
 _STARTING_S = 5.0
 _PUBLISHING_S = 0.2
-"""A hub that listens has published its secret within milliseconds."""
+"""A listening hub publishes the secret within milliseconds."""
 _POLL_S = 0.05
 
 _VERDICTS = {
@@ -37,10 +37,10 @@ def reach(
 ) -> zenoh.Session:
     """Open a Zenoh session with the hub at `endpoint`.
 
-    On the hub's machine that takes the secret of the session, from another one the certificate of `name`.
+    The secret of the session is needed on the hub's machine, the certificate of `name` on any other.
 
     `mode` is Zenoh's, and used on loopback only: from other machines everything goes through the hub. Raises
-    ConnectError, which says how to repair it.
+    ConnectError with the remedy.
     """
     host, port = address(endpoint)
     if is_loopback(endpoint):

@@ -26,17 +26,17 @@ R = TypeVar("R", bound=BaseModel)
 M = TypeVar("M", bound=Message)
 
 _NO_HUB = ConnectError, MessageError, zenoh.ZError
-"""The errors of a query to a server that is no hub."""
+"""The errors of a query to a server other than a hub."""
 
 ANSWER_S = 2.0
-"""A hub answers within a step; a paused one at once."""
+"""Time for an answer: a hub answers within a step, a paused hub at once."""
 
 
 def live_sessions(endpoints: Iterable[str], certificates: Path | None = None) -> list[SessionStatus]:
-    """Return the status of every session whose hub listens on one of `endpoints`.
+    """Return the status of every session with a hub at one of `endpoints`.
 
-    A hub on another machine needs the certificate `observer`, which is read from `certificates`; raises
-    ConnectError if there is no such hub. On this machine, endpoints without a hub are ignored.
+    A hub on another machine needs the certificate `observer`, read from `certificates`; raises ConnectError
+    if there is no such hub. On this machine, endpoints without a hub are ignored.
     """
     statuses = _answers(endpoints, certificates, Keys("*").status, SessionStatus)
     found = {status.session: status for status in statuses}
@@ -44,16 +44,16 @@ def live_sessions(endpoints: Iterable[str], certificates: Path | None = None) ->
 
 
 def live_profiles(endpoints: Iterable[str], certificates: Path | None = None) -> dict[int, Profile]:
-    """Return the profiles of those of these sessions that keep one, by the numbers of their runs.
+    """Return the profile of each session that has a profile, keyed by run number.
 
-    The arguments, and what is raised, are those of `live_sessions`.
+    Arguments and errors are the same as for `live_sessions`.
     """
     profiles = _answers(endpoints, certificates, Keys("*").profile, Profile)
     return {profile.run: profile for profile in profiles}
 
 
 def _answers(endpoints: Iterable[str], certificates: Path | None, key: str, model: type[M]) -> list[M]:
-    """Return what the sessions at `endpoints` answer on `key`."""
+    """Return the answers of the sessions at `endpoints` on `key`."""
     found: list[M] = []
     for endpoint in endpoints:
         if is_loopback(endpoint) and not listens(endpoint):  # a hub that is about to start has no session yet
@@ -75,15 +75,15 @@ def ask_about(
     *,
     session: str | None = None,
 ) -> R:
-    """Send a request to the hub of the session that has `participant`, and return the reply.
+    """Send a request to the hub of the session with `participant`, and return the reply.
 
     Args:
         participant: A participant of the session.
         endpoints: Where hubs listen.
-        verb: The kind of request, as in its key.
+        verb: The kind of request, as in the key.
         request: The request.
         reply_model: The model of the reply.
-        session: The name of the session, if several may have such a participant.
+        session: The name of the session, needed if several have such a participant.
 
     Raises:
         ConnectError: There is no such session on these endpoints, or more than one.
@@ -97,7 +97,7 @@ def ask_about(
 def session_of(
     participant: str, endpoints: Iterable[str], session: str | None = None
 ) -> Generator[tuple[zenoh.Session, Keys]]:
-    """Yield a connection to the session that has `participant`, and its keys; raises as `ask_about` does."""
+    """Yield a connection to the session with `participant`, and its keys; raises like `ask_about`."""
     seen: list[str] = []
     found: list[tuple[zenoh.Session, str]] = []
     with ExitStack() as clients:
@@ -127,7 +127,7 @@ def session_of(
 
 
 def _hub_at(endpoint: str) -> zenoh.Session | None:
-    """Return a session with the hub at `endpoint`; None if what listens there on this machine is none."""
+    """Return a session with the hub at `endpoint`; None if the server there on this machine is no hub."""
     try:
         return reach(endpoint, OBSERVER)
     except ConnectError:

@@ -1,7 +1,7 @@
-"""Conformance checks for participants, a driver of one, and sessions in one process: for tests of plug-ins.
+"""Conformance checks for participants, a driver, and sessions in one process: for tests of plug-ins.
 
 Authors of participants call `check_engine` or `check_device` in their own tests. A failure is an
-AssertionError that quotes the rule of `hub.participant` which is broken.
+AssertionError that quotes the broken rule of `hub.participant`.
 """
 
 from hub.testing.devices import check_device

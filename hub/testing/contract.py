@@ -52,7 +52,7 @@ def check_declarations(participant: Stepped | Device) -> None:
 
 
 def check_message(port: Port, message: Any, where: str) -> None:
-    """Check that a message fits its port; `where`: name of the returning method."""
+    """Check that a message fits the port; `where`: name of the returning method."""
     require(isinstance(message, Message), f"{where} gives messages on '{port.name}', but also {message!r}")
     require(
         message.ros_type == port.type,

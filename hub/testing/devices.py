@@ -27,11 +27,12 @@ def check_device(
 
         trocar.check_device(lambda: Wave("wave", WaveParams(clock="wall")))
 
-    A device in wall time is read for a fifth of a second, one in simulated time for as much simulated time.
+    A device in wall time is read for a fifth of a second, a device in simulated time for as much simulated
+    time.
 
     Args:
-        make: Returns a new instance of the same device, not opened, each time it is called.
-        inputs: Values to write to its input ports before each read; default: the start or neutral value.
+        make: Returns a new instance of the same device, not opened, at each call.
+        inputs: Values to write to the input ports before each read; default: the start or neutral value.
         directory: Where relative paths start.
 
     Raises:
@@ -75,7 +76,7 @@ def _samples(
 
 
 def _read_times(*, simulated: bool) -> Iterator[int]:
-    """Yield the times at which the device is read; in wall time, wait for each."""
+    """Yield the times of reading the device; in wall time, wait for each."""
     start_ns = monotonic_ns()
     for i in range(_READS):
         if not simulated:

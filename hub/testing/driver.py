@@ -1,4 +1,4 @@
-"""One stepped participant, driven by a test."""
+"""A stepped participant, driven by a test."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ __all__ = ["Driver", "start_value"]
 
 
 class Driver:
-    """A configured participant: a test sets its inputs, sends it messages, steps it and reads its outputs.
+    """A configured participant: a test sets inputs, sends messages, makes steps and reads outputs.
 
         driver = Driver(Teleoperation("teleop", TeleoperationParams()), inputs={"scale": [0.2]})
-        driver.set("master", [0.3, -0.1, 0.2, 0.0, 0.0, 0.0, 1.0])     # kept until it is set again
+        driver.set("master", [0.3, -0.1, 0.2, 0.0, 0.0, 0.0, 1.0])     # kept until set again
         driver.send("buttons", Joy(buttons=[1]))                       # arrives in the next step
         driver.step()["servo_jp"]                                      # (6,), rad and m
         driver.stale("master")                                         # the device of this port is silent
@@ -46,7 +46,7 @@ class Driver:
         Args:
             participant: A new instance, not configured.
             period_ns: Duration of a step, in nanoseconds.
-            inputs: Values of signals that have a source; any other signal begins at its start value.
+            inputs: Values of signals with a source; signals without a source begin at the start value.
             bonds: The bonds to connect, by name; default: none.
             directory: Where relative paths start; default: the working directory.
         """
@@ -88,10 +88,10 @@ class Driver:
         self.values[port] = value
 
     def send(self, port: str, *messages: Message) -> None:
-        """Send messages to an event port; they arrive in the next step, after those sent before.
+        """Send messages to an event port; the messages arrive in the next step, after messages sent before.
 
         Raises:
-            SessionError: There is no such event port, or it has another type.
+            SessionError: There is no such event port, or the type differs.
         """
         events = self._inputs.keys() - self.values.keys()
         if port not in events:
@@ -143,7 +143,7 @@ class Driver:
 
 
 def start_value(port: Port) -> Any:
-    """Return the value of an input signal without a source: a vector, or None where its type has none."""
+    """Return the value of an input signal without a source: a vector, or None for a type without one."""
     vector = codec_of(port).vector
     if vector is None:
         return None

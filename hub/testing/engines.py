@@ -36,10 +36,10 @@ def check_engine(
         trocar.check_engine(lambda: Pendulum("pendulum", PendulumParams()), inputs={"torque": [0.1]})
 
     Args:
-        make: Returns a new instance of the same participant, not configured, each time it is called.
-        period_ns: The step to try it with, in nanoseconds; it must work at twice this step as well.
-        inputs: Value of each input that is not to be at its start value; events arrive at every step. The
-            position of a bond's force side moves with its velocity, so a velocity into a contact tests the
+        make: Returns a new instance of the same participant, not configured, at each call.
+        period_ns: The step of the check, in nanoseconds; twice this step must work as well.
+        inputs: Value of each input with another value than the start value; events arrive at every step. The
+            position of a bond's force side moves with the velocity, so a velocity into a contact tests the
             work; on a motion side, a force without torque does.
         bonds: The bonds to connect, by name; default: all, coupled by `impulse`.
         counts_steps: The result depends on the number of steps and not on their length.
@@ -91,7 +91,7 @@ def _bytes(value: Message | tuple[Message, ...]) -> list[bytes]:
 
 
 def _check_restore(rig: Rig) -> None:
-    """After restore(), the steps that followed save() give the same hashes again."""
+    """After restore(), the steps after save() give the same hashes again."""
     try:
         state = rig.participant.save()
     except StateError:
@@ -109,7 +109,7 @@ def _check_restore(rig: Rig) -> None:
 
 
 def _check_step_length(one: Rig, other: Rig) -> None:
-    """A state that moves by itself is another one after a step of twice the length."""
+    """A state that moves by itself differs after a step of twice the length."""
     first, second = one.step(), one.step()
     if second != first:
         require(

@@ -1,4 +1,4 @@
-"""One stepped participant, driven by hand and checked at every step."""
+"""A stepped participant, driven by hand and checked at every step."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class _Surroundings:
 
 
 class Rig:
-    """A configured participant with its inputs; every method raises AssertionError if a rule is broken."""
+    """A configured participant with inputs; every method raises AssertionError if a rule is broken."""
 
     def __init__(
         self,
@@ -83,7 +83,7 @@ class Rig:
 
     @property
     def hash(self) -> int:
-        """The state hash, read twice: it must be the same."""
+        """The state hash, read twice: both must be the same."""
         value = self.participant.state_hash()
         require(
             isinstance(cast(Any, value), int) and 0 <= value < 2**64,
@@ -126,11 +126,11 @@ class Rig:
         return after
 
     def surroundings(self) -> _Surroundings:
-        """Return all that the rig, not the participant, knows between two steps."""
+        """Return the state of the rig, without the participant, between two steps."""
         return _Surroundings(dict(self._values), self.outputs, dict(self._bonds.work), self.time_ns)
 
     def restore_surroundings(self, saved: _Surroundings) -> None:
-        """Return to what `surroundings` gave."""
+        """Return to the state from `surroundings`."""
         self._values, self.outputs, self.time_ns = dict(saved.values), saved.outputs, saved.time_ns
         self._bonds.work = dict(saved.work)
 
@@ -142,7 +142,7 @@ class Rig:
         return start_value(port)
 
     def _checked(self, outputs: Outputs, where: str) -> dict[str, Value]:
-        """Return copies of all outputs that are due now, each checked."""
+        """Return copies of all outputs due now, each checked."""
         expected = [port for port in self._ports if port.causality == "output"]
         extra = sorted(outputs.keys() - {port.name for port in expected} - set(self._works))
         require(not extra, f"{where} returns declared outputs only, but also {extra}")

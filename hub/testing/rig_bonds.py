@@ -1,4 +1,4 @@
-"""The bonds of a participant in the rig: the motion of the other side, and the check of its own work."""
+"""The bonds of a participant in the rig: the motion of the opposite side, and the check of the work."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from schemas.vectors import Vector
 __all__ = ["RigBonds"]
 
 _WORK_TOLERANCE = 0.01
-"""Share by which work may differ from force times displacement: an engine may count at its sub-steps."""
+"""Share by which work may differ from force times displacement: an engine may count at sub-steps."""
 _LEAST_WORK_J = 1e-12
 
 
 class RigBonds:
-    """The connected bonds of one participant, by name."""
+    """The connected bonds of a participant, by name."""
 
     def __init__(self, sides: Mapping[str, BondSide], plans: Mapping[str, BondPlan]) -> None:
         self._sides = {name: sides[name] for name in plans}
@@ -27,7 +27,7 @@ class RigBonds:
         """The work (J) of each bond since the start."""
 
     def move(self, values: dict[str, Any], seconds: float) -> None:
-        """Move the other side of each force side in `values`, the inputs, with its velocity."""
+        """Move the opposite side of each force side in `values`, the inputs, with its velocity."""
         for _, side in self._of_side("force"):
             position, velocity, _ = _ports(side)
             moved = cast("Vector", values[position]).copy()
@@ -45,7 +45,7 @@ class RigBonds:
         before: Mapping[str, Vector],
         seconds: float,
     ) -> None:
-        """Check the work of each bond in a step of `seconds`; `before`: `positions` at its start."""
+        """Check the work of each bond in a step of `seconds`; `before`: `positions` at the start."""
         for name, plan in self._plans.items():
             side = self._sides[name]
             position, velocity, force = _ports(side)

@@ -23,7 +23,7 @@ def run_in_process(
     *,
     directory: Path | None = None,
 ) -> Summary:
-    """Run a scenario with these instances in this process, without a recording, and return its summary.
+    """Run a scenario with these instances in this process, without a recording, and return the summary.
 
         tree = {"name": "swing", "step": "1 ms", "duration": "1 s"}
         summary = trocar.run_in_process(tree, {"pendulum": Pendulum("pendulum", PendulumParams())})
