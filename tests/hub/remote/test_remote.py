@@ -1,6 +1,7 @@
 """A session with participants on another machine: a network namespace of its own stands for it."""
 
 import json
+import os
 import re
 import secrets
 import shutil
@@ -40,7 +41,9 @@ measure:
   fresh_steps: {kind: final, of: deaf.fresh_steps, live: true}
   pressed: {kind: final, of: deaf.pressed, live: true}
 """
-HUB_ADDRESS, OTHER_ADDRESS = "10.213.77.1", "10.213.77.2"
+NETWORK = f"10.213.{os.getpid() % 250}"
+"""Another one in each process: a run that was killed leaves its interface, with its addresses."""
+HUB_ADDRESS, OTHER_ADDRESS = f"{NETWORK}.1", f"{NETWORK}.2"
 
 
 def ip(*words):
