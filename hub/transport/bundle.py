@@ -1,7 +1,7 @@
-"""Bundles: the signals of one participant for a wall-time device or an observer, all of a step in a message.
+"""Bundles: the signals of a participant for a wall-time device or an observer, all of a step in a message.
 
-A gateway to ROS receives a hundred of them at a time. As a message each they took the hub 1.9 ms of a step
-(docs/decisions/0034). Vectors are in it as their numbers alone: both ends know the ports.
+A gateway to ROS receives a hundred signals at a time. As a message each, the signals took the hub 1.9 ms of a
+step (docs/decisions/0034). Vectors are bundled as numbers alone: both ends know the ports.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from schemas.errors import MessageError
 __all__ = ["Bundle", "DeviceBundle", "ObserverBundle", "bundled", "unpacked", "use_mask"]
 
 _HEAD = struct.Struct("<II")
-"""Index of the connection, and the number of bytes of the value that follow."""
+"""Index of the connection, and the number of bytes of the value behind."""
 _WANTED, _UNUSED = b"\1", b"\0"
 
 
 def bundled(plan: Plan, source: str, target: str) -> list[ConnectionToDevice]:
-    """Return the connections in a bundle, those of signals, in the order of their indices."""
+    """Return the connections in a bundle (signals only), in the order of their indices."""
     return [
         outlet
         for outlet in plan.to_devices
@@ -36,14 +36,14 @@ def bundled(plan: Plan, source: str, target: str) -> list[ConnectionToDevice]:
 
 
 def use_mask(ports: Sequence[str], unused: Collection[str]) -> bytes:
-    """Return what a device publishes for the source of a bundle: a byte for each of the inputs `ports`."""
+    """Return a device's message to the source of a bundle: a byte for each of the inputs `ports`."""
     return b"".join(_UNUSED if port in unused else _WANTED for port in ports)
 
 
 class Bundle:
-    """Collects the values of a step and publishes them under `key`.
+    """Collects the values of a step and publishes the bundle under `key`.
 
-    A reader whose connection is congested misses some, and delays no one. `changed` is called whenever
+    A reader on a congested connection misses some values, and delays nobody. `changed` is called whenever
     `needs` may have changed.
     """
 
@@ -69,7 +69,7 @@ class Bundle:
         return bool(self._parts)
 
     def add(self, index: int, payload: bytes) -> None:
-        """Add the value of the connection with this index, as `PortCodec.pack` returns it."""
+        """Add the value of the connection with this index, as returned by `PortCodec.pack`."""
         self._parts += _HEAD.pack(index, len(payload)), payload
 
     def send(self, tag: bytes, *, first: bool = False) -> None:  # noqa: ARG002
@@ -83,17 +83,17 @@ class Bundle:
 
 
 class DeviceBundle(Bundle):
-    """A bundle of the values that a wall-time device needs: as often as it uses them, and only those it uses.
+    """A bundle of the values needed by a wall-time device: only the values in use, as often as used.
 
     Args:
         session: The Zenoh session.
-        key: Under which the values are published.
+        key: The key of the bundle.
         changed: Is called whenever `needs` may have changed.
         use_ns: The time between two uses of the values; 0: each value is used.
-        uses_key: Under which the device publishes what it needs; until it does, that is everything.
+        uses_key: The key of the device's needs; until these are published, the device needs everything.
         count: The number of connections.
         run: The number of the run.
-        refusals: Counts the messages that are refused.
+        refusals: Counts the refused messages.
     """
 
     def __init__(
@@ -134,7 +134,7 @@ class DeviceBundle(Bundle):
     def takes(self, time_ns: int, stride_ns: int) -> bool:
         """Return whether to add the value of `time_ns`, which holds for `stride_ns`.
 
-        It is every n-th value, with the largest n that brings a new one for each use.
+        Every n-th value is added, with the largest n for a new value at each use.
         """
         if self._use_ns >= 2 * stride_ns and time_ns % (self._use_ns // stride_ns * stride_ns):
             return False
@@ -147,10 +147,10 @@ class DeviceBundle(Bundle):
 
 
 class ObserverBundle(Bundle):
-    """A bundle of the values that an observer would read at its own period, and of no others.
+    """A bundle of the values read by an observer at the observer's own period, and of no others.
 
-    The values at time 0 may bring what later ones lack, such as the surface of a soft body: they are sent
-    again before all others to an observer that joins again.
+    The values at time 0 may hold data missing in later values, such as the surface of a soft body: an
+    observer joining again receives the values at time 0 before all others.
     """
 
     def __init__(self, session: zenoh.Session, key: str, changed: Callable[[], None], period_ns: int) -> None:
@@ -164,7 +164,7 @@ class ObserverBundle(Bundle):
         super()._matched()
 
     def takes(self, time_ns: int, stride_ns: int) -> bool:
-        """Return whether to add the value of `time_ns`: it holds at a multiple of the period."""
+        """Return whether the value of `time_ns` holds at a multiple of the period and is to be added."""
         return self._publisher.needed and -time_ns % self._period_ns < stride_ns
 
     def send(self, tag: bytes, *, first: bool = False) -> None:
@@ -178,7 +178,7 @@ class ObserverBundle(Bundle):
 
 
 def unpacked(payload: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield index and bytes of each value in a bundle; raises MessageError if it is invalid."""
+    """Yield index and bytes of each value in a bundle; raises MessageError if invalid."""
     at = 0
     while at < len(payload):
         if len(payload) - at < _HEAD.size:

@@ -1,7 +1,7 @@
 """Cells: the last values of an output port, by the same rules inside a process and between processes.
 
-A value carries the step in which its source computed it (the *tag*; -1 for the value at time 0). Readers ask
-for a tag, never for "the newest", so that the result does not depend on timing or on who runs where.
+A value carries the step of its computation (the *tag*; -1 for the value at time 0). Readers ask for a tag,
+never for "the newest": the result does not depend on timing or on the placement of participants.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ class Receiver(Protocol):
     """Receives the values of a remote cell."""
 
     def receive(self) -> tuple[int, Any]:
-        """Wait for the next valid value; return its tag and the value."""
+        """Wait for the next valid value; return tag and value."""
         ...
 
     def poll(self) -> tuple[int, Any] | None:
-        """Return the next valid value if one has arrived."""
+        """Return the next valid value if any has arrived."""
         ...
 
 
 class Cell:
-    """The last values of one output port of a participant in this process.
+    """The last values of an output port of a participant in this process.
 
     Args:
         period: The source's period, in steps.
         stride: The distance of two values, in steps.
-        depth: The number of values that readers may look back.
+        depth: The number of values readers may look back.
     """
 
     def __init__(self, period: int, stride: int, depth: int) -> None:
@@ -47,7 +47,7 @@ class Cell:
     def put(self, tag: int, value: Any) -> None:
         """Store the value computed in step `tag`.
 
-        An array is copied if readers look back, as its owner may reuse it.
+        An array is copied if readers look back: the owner may reuse the array.
         """
         if self._depth == 1:
             self._values = {tag: value}
@@ -61,15 +61,15 @@ class Cell:
         return self._values[tag]
 
     def tag(self, step: int, *, fresh: bool) -> int:
-        """Return the tag that a reader in `step` sees.
+        """Return the tag for a reader in `step`.
 
-        It is that of the newest step begun (`fresh`), or of the newest step completed by then.
+        This is the tag of the newest step begun (`fresh`), or of the newest step completed by then.
         """
         count = (step + self._period if fresh else step) // self.stride
         return count * self.stride - self._period if count else INITIAL
 
     def valid_from(self, tag: int) -> int:
-        """Return the communication point at which the value of `tag` holds: the end of its step."""
+        """Return the communication point at which the value of `tag` holds: the end of the step."""
         return tag + self._period if tag > INITIAL else 0
 
     def before(self, tag: int) -> int:
@@ -82,7 +82,7 @@ class Cell:
 
 
 class RemoteCell(Cell):
-    """The values of an output port of a participant in another process; `get` waits for them to arrive."""
+    """The values of an output port of a participant in another process; `get` waits for arrival."""
 
     def __init__(self, period: int, stride: int, depth: int, receiver: Receiver) -> None:
         super().__init__(period, stride, depth)
@@ -104,15 +104,15 @@ class RemoteCell(Cell):
             self.put(tag, value)
 
     def take_until(self, tag: int) -> None:
-        """Receive what has arrived up to the value of step `tag`, the next one that is read.
+        """Receive the values arrived up to step `tag`, the next value read.
 
-        A sender waits while too many of its values are not received.
+        A sender waits while too many values are not received.
         """
         while self._newest < tag and (arrived := self._receiver.poll()) is not None:
             self._keep(*arrived)
 
     def get(self, tag: int) -> Any:
-        """Return the value computed in step `tag`, when it has arrived."""
+        """Wait for the value computed in step `tag`, and return the value."""
         while tag not in self._values:
             if self._newest > tag:
                 raise SessionError(

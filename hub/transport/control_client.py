@@ -18,7 +18,7 @@ from schemas.ros import StringMessage
 __all__ = ["ask", "ask_as_child", "join_session"]
 
 _STARTING_S = 5.0
-"""A hub that has only just started to listen answers within this time."""
+"""A hub just started answers within this time."""
 _ANSWER_S = 10.0
 _RETRY_S = 0.1
 
@@ -51,7 +51,7 @@ def ask(
 
 
 def ask_as_child(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[R]) -> R:
-    """Send a control request from a process that ends with the hub, until the hub answers.
+    """Send a control request from a process ending with the hub, until the hub answers.
 
     Raises MessageError if the request is refused.
     """
@@ -64,7 +64,7 @@ def ask_as_child(session: zenoh.Session, key: str, request: BaseModel, reply_mod
 def join_session(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
     """Join a session with a host, and return the hub's reply.
 
-    Raises what `ask` raises; a host that the hub has started waits as long as the hub lives.
+    Raises the errors of `ask`; a host started by the hub waits as long as the hub lives.
     """
     key = keys.join(request.host)
     if request.is_local:

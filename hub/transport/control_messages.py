@@ -1,4 +1,4 @@
-"""Requests and replies of the control queryables: `std_msgs/String` messages that hold JSON."""
+"""Requests and replies of the control queryables: `std_msgs/String` messages with JSON."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Empty(_Json):
 
 
 class Refusal(_Json):
-    """The reply to a request that is refused."""
+    """The reply to a refused request."""
 
     refused: str
 
@@ -52,13 +52,13 @@ class SetRequest(_Json):
 
 
 class JoinRequest(_Json):
-    """A host process joins (first request), and reports that its participants are configured (second)."""
+    """A host process joins (first request), and reports all participants as configured (second)."""
 
     host: Annotated[str, Field(pattern=r"^(remote/)?[A-Za-z][A-Za-z0-9_]*$")]
     pid: int
     ready: bool = False
     watching: bool = False
-    """Its observers have seen the state at time 0."""
+    """Whether the host's observers have seen the state at time 0."""
     bonds: dict[str, tuple[BondSide, ...]] = {}
     failed: str = ""
     """Why the host has failed: `participant: cause`."""
@@ -79,39 +79,40 @@ class ClockReply(_Json):
 
 
 class DescribeReply(_Json):
-    """What a session is: for pages on the hub's machine."""
+    """Description of a session, for pages on the hub's machine."""
 
     session: str
     run: int
     scenario: Scenario
     plan: Plan
     recording: str = ""
-    """The directory to which it is recorded; empty: it is not."""
+    """Directory of the recording; empty without a recording."""
 
 
 class JoinReply(_Json):
-    """All that a host needs to create its participants."""
+    """The data for a host to create the host's participants."""
 
     session: str
     run: int
     admission: int
     """The number of this admission.
 
-    A device's samples carry it, so that those of an earlier host are recognised.
+    A device's samples carry the number: samples of an earlier host are recognised.
     """
     plan: Plan
-    """For another machine, the part of it that concerns the host."""
+    """The plan of the session; for a remote machine, only the part about the host."""
     params: dict[str, dict[str, Any]]
     directory: str
     watched: list[tuple[str, str]]
-    """Outputs, as participant and port, of which the hub needs every value: for a recording or a measure."""
+    """Outputs, as participant and port, with every value needed by the hub: for a recording or a measure."""
     ack_key: str
-    """The key with which the host signs its acks, in hexadecimal digits."""
+    """Key of the signatures of the host's acks, in hexadecimal digits."""
     programs_endpoint: str = ""
-    """Where devices on the hub's machine meet programs outside Trocar; empty on other machines."""
+    """Endpoint shared by devices on the hub's machine and programs outside Trocar; empty on remote machines.
+    """
     profile: bool = False
-    """The host keeps a profile, for which the hub asks."""
+    """Whether the host keeps a profile, collected by the hub."""
     renewals: list[Renewal] = []
-    """Where participants take other parameters."""
+    """Steps at which participants change parameters."""
     live_from_ns: int = 0
-    """Simulated time before which the run repeats a recorded one."""
+    """Simulated time until which the run repeats a recorded run."""

@@ -1,7 +1,7 @@
-"""The text of a control message, with limits that hold before its JSON is parsed.
+"""The text of a control message, with limits checked before the JSON is parsed.
 
-A parser of JSON and the models behind it take time and memory by what a message holds: sixteen nested ones
-held a hub for two minutes.
+A parser of JSON and the models behind the parser take time and memory by the content of a message: sixteen
+nested messages held a hub for two minutes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from schemas.ros import StringMessage
 __all__ = ["MOST_BYTES", "control_text"]
 
 MOST_BYTES = 2**18
-"""The largest value that is set by hand has some thousand numbers."""
+"""The largest value set by hand has some thousand numbers."""
 
 _MOST_NESTED = 16
 """A pose with covariance, as JSON within a request, has 6."""
@@ -25,7 +25,7 @@ _NO_BRACKETS = re.compile(r"[^\[\]{}]+")
 
 
 def control_text(payload: bytes) -> str:
-    """Return the JSON in a `std_msgs/String`; raises MessageError if it is too long or too deeply nested."""
+    """Return the JSON in a `std_msgs/String`; raises MessageError if too long or too deeply nested."""
     if len(payload) > MOST_BYTES:
         raise MessageError(f"{len(payload)} bytes, a control message has at most {MOST_BYTES}")
     text = decode(StringMessage, payload).data

@@ -15,11 +15,11 @@ __all__ = [
 ]
 
 PORTS = range(7447, 7467)
-"""Zenoh's own port, and the next ones for further hubs on the same machine, before any free one."""
+"""Zenoh's own port, and the next ports for further hubs on the same machine, before any free port."""
 
 
 def require_loopback(endpoint: str) -> str:
-    """Return `endpoint` if only this machine can reach it. Raises ScenarioError otherwise."""
+    """Return `endpoint` if only this machine can reach the endpoint. Raises ScenarioError otherwise."""
     if is_loopback(endpoint):
         return endpoint
     raise ScenarioError(

@@ -1,6 +1,6 @@
 """The attachments of messages on Zenoh.
 
-Those of values and samples have run, step or sequence number, and time of sending; those of acks a signature.
+Values and samples have run, step or sequence number, and time of sending; acks have a signature.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _STAMP = struct.Struct("<QQq")
 class Tag:
     """The attachment of every value.
 
-    Run, epoch, step in which it was computed, time it is valid at, index and count of an event batch, and
-    when it was published (by the monotonic clock of its host).
+    Run, epoch, step of computation, time of validity, index and count of an event batch, and time of
+    publication (by the monotonic clock of the publishing host).
     """
 
     __slots__ = ("count", "epoch", "index", "run", "sent_ns", "step", "time_ns")
@@ -44,7 +44,7 @@ class Tag:
 
     @staticmethod
     def pack(run: int, epoch: int, step: int, time_ns: int, index: int = 0, count: int = 1) -> bytes:
-        """Return the bytes of a tag of a value that is published now."""
+        """Return the bytes of the tag of a value published now."""
         return _TAG.pack(run, epoch, step, time_ns, index, count, monotonic_ns())
 
     @classmethod
@@ -60,11 +60,11 @@ class Stamp(NamedTuple):
     """The attachment of every sample of a device."""
 
     admission: int
-    """The number of its host's admission: a device that joins again counts its samples from 1 again."""
+    """Number of the host's admission: a device joining again counts samples from 1 again."""
     sequence: int
-    """Counts the samples of one port."""
+    """Number of the sample among the samples of a port."""
     sent_ns: int
-    """When the device returned it, by the monotonic clock of its host, or in simulated time."""
+    """Time at which the device returned the sample, by the monotonic clock of the host, or simulated time."""
 
     def pack(self) -> bytes:
         """Return the bytes of a stamp."""
@@ -80,5 +80,5 @@ class Stamp(NamedTuple):
 
 
 def signature(payload: bytes, key: bytes) -> bytes:
-    """Return the attachment of an ack; only the host that the hub has given `key` can make it."""
+    """Return the attachment of an ack; only a host with the `key` from the hub can make the attachment."""
     return blake2b(payload, digest_size=8, key=key).digest()

@@ -1,8 +1,8 @@
-"""The link of the hub to a host that it has started: a socket for grants and acks, and a shared number.
+"""The link of the hub to a host started by the hub: a socket for grants and acks, and a shared number.
 
-The socket is made before the process, which inherits its end: it has no name under which another process
-could connect, and none that could be left behind. In the number the host notes which participant it steps:
-the hub knows it without a message of each. Linux only; other hosts have Zenoh.
+The socket is made before the process, and the process inherits an end: without a name no other process can
+connect, and no name can be left behind. In the number the host notes the participant being stepped: the hub
+needs no message of each step for this. Linux only; hosts of remote machines have Zenoh.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from time import sleep
 __all__ = ["IDLE", "HostLink", "HubLink", "has_link"]
 
 IDLE = -1
-"""The shared number of a host that steps no participant."""
+"""The shared number of a host stepping no participant."""
 
 _LENGTH = struct.Struct("<I")
 _ACK = struct.Struct("<HI")
-"""In front of each ack: the place of its participant in the step order of the host, and its length."""
+"""Head of each ack: place of the participant in the step order of the host, and length of the ack."""
 _WORD = 8
 _CHUNK = 4096
 _LOOK_S = 0.02
-"""The hub waits no longer at once: it may have to look elsewhere."""
+"""Longest single wait of the hub: other hosts need attention too."""
 _TIME_LIMIT = struct.pack("@ll", 0, round(_LOOK_S * 1e6))
 """`struct timeval` of socket(7), SO_RCVTIMEO."""
 
@@ -38,21 +38,21 @@ def has_link(host: str) -> bool:
 
 
 class _Messages:
-    """Messages of any length on a stream socket, each with its length in front."""
+    """Messages of any length on a stream socket, each behind a length."""
 
     def __init__(self, stream: socket.socket) -> None:
         self.stream = stream
         self.ended = False
-        """Whether the other process has closed its end, or has ended."""
+        """Whether the process at the far end has closed the socket, or has ended."""
         self._arrived = b""
 
     def send(self, payload: bytes) -> None:
-        """Send a message; nothing if the other process has ended, which the hub's watchdog reports."""
+        """Send a message; nothing if the far process has ended: the hub's watchdog reports the end."""
         with suppress(BrokenPipeError, ConnectionResetError):
             self.stream.sendall(_LENGTH.pack(len(payload)) + payload)
 
     def receive(self, flags: int = 0) -> bytes | None:
-        """Return the next message; None if the time limit of the socket is over, or the other end closed."""
+        """Return the next message; None if the time limit of the socket is over, or the far end closed."""
         while True:
             arrived, end = self._arrived, _LENGTH.size
             if len(arrived) >= end:
@@ -73,7 +73,7 @@ class _Messages:
 
 
 class HubLink:
-    """The hub's end of the link to one host.
+    """The hub's end of the link to a host.
 
     Args:
         names: The stepped participants of the host, in step order.
@@ -92,11 +92,11 @@ class HubLink:
 
     @property
     def inherited(self) -> tuple[int, int]:
-        """The descriptors that the host's process inherits, for `HostLink`."""
+        """The descriptors for the host's process to inherit, for `HostLink`."""
         return self._theirs.fileno(), self._file
 
     def started(self) -> None:
-        """Close what the host's process has inherited, so that its end is the end of the socket."""
+        """Close the descriptors inherited by the host's process: the socket then ends with the process."""
         self._theirs.close()
         if self._file >= 0:
             os.close(self._file)
@@ -104,7 +104,7 @@ class HubLink:
 
     @property
     def passed(self) -> Sequence[str]:
-        """The participants that stand in step order before the one that the host steps now, or did last."""
+        """The participants before the present or last stepped participant in step order."""
         return self._names[: max(self._place[0], 0)]
 
     def send_grant(self, grant: bytes) -> None:
@@ -112,9 +112,9 @@ class HubLink:
         self._messages.send(grant)
 
     def acks(self, *, wait: bool) -> list[tuple[str, bytes]]:
-        """Return participants and acks of the next message; none if it has not arrived.
+        """Return participants and acks of the next message; none if no message has arrived.
 
-        With `wait`, wait for it a moment.
+        With `wait`, wait a moment for a message.
         """
         message = self._messages.receive(0 if wait else socket.MSG_DONTWAIT)
         if message is None:
@@ -139,7 +139,7 @@ class HubLink:
 
 
 class HostLink:
-    """A host's end of its link to the hub.
+    """A host's end of the link to the hub.
 
     Args:
         stream: The descriptor of the socket, inherited from the hub.
@@ -151,21 +151,21 @@ class HostLink:
         self._memory = mmap.mmap(file, _WORD)
         os.close(file)
         self.place = memoryview(self._memory).cast("q")
-        """Of one element: the place of the participant that the host steps, or IDLE."""
+        """Place of the participant being stepped, or IDLE; a single element."""
 
     def grant(self, *, wait: bool) -> bytes | None:
-        """Return the next grant; None if it has not arrived. With `wait`, wait for it."""
+        """Return the next grant; None if no grant has arrived. With `wait`, wait for a grant."""
         grant = self._messages.receive(0 if wait else socket.MSG_DONTWAIT)
         while wait and grant is None:
             sleep(1.0)  # the hub has ended, and so does this process
         return grant
 
     def send_acks(self, acks: Sequence[tuple[int, bytes]]) -> None:
-        """Send acks, each with the place of its participant, in one message."""
+        """Send acks, each with the place of the participant, in a single message."""
         self._messages.send(b"".join(_ACK.pack(place, len(ack)) + ack for place, ack in acks))
 
     def close(self) -> None:
-        """Close the link; the hub takes it for the end of this process."""
+        """Close the link; for the hub this is the end of the process."""
         self._messages.stream.close()
         self.place.release()
         self._memory.close()

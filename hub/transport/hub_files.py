@@ -1,7 +1,7 @@
-"""Where the hubs of this user listen on this machine: a file for each, while it runs.
+"""Files with the endpoints of this user's hubs on this machine: a file for each running hub.
 
-By them `trocar ls` finds hubs at any port. The file of a hub that was killed stays until the next look, which
-finds that no process listens there.
+With these files `trocar ls` finds hubs at any port. The file of a killed hub stays until the next look finds
+no process listening there.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ _PROBE_S = 1.0
 
 @dataclass(frozen=True)
 class HubFile:
-    """What the file of a hub says."""
+    """Content of the file of a hub."""
 
     endpoint: str
     """Where the hub listens on loopback."""
     outside: tuple[str, ...]
-    """Where its gate listens to other machines."""
+    """Endpoints of the gate for remote machines."""
     pid: int
 
 
 @contextmanager
 def hub_file(endpoint: str, outside: Sequence[str]) -> Generator[None]:
-    """Keep the file of a hub of this process, which listens at `endpoint` and at `outside`."""
+    """Keep the file of a hub of this process, listening at `endpoint` and at `outside`."""
     file = private_directory() / f"{address(endpoint)[1]}.json"
     file.write_text(json.dumps(asdict(HubFile(endpoint, tuple(outside), os.getpid()))), encoding="utf-8")
     try:
@@ -44,7 +44,7 @@ def hub_file(endpoint: str, outside: Sequence[str]) -> Generator[None]:
 
 
 def running_hubs() -> list[HubFile]:
-    """Return what the files of hubs say at whose endpoint a process listens; delete the other files."""
+    """Return the contents of the hub files with a process listening at the endpoint; delete the rest."""
     found: list[HubFile] = []
     for file in sorted(private_directory().glob("*.json")):
         try:

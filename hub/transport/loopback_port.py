@@ -16,21 +16,21 @@ from schemas.errors import ConnectError, ScenarioError
 __all__ = ["LoopbackPort", "listening_ports"]
 
 _TRIES = 5
-"""How many free ports are tried, each of which another process may take just before the hub listens."""
+"""Number of free ports tried: another process may bind a port just before the hub listens."""
 
 
 class LoopbackPort:
-    """A port that is given, or a free one that no other process can take before the hub listens there.
+    """A given port, or a free port reserved until the hub listens there.
 
-    Of hubs that start in the same moment each holds a port of its own, by a socket that is bound to it.
+    Of hubs started in the same moment each holds a port of its own, by a socket bound to the port.
     """
 
     def __init__(self, endpoint: str | None = None, ports: Sequence[int] = (*PORTS, 0)) -> None:
-        """Hold a free port if `endpoint` is None or names port 0, which stands for any free one.
+        """Hold a free port if `endpoint` is None or names port 0 (any free port).
 
         Args:
             endpoint: such as tcp/127.0.0.1:7447.
-            ports: of which the first free one is taken if no endpoint is given; 0 for any free one.
+            ports: candidates if no endpoint is given, the first free port wins; 0 for any free port.
 
         Raises ScenarioError if `endpoint` is not on loopback, ConnectError if no port is free.
         """
@@ -38,7 +38,7 @@ class LoopbackPort:
         self._ports: Sequence[int] = ports
         self._held: socket.socket | None = None
         self.endpoint = "" if endpoint is None else require_loopback(endpoint)
-        """Where the hub listens; a port that is not given may become another one in `listen`."""
+        """Endpoint of the hub; unless given, the port may change in `listen`."""
         if endpoint is not None:
             port = address(endpoint)[1]
             self._ports = (0,) if port == 0 else ()
@@ -51,7 +51,7 @@ class LoopbackPort:
         return not self._ports
 
     def another(self) -> LoopbackPort:
-        """Return another free port, chosen as this one was."""
+        """Return another free port, chosen in the same way."""
         return LoopbackPort(ports=self._ports or self._range)
 
     def listen(
@@ -64,8 +64,8 @@ class LoopbackPort:
     ) -> zenoh.Session:
         """Open the Zenoh session of a router on the port, and on the endpoints `listen` too.
 
-        `connect`, `security` and `alone` are those of `open_session`. Raises ConnectError if a port that was
-        given is taken.
+        `connect`, `security` and `alone` are parameters of `open_session`. Raises ConnectError if a given
+        port is taken.
         """
         tries = _TRIES
         while True:
@@ -104,9 +104,9 @@ class LoopbackPort:
 
 
 def listening_ports(endpoints: Iterable[str]) -> tuple[LoopbackPort, list[str]]:
-    """Return the loopback port of a hub, and the endpoints at which its gate listens to other machines.
+    """Return the loopback port of a hub, and the endpoints of the hub's gate for remote machines.
 
-    If `endpoints` has no loopback endpoint, a free port is chosen. Raises ScenarioError if one of them is
+    If `endpoints` has no loopback endpoint, a free port is chosen. Raises ScenarioError if an endpoint is
     neither TCP on loopback nor TLS.
     """
     given = list(endpoints)
@@ -120,7 +120,7 @@ def listening_ports(endpoints: Iterable[str]) -> tuple[LoopbackPort, list[str]]:
 
 
 def _bound(port: int) -> socket.socket | None:
-    """Return a socket that is bound to `port`; None if the port is taken."""
+    """Return a socket bound to `port`; None if the port is taken."""
     held = socket.socket()
     try:
         held.bind(("127.0.0.1", port))

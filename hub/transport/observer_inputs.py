@@ -1,4 +1,4 @@
-"""What an observer receives: the newest state of the simulation that is complete, never a queue of them."""
+"""Inputs of an observer: the newest complete state of the simulation, never a queue of states."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from schemas.keys import Keys
 __all__ = ["ObserverInputs", "State"]
 
 _KEPT = 8
-"""Values of one input that are kept: inputs of one state arrive one after another."""
+"""Number of values kept of an input: the inputs of a state arrive one after another."""
 
 
 class State(NamedTuple):
-    """The inputs of an observer at one moment."""
+    """The inputs of an observer at a moment."""
 
     time_ns: int
-    """When the newest of them holds."""
+    """Time of the newest value."""
     values: dict[str, Any]
-    """By input port."""
+    """Values by input port."""
     sent_ns: int
-    """When the last of them was sent, by the monotonic clock of its host."""
+    """Time at which the last value was sent, by the monotonic clock of the sending host."""
     missed: int
-    """States that were there since the one before and were not taken."""
+    """States complete since the last call and not returned."""
 
 
 class _Value(NamedTuple):
@@ -46,7 +46,7 @@ class _Value(NamedTuple):
 
 
 class ObserverInputs:
-    """Receives the bundles for one observer, until it is closed.
+    """Receives the bundles for an observer, until closed.
 
     Args:
         session: The Zenoh session.
@@ -54,7 +54,7 @@ class ObserverInputs:
         plan: The plan of the session.
         name: The observer.
         run: The number of the run.
-        refusals: Counts the messages that are refused.
+        refusals: Counts the refused messages.
         arrived: Is called, in any thread, when something has arrived.
     """
 
@@ -82,7 +82,7 @@ class ObserverInputs:
             receive = Callback(partial(self._receive, inputs), indirect=False)
             self._subscribers.append(session.declare_subscriber(keys.signals(source, name), receive))
         self._spacing_ns = max(self._period_ns, min(one.stride_ns for one in self._inputs))
-        """Between two states."""
+        """Simulated time between two states."""
 
     def _receive(self, inputs: list[_Input], sample: zenoh.Sample) -> None:
         try:
@@ -100,7 +100,7 @@ class ObserverInputs:
         self._arrived()
 
     def take(self) -> State | None:
-        """Return the newest complete state, unless it was taken before; the first one is that at time 0.
+        """Return the newest complete state, unless returned before; the first is the state at time 0.
 
         Complete means: of every input, the value that holds at a multiple of the period has arrived.
         """
@@ -124,7 +124,7 @@ class ObserverInputs:
         return State(time_ns, values, max(value.sent_ns for value in chosen), missed)
 
     def miss_none(self) -> None:
-        """Count no state as missed that was there before now: the observer has just joined."""
+        """Count no earlier state as missed: the observer has just joined."""
         with self._lock:
             newest_ns = max(value.time_ns for value in self._newest())
             self._seen_ns = max(self._seen_ns or 0, newest_ns - self._spacing_ns)
@@ -146,7 +146,7 @@ class ObserverInputs:
 
 
 class _Input:
-    """One connection to the observer, and the last values that it has brought."""
+    """A connection to the observer, and the last values received over the connection."""
 
     def __init__(self, plan: Plan, outlet: ConnectionToDevice) -> None:
         source = plan.participants[outlet.source]
@@ -157,7 +157,7 @@ class _Input:
         self.recent: deque[_Value] = deque(maxlen=_KEPT)
 
     def keep(self, tag: Tag, payload: bytes) -> None:
-        """Keep a value, unless it is an old one: that at time 0 is repeated until the session begins."""
+        """Keep a value unless old: the value at time 0 is repeated until the session begins."""
         value = _Value(tag.time_ns, payload, tag.sent_ns)
         if tag.step == INITIAL and self.first is None:
             self.first = value
@@ -165,5 +165,5 @@ class _Input:
             self.recent.append(value)
 
     def at(self, time_ns: int) -> _Value:
-        """Return the value that holds at `time_ns`, or the oldest one that is kept."""
+        """Return the value at `time_ns`, or the oldest value kept."""
         return next((value for value in reversed(self.recent) if value.time_ns <= time_ns), self.recent[0])

@@ -1,7 +1,7 @@
-"""What pages see of an output: of a signal some values a second of wall time, of events each message.
+"""The feed of an output for pages: of a signal some values a second of wall time, of events each message.
 
-A page is no reader of the simulation: nothing waits for it, what cannot be sent is dropped, and no value is
-encoded that a page would not show. While none looks, an output costs what it did.
+A page is no reader of the simulation: nothing waits for a page, messages are dropped where sending is
+impossible, and only values for a page are encoded. While no page looks, an output costs nothing more.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from hub.transport.publisher import Publisher
 __all__ = ["PageFeed"]
 
 PERIOD_NS = 16_000_000
-"""Least wall time between two values of a signal: what a display of 60 Hz can show."""
+"""Least wall time between two values of a signal, for a display of 60 Hz."""
 _FIRST_NS = 1_000_000_000
-"""Wall time after which the state at time 0 is repeated: pages come late, and messages may be dropped."""
+"""Wall time until the state at time 0 is repeated: pages come late, and messages may be dropped."""
 
 
 class PageFeed:
@@ -30,8 +30,8 @@ class PageFeed:
 
     Args:
         session: The Zenoh session.
-        key: Under which it is published.
-        codec: Of the port.
+        key: The key of the output for pages.
+        codec: The codec of the port.
         run: The number of the run.
         changed: Is called whenever `needed` may have changed.
     """
@@ -41,7 +41,9 @@ class PageFeed:
     ) -> None:
         self._codec, self._run, self._changed = codec, run, changed
         self._first: tuple[bytes, bytes] | None = None
-        """The state at time 0 of a message, which may hold what later ones lack: the surface of an organ."""
+        """State of a message at time 0, possibly with data missing in later messages: the surface of an
+        organ.
+        """
         self._due_ns = self._first_due_ns = 0
         self._publisher = Publisher(session, key, zenoh.CongestionControl.DROP, self._matched, always=False)
 
@@ -55,12 +57,12 @@ class PageFeed:
         self._changed()
 
     def keep_first(self, time_ns: int, value: Any) -> None:
-        """Keep the value at time 0 of a signal without a vector form, for pages that come later."""
+        """Keep the value at time 0 of a signal without a vector form, for later pages."""
         if self._codec.vector is None and not self._codec.is_event:
             self._first = self._codec.encode(value, time_ns), Tag.pack(self._run, 0, INITIAL, time_ns)
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
-        """Publish the value computed in `step`, valid at `time_ns`; of a signal only if it is due."""
+        """Publish the value computed in `step`, valid at `time_ns`; of a signal only when due."""
         if self._codec.is_event:
             for message in value:
                 self._publisher.put(

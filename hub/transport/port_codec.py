@@ -1,4 +1,4 @@
-"""Values of one port to CDR and back."""
+"""Values of a port to CDR and back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from schemas.vectors import VectorCodec, has_vector
 __all__ = ["PortCodec", "codec_of"]
 
 _PORTS = 4096
-"""Whose codecs are kept: some times the ports of the largest session."""
+"""Number of ports with kept codecs: some times the ports of the largest session."""
 
 
 Layout = tuple[str, str, int, tuple[int, ...], tuple[str, ...], tuple[str, ...], str]
@@ -23,7 +23,7 @@ Layout = tuple[str, str, int, tuple[int, ...], tuple[str, ...], tuple[str, ...],
 
 
 class PortCodec:
-    """Encodes and decodes the values of one port, of any type.
+    """Encodes and decodes the values of a port, of any type.
 
     The newest message is encoded once for all readers and the recorder: a picture has megabytes.
     """
@@ -47,7 +47,7 @@ class PortCodec:
         """Message and CDR."""
 
     def encode(self, value: Any, time_ns: int) -> bytes:
-        """Return one vector or message as CDR."""
+        """Return a vector or message as CDR."""
         return self.vector.encode(value, time_ns) if self.vector is not None else self._encode(value)
 
     def _encode(self, message: Message) -> bytes:
@@ -58,24 +58,24 @@ class PortCodec:
         return payload
 
     def decode(self, payload: bytes) -> Any:
-        """Return the vector or message in `payload`, as a `PortCodec` of the same port has encoded it.
+        """Return the vector or message in `payload`, encoded by a `PortCodec` of the same port.
 
-        Raises MessageError if it is invalid.
+        Raises MessageError if the payload is invalid.
         """
         return self.vector.decode(payload) if self.vector is not None else decode(self._model, payload)
 
     def pack(self, value: Any) -> bytes:
-        """Return a signal's value for a bundle: a vector as its numbers alone, a message as CDR."""
+        """Return a signal's value for a bundle: a vector as numbers alone, a message as CDR."""
         return value.tobytes() if self.vector is not None else self._encode(value)
 
     def unpack(self, payload: bytes) -> Any:
-        """Return the value that a `PortCodec` of the same port has packed; raises MessageError if invalid."""
+        """Return a value packed by a `PortCodec` of the same port; raises MessageError if invalid."""
         return self.vector.unpack(payload) if self.vector is not None else decode(self._model, payload)
 
     def accept(self, payload: bytes) -> Any:
         """Return the vector or message in `payload`, from any sender: joints in any order, frame left out.
 
-        Raises MessageError if it is invalid.
+        Raises MessageError if the payload is invalid.
         """
         if self.vector is not None and (found := self.vector.found(payload)) is not None:
             return found
@@ -88,9 +88,9 @@ class PortCodec:
 
 
 def codec_of(port: Port) -> PortCodec:
-    """Return the codec of a port, the same at every call: it takes 0.1 ms to make.
+    """Return the codec of a port, the same at every call: making a codec takes 0.1 ms.
 
-    An output that is published or recorded has a codec of its own, with its newest message.
+    A published or recorded output has a codec of its own, with the newest message.
     """
     return _kept(cast("Hashable", port))
 

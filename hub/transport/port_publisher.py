@@ -19,21 +19,21 @@ __all__ = ["PortPublisher"]
 
 
 class PortPublisher:
-    """Publishes the values of one output port.
+    """Publishes the values of an output port.
 
     Wall-time devices receive events under a key of their own, and signals in bundles. A step without events
-    is published only for readers that need every value (`always`): dozens of quiet ports cost nothing.
+    is published only for readers in need of every value (`always`): dozens of quiet ports cost nothing.
 
     Args:
         session: The Zenoh session.
         keys: The keys of the session.
         planned: The participant.
-        codec: Codec of its output.
+        codec: Codec of the output.
         run: The number of the run.
         changed: Is called whenever `needed` may have changed.
         always: A reader needs every value from the first on.
-        feeds: Wall-time devices receive its events.
-        bundles: Where its signal goes to wall-time devices and observers, with its index in each.
+        feeds: Wall-time devices receive the events of the port.
+        bundles: Bundles of the signal to wall-time devices and observers, with the signal's index in each.
         stride_ns: The simulated time between two values.
     """
 
@@ -79,7 +79,7 @@ class PortPublisher:
         return bool(self._needed or bundled or self._pages.needed)
 
     def keep_first(self, value: Any) -> None:
-        """Keep the value at time 0 for pages that come later, if later ones may lack something."""
+        """Keep the value at time 0 for later pages, if later values may lack something."""
         self._pages.keep_first(0, value)
 
     def put(self, step: int, time_ns: int, value: Any) -> None:

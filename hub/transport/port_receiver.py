@@ -19,9 +19,9 @@ __all__ = ["PortReceiver"]
 
 
 class PortReceiver:
-    """Receives the values of one output port of another process, in order.
+    """Receives the values of an output port of another process, in order.
 
-    Invalid messages and those of another run are refused and counted.
+    Invalid messages and messages of another run are refused and counted.
     """
 
     def __init__(self, session: zenoh.Session, key: str, port: Port, run: int, refusals: Refusals) -> None:
@@ -33,14 +33,14 @@ class PortReceiver:
         self._subscriber = session.declare_subscriber(key, FifoChannel(4096))
 
     def receive(self) -> tuple[int, Any]:
-        """Wait for the next valid value and return it with its tag's step."""
+        """Wait for the next valid value; return the step in the tag, and the value."""
         while True:
             arrived = self._accept(self._subscriber.recv())
             if arrived is not None:
                 return arrived
 
     def poll(self) -> tuple[int, Any] | None:
-        """Return the next valid value if one has arrived."""
+        """Return the next valid value if any has arrived."""
         while (sample := self._subscriber.try_recv()) is not None:
             arrived = self._accept(sample)
             if arrived is not None:
@@ -67,7 +67,7 @@ class PortReceiver:
         return tag.step, value
 
     def _batched(self, tag: Tag, payload: bytes) -> tuple[Message, ...] | None:
-        """Add an event to those of the same step; return them when all have arrived."""
+        """Add an event to the events of the same step; return all events of the step when complete."""
         batch = self._batch if tag.step == self._batch_step else ()
         if tag.index != len(batch):
             raise MessageError(

@@ -1,4 +1,4 @@
-"""A publisher on Zenoh that knows whether it has subscribers."""
+"""A publisher on Zenoh with knowledge of its subscribers."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ __all__ = ["Publisher"]
 
 
 class Publisher:
-    """Publishes under one key, immediately and with the highest priority.
+    """Publishes under a key, immediately and with the highest priority.
 
     Args:
         session: The Zenoh session.
         key: The key.
-        congestion: What happens to a message that cannot be sent now.
+        congestion: Whether a message is dropped or waits if sending is impossible now.
         changed: Is called whenever `needed` may have changed.
-        always: It is needed without subscribers too.
+        always: Publish without subscribers too.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Publisher:
         self._changed()
 
     def put(self, payload: bytes, tag: bytes | None = None) -> None:
-        """Publish a message with its attachment."""
+        """Publish a message with an attachment."""
         self._publisher.put(payload, attachment=tag)
 
     def close(self) -> None:

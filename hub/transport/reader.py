@@ -1,4 +1,4 @@
-"""How an input is read from the cell of its source, also that of a device in simulated time."""
+"""Reading of an input from the cell of the source, for devices in simulated time too."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from schemas.ports import Port
 __all__ = ["DeviceInputs", "Queue", "Reader", "as_messages"]
 
 Messages = Callable[[Any, int], tuple[Message, ...]]
-"""Makes messages of a value and the time (ns) at which it is valid."""
+"""Makes messages of a value and the time of validity (ns)."""
 
 
 @dataclass(slots=True)
 class Reader:
-    """An input port, the cell that feeds it, and how it is read."""
+    """An input port, the cell feeding the port, and the way of reading."""
 
     port: str
     cell: Cell
     fresh: bool
     linear: bool
     messages: Messages | None
-    """For an event port: makes its messages of a value of the source; None for a signal."""
+    """Function from a value of the source to messages, for an event port; None for a signal."""
     stride_s: float
     seen: int = INITIAL
 
     def events(self, step: int, step_ns: int) -> list[tuple[int, Message]]:
-        """Return what is new in `step` on an event port, oldest first: time of validity (ns) and message."""
+        """Return the new messages in `step` on an event port, oldest first, with times of validity (ns)."""
         if self.messages is None:
             raise ValueError(f"'{self.port}' is a signal")
         cell, tag = self.cell, self.cell.tag(step, fresh=self.fresh)
@@ -46,17 +46,17 @@ class Reader:
 
 @dataclass(slots=True)
 class Queue:
-    """An event port that a neighbour in this process writes to."""
+    """An event port written by a neighbour in this process."""
 
     port: str
     arrived: list[Message] = field(default_factory=list[Message])
-    """Since it was read."""
+    """Messages since the last read."""
 
 
 class DeviceInputs:
     """The connected inputs of a device in simulated time.
 
-    At a communication point they are what all participants had computed by then.
+    At a communication point these are the values computed by all participants until then.
     """
 
     def __init__(self, readers: Sequence[Reader], step_ns: int) -> None:
@@ -78,7 +78,7 @@ class DeviceInputs:
 
 
 def as_messages(source: Port, target: Port) -> Messages | None:
-    """Return the function that makes messages of an event port `target` of a value of `source`.
+    """Return the function making messages of an event port `target` of a value of `source`.
 
     None if the target is a signal.
     """

@@ -1,4 +1,4 @@
-"""Counts and logs messages that are refused: invalid, foreign or late ones."""
+"""Counts and logs refused messages: invalid, foreign or late."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ log = logging.getLogger(__name__)
 
 
 class Refusals:
-    """Counts refused messages by key, and logs the first ones of each key with their sender.
+    """Counts refused messages by key, and logs the first messages of each key with their sender.
 
-    A sender may make up keys without end: beyond some, all are counted under one.
+    A sender may make up keys without end: beyond some keys, all share a count.
 
     May be used from any thread. `report` is called with the key of each refused message.
     """
@@ -35,7 +35,7 @@ class Refusals:
         return sum(self.by_key.values())
 
     def add(self, key: str) -> int:
-        """Count one refusal on `key`; return the count of this key."""
+        """Count a refusal on `key`; return the count of this key."""
         with self._lock:
             if len(self.by_key) >= self._MOST_KEYS and key not in self.by_key:
                 key = "further keys"

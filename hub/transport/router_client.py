@@ -1,4 +1,4 @@
-"""What the hub asks of a device whose own programs connect to the hub's Zenoh router."""
+"""The hub's interface to a device with programs of its own at the hub's Zenoh router."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ __all__ = ["RouterClient"]
 
 @runtime_checkable
 class RouterClient(Protocol):
-    """A device that shares the hub's router with programs outside Trocar, such as a gateway to ROS 2."""
+    """A device sharing the hub's router with programs outside Trocar, such as a gateway to ROS 2."""
 
     @property
     def foreign_keys(self) -> tuple[str, ...]:
-        """Zenoh keys, none of Trocar's own, that the programs and this device use at the hub's router.
+        """Zenoh keys, none of Trocar's own, for the programs and this device at the hub's router.
 
-        Holders of the certificate `console` may use them.
+        Holders of the certificate `console` may use these keys.
         """
         ...
 
     def learn_hub(self, connect: Callable[[], zenoh.Session]) -> None:
-        """Receive, before `open`, a function that opens a Zenoh session of the device's own with the hub."""
+        """Receive, before `open`, a function to open a Zenoh session of the device's own with the hub."""
         ...

@@ -1,8 +1,8 @@
-"""The secret of a session: without it no process of this machine can connect to the hub or to its hosts.
+"""The secret of a session: without the secret no process of this machine can connect to the hub or a host.
 
-Loopback is open to every user of a machine. Zenoh demands user name and password from each that connects; the
-password is random and lasts as long as the hub. It lies in a file that this user alone can read, from where
-hosts and commands take it (docs/decisions/0038-secret-of-a-session.md).
+Loopback is open to every user of a machine. Zenoh demands user name and password for each connection; the
+password is random and lasts as long as the hub. Hosts and commands read the password from a file readable by
+this user alone (docs/decisions/0038-secret-of-a-session.md).
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _SETTINGS = "transport/auth/usrpwd"
 
 
 def private_directory() -> Path:
-    """Return the directory for what the sessions of this user keep while they run; only the user can open it.
+    """Return the directory for files of this user's running sessions; only the user can open the directory.
 
-    Raises ConnectError if it belongs to another user or is open to others.
+    Raises ConnectError if the directory belongs to another user or is open to others.
     """
     user = f"-{os.getuid()}" if hasattr(os, "getuid") else ""  # Windows has a temporary directory per user
     directory = Path(tempfile.gettempdir(), f"trocar{user}")
@@ -59,9 +59,9 @@ def _file(endpoint: str) -> Path:
 
 @contextmanager
 def listen_with_secret(port: LoopbackPort, connect: Sequence[str] = ()) -> Generator[zenoh.Session]:
-    """Open the hub's Zenoh session on `port` with a new secret, and remove the secret when it closes.
+    """Open the hub's Zenoh session on `port` with a new secret; remove the secret at the end.
 
-    `connect`: further endpoints to which the hub connects; these do not demand a secret.
+    `connect`: further endpoints for the hub to connect to; these do not demand a secret.
 
     Raises ConnectError if the port is taken, or if there is no private directory.
     """
@@ -84,9 +84,9 @@ def listen_with_secret(port: LoopbackPort, connect: Sequence[str] = ()) -> Gener
 
 
 def secret_of(endpoint: str) -> dict[str, Any]:
-    """Return Zenoh's settings for a connection to the hub that listens at `endpoint` on this machine.
+    """Return Zenoh's settings for a connection to the hub at `endpoint` on this machine.
 
-    A peer demands the same secret of those that connect to it. Raises ConnectError if no hub of this user
+    A peer demands the same secret for connections to itself. Raises ConnectError if no hub of this user
     listens there.
     """
     file = _file(endpoint)

@@ -1,4 +1,4 @@
-"""A host's connections to other processes, over Zenoh."""
+"""A host's connections to further processes, over Zenoh."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ __all__ = ["Wire"]
 
 
 class Wire:
-    """A host's publishers and receivers on one Zenoh session.
+    """A host's publishers and receivers on a Zenoh session.
 
     Args:
         session: The Zenoh session.
         keys: The keys of the session.
         run: The number of the run.
-        refusals: Counts the messages that are refused.
-        watched: The outputs of which the hub needs every value.
+        refusals: Counts the refused messages.
+        watched: The outputs with every value needed by the hub.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Wire:
         self.changes = 0
         """How often somebody has begun or ceased to receive an output."""
         self.noted = 0
-        """As much of `changes` as the host has noted before the step that it takes."""
+        """Part of `changes` noted by the host before the present step."""
 
     def _count_change(self) -> None:
         self.changes += 1
@@ -86,10 +86,10 @@ class Wire:
         bundles: Sequence[tuple[Bundle, int]],
         stride_ns: int,
     ) -> PortPublisher:
-        """Return a publisher of an output of a participant here; other hosts read it if `is_read`.
+        """Return a publisher of an output of a participant here; remote hosts read the output if `is_read`.
 
-        Wall-time devices receive its events if it `feeds` them; they and observers receive its signal in
-        `bundles`, each with the signal's index in it. `stride_ns` is the simulated time between two values.
+        Wall-time devices receive the events if `feeds`; wall-time devices and observers receive the signal
+        in `bundles`, each with the signal's index. `stride_ns` is the simulated time between two values.
         """
         publisher = PortPublisher(
             self.session,

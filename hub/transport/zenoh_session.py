@@ -13,16 +13,18 @@ from schemas.errors import ConnectError
 __all__ = ["LEASE_MS", "open_session"]
 
 LEASE_MS = 10_000
-"""A peer that is silent for this long is gone.
+"""A peer silent for this long is gone.
 
-The end of a process is known at once, as its sockets close; one on a busy machine may be silent for seconds.
+The end of a process is known at once, by the closing of the sockets; a process on a busy machine may be
+silent for seconds.
 """
 
 
 _EVENT_BATCHES = 16
-"""Batches of 64 KiB for events that wait to be sent, the most that Zenoh allows: three pictures.
+"""Batches of 64 KiB for events waiting to be sent, the most Zenoh allows: three pictures.
 
-With its default, two, the second picture of a stereo pair was dropped now and then while the first was sent.
+With Zenoh's default, two, the second picture of a stereo pair was dropped now and then while the first was
+sent.
 """
 
 
@@ -34,10 +36,10 @@ def open_session(
     security: Mapping[str, Any] | None = None,
     alone: bool = False,
 ) -> zenoh.Session:
-    """Open a Zenoh session without scouting: it listens and connects only at the given endpoints.
+    """Open a Zenoh session without scouting, listening and connecting only at the given endpoints.
 
-    `security`: Zenoh's settings of TLS and of access, as `hub.security.credentials` and `hub.security.access`
-    make them. `alone`: a router that no other router meets; it does not wait half a second for others.
+    `security`: Zenoh's settings of TLS and of access, from `hub.security.credentials` and
+    `hub.security.access`. `alone`: a router without further routers; no wait of half a second for others.
 
     Raises ConnectError if an endpoint cannot be opened or reached.
     """
