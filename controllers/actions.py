@@ -44,7 +44,7 @@ from schemas.vectors import Vector
 __all__ = ["Actions", "ActionsParams"]
 
 _NUMBERS = 5
-"""Of an action of one hand."""
+"""Numbers in an action of a hand."""
 _Point = tuple[Length, Length, Length]
 _Angle = Annotated[Angle, Field(gt=0.0)]
 
@@ -106,7 +106,7 @@ class _HandState(Record):
 
 
 class _Hand:
-    """One arm."""
+    """An arm."""
 
     def __init__(self, arm: ArmName, params: ActionsParams, held: PsmParams) -> None:
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)

@@ -39,7 +39,7 @@ __all__ = ["Caliper", "CaliperParams", "width_of_mesh"]
 _FINGERS, _PHALANGES = len(HAND.fingers), len(HAND.phalanges)
 _SPHERES = _FINGERS * _PHALANGES
 _JAWS = (0, 1)
-"""The fingers that are opposed in the mode `caliper`."""
+"""The fingers opposed in the mode `caliper`."""
 _OPEN, _CLOSED = HAND.command("caliper", 0.0), HAND.command("caliper", 1.0)
 
 
@@ -61,9 +61,9 @@ class CaliperState(Record):
     """Progress of the measurement."""
 
     closing = array(_FINGERS)
-    """Of each finger: 0 open to 1 closed."""
+    """State of each finger: 0 open to 1 closed."""
     touched = array(_FINGERS)
-    """Of each finger: 1 if its tip has felt the organ."""
+    """Flag of each finger: 1 if the tip has felt the organ."""
     started = flag()
     width = number()
     """m; 0: not yet measured."""

@@ -88,7 +88,7 @@ class EcmMastersState(Record):
     """Whether the endoscope's arm is ENABLED and homed."""
     follows = flag()
     middle = array(3)
-    """Between the masters, m."""
+    """Middle between the masters, m."""
     up = array(3)
     """Normal of the plane through the masters and the display's origin."""
     span = array(2)

@@ -59,7 +59,7 @@ _JOINTS = len(ecm.JOINT_NAMES)
 _TURNING, _INSERTION = [0, 1, 3], 2
 
 _CAMERA_IN_HEAD = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-"""From a head's axes (x ahead, y left, z up) to those in which the camera sees (x left, y up, z ahead;
+"""Rotation from a head's axes (x ahead, y left, z up) to the camera's (x left, y up, z ahead;
 robots.dvrk.ecm, tip frame `view`).
 """
 
@@ -174,7 +174,7 @@ class EcmTeleoperationState(Record):
 
 
 class EcmTeleoperation(Controller):
-    """One head, one endoscope.
+    """A head, one endoscope.
 
     Nothing moves while the head's pose is not fresh, the dead-man is released, or the arm is not ready.
     """

@@ -1,6 +1,6 @@
 """The mirror: simulated arms follow the measured states of real ones, for overlays and for comparison.
 
-Each new sample of a real arm becomes one `servo_jp`, with the velocity that was measured, clipped to the
+Each new sample of a real arm becomes one `servo_jp`, with the velocity measured, clipped to the
 simulated arm's ranges. An arm whose real one is silent holds. Two figures measure how well it follows:
 
     distance   from the simulated tip to the real one, both by the simulated arm's kinematics, m
@@ -96,7 +96,7 @@ class Mirror(Controller):
 
 class _ArmState(Record):
     sample = array("n")
-    """Positions that were sent last; NaN: none."""
+    """Positions sent last; NaN: none."""
     jaw_sample = array("jaw")
     sums = array(2)
     """v.(q - q_sim) and v.v, of which the lag is the ratio."""
@@ -108,7 +108,7 @@ class _ArmState(Record):
 
 
 class _Arm:
-    """One arm. All that lasts from step to step is in `state`."""
+    """An arm. All that lasts from step to step is in `state`."""
 
     def __init__(self, name: str, params: PsmParams | EcmParams, max_age_ns: int) -> None:
         self._name, self._chain, self._max_age_ns = name, params.chain, max_age_ns

@@ -52,4 +52,4 @@ _MEANINGS = {
     "feasible_share_without": "share without rolling, with the one grasp that serves most stitches",
     "feasible_share_regrasped": "share without rolling, if the needle is grasped again for each stitch",
 }
-"""By port."""
+"""Descriptions by port."""

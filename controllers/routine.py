@@ -1,8 +1,8 @@
 """A scripted procedure: CRTK commands to the motion controller, in sequence or at the same time.
 
-The routine is a client like any other: it sends a command, waits until the arm's operating state was busy and
-is not busy any more, and continues. A command that is refused, with an event on the arm's `error` or
-`warning`, ends the session with the text of that event.
+The routine is a client like any other: it sends a command, waits until the arm's operating state was busy
+and is not busy any more, and continues. A refused command, with an event on the arm's `error` or `warning`,
+ends the session with the text of that event.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ class RoutineState(Record):
     begun_ns = integer(-1)
     """When the present step began, ns; -1: it has not begun."""
     busy = array("arms")
-    """Of each arm: 0 nothing is awaited, 1 busy is awaited, 2 not busy is awaited."""
+    """State of each arm: 0 nothing is awaited, 1 busy is awaited, 2 not busy is awaited."""
 
 
 class Routine(Controller):

@@ -29,7 +29,7 @@ _CORNERS = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3))) * _SKIN
 _FACES = np.array(
     [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]], np.uint32
 )
-"""Of the box, counter-clockwise from outside."""
+"""Faces of the box, counter-clockwise from outside."""
 _TRIANGLES = np.concatenate([_FACES[:, [0, 1, 2]], _FACES[:, [0, 2, 3]]]).reshape(-1)
 
 

@@ -26,7 +26,7 @@ from schemas.vectors import Vector
 __all__ = ["TipTracker", "TipTrackerParams"]
 
 _UNKNOWN = np.pi**2
-"""rad^2; of an orientation that is not reported."""
+"""rad^2; of an orientation not reported."""
 
 
 class TipTrackerParams(Params):

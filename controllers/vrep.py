@@ -1,9 +1,9 @@
-"""The topics of the V-REP scenes of Ferro et al., over a robot that is simulated here.
+"""The topics of the V-REP scenes of Ferro et al., over a robot simulated here.
 
-Programs that were written for "A Portable da Vinci Simulator in Virtual Reality", 2019, run unchanged: names,
+Programs written for "A Portable da Vinci Simulator in Virtual Reality", 2019, run unchanged: names,
 sizes and mappings are those of the scripts of its scenes (unina-icaros/dvrk-vrep, 88fe5975). Ports are named
 as the topics. As there, desired joint positions go to the joints without a motion controller: here to their
-servos, clipped to the joints' ranges. States are words that are echoed without effect.
+servos, clipped to the joints' ranges. States are words echoed without effect.
 
 docs/decisions/0032 lists the differences.
 """
@@ -133,7 +133,7 @@ class _ArmState(Record):
 
 
 class _Arm:
-    """One arm."""
+    """An arm."""
 
     def __init__(self, name: CartArm, params: PsmParams | EcmParams) -> None:
         self._name, self._joints = name, params.chain.joints
@@ -203,7 +203,7 @@ class _Arm:
         return self.outputs
 
     def _words(self, inputs: Inputs) -> tuple[StringMessage, ...]:
-        """Return the first word at the start, and those that are echoed."""
+        """Return the first word at the start, and those echoed."""
         first = () if self.state.published else (StringMessage(data=_STATES[self._name][1]),)
         self.state.published = True
         return (
@@ -217,7 +217,7 @@ class _Arm:
 
 
 def _fits(desired: JointState, count: int) -> bool:
-    """Say whether a message has `count` finite positions; others are dropped: no topic is for errors."""
+    """Return whether a message has `count` finite positions; others are dropped: no topic is for errors."""
     return desired.position.size == count and bool(np.isfinite(desired.position).all())
 
 

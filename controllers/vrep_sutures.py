@@ -39,7 +39,7 @@ _PLANNER = "suture_planner"
 _POINT = 1e-3
 """m; diameter of a point."""
 _MOST_POINTS = 1000
-"""Of each colour; more replace the oldest, where the authors' scene stops to draw."""
+"""Largest number of points of a colour; more replace the oldest, where the authors' scene stops to draw."""
 _DISC, _THICKNESS = 23e-3, 0.2e-3
 """m; diameter of the disc, which is that of the needle, and its thickness, which is our choice."""
 _LETTERS = 6e-3
@@ -50,7 +50,7 @@ _COLOURS = {
     "disc": ColorRGBA(r=0.2, g=0.8, b=1.0, a=0.4),
     "banner": ColorRGBA(r=1.0, g=0.9, b=0.2, a=1.0),
 }
-"""Of the points as there; the others are our choice."""
+"""Colours of the points as in the authors' scene; the rest are our choice."""
 _FIRST_WORD = "Teleoperation"
 
 

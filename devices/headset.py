@@ -68,7 +68,7 @@ class NoHead:
 
 
 class Runtime(Protocol):
-    """A runtime that is connected."""
+    """A runtime connected."""
 
     @property
     def hardware(self) -> str:

@@ -87,7 +87,7 @@ class Playback:
         self._next = next(self._samples, None)
 
     def due(self, t: int) -> list[Sample]:
-        """Return the samples up to time `t` (ns) that were not returned before, oldest first."""
+        """Return the samples up to time `t` (ns) not returned before, oldest first."""
         due: list[Sample] = []
         while self._next is not None and self._next[0] <= t:
             due.append(self._next[1])

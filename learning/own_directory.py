@@ -1,6 +1,6 @@
-"""Directories that a command of ours has made: marked, used by a single process, and without links.
+"""Directories made by a command of ours: marked, used by a single process, and without links.
 
-A directory may come from somebody else. A link in it would lead what is written, or removed, to other places.
+A directory may come from somebody else. A link there would lead writing, or removal, to a strange place.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from schemas.errors import ScenarioError
 __all__ = ["MARKER", "NewDirectory", "claimed", "whole_file"]
 
 MARKER = ".trocar"
-"""Name of the file that says which command has made a directory; locked while the command runs."""
+"""Name of the file with the command that has made a directory; locked while the command runs."""
 
 if sys.platform == "win32":
     import msvcrt
@@ -37,9 +37,9 @@ else:
 
 @contextmanager
 def claimed(directory: Path, purpose: str) -> Generator[None]:
-    """Make `directory`, or go on with one that was made for `purpose`, and keep other processes out of it.
+    """Make `directory`, or go on with a directory made for `purpose`, and keep other processes out.
 
-    Raises ScenarioError if it holds something else, or a link, or if another process uses it.
+    Raises ScenarioError if the directory holds something else, or a link, or if another process uses it.
     """
     descriptor = _open_marker(directory, purpose)
     try:
@@ -56,7 +56,7 @@ def claimed(directory: Path, purpose: str) -> Generator[None]:
 
 
 def _open_marker(directory: Path, purpose: str) -> int:
-    """Return a descriptor of the marker, which a new or empty directory gets."""
+    """Return a descriptor of the marker; a new or empty directory gets a marker."""
     marker, flags = directory / MARKER, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -87,7 +87,7 @@ def _require_plain(directory: Path) -> None:
 
 @contextmanager
 def whole_file(file: Path) -> Generator[Path]:
-    """Yield the path of a new file that takes the place of `file` in the end, without following links."""
+    """Yield the path of a new file to replace `file` in the end, without following links."""
     part = file.with_suffix(".part")
     part.unlink(missing_ok=True)
     yield part
@@ -95,11 +95,11 @@ def whole_file(file: Path) -> Generator[Path]:
 
 
 class NewDirectory:
-    """A directory in the making, beside its place until `publish`; else nothing is left of it.
+    """A directory in the making, beside its place until `publish`; else nothing is left.
 
     Args:
         place: Place of the finished directory, where nothing or an empty directory stands.
-        purpose: What it is, in one word.
+        purpose: Purpose, in a word.
 
     Raises ScenarioError as `claimed` does.
     """
@@ -134,6 +134,6 @@ class NewDirectory:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Remove what was not published."""
+        """Remove an unpublished directory."""
         shutil.rmtree(self.path, ignore_errors=True)
         self._claim.close()

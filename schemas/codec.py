@@ -1,7 +1,7 @@
 """CDR codecs: every message model to bytes and back, with .msg texts and RIHS01 hashes.
 
-`rosbags` does it all; where there was a compiler, `_cdr.c` encodes: a session encodes thousands of messages
-a second between its steps (docs/decisions/0104-messages-encoded-in-c.md).
+`rosbags` does everything; `_cdr.c`, where a compiler was present, encodes: a session encodes thousands of
+messages a second between its steps (docs/decisions/0104-messages-encoded-in-c.md).
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ _KINDS = {
     "float64": "d",
     "string": "s",
 }
-"""How `_cdr.c` calls them; `m` is a message."""
+"""Kinds of `_cdr.c`; `m` is a message."""
 _ONE, _SEQUENCE = -1, 0
-"""How it counts what is no array of fixed length."""
+"""Counts in `_cdr.c` of a single value and of a sequence."""
 
 M = TypeVar("M", bound=Message)
 
@@ -105,10 +105,10 @@ def encode(message: Message) -> bytes:
 
 
 def encode_as(model: type[Message], values: object) -> bytes:
-    """Return the message of type `model` that has the attributes of `values`, in CDR.
+    """Return the message of type `model` with the attributes of `values`, in CDR.
 
-    Numbers may be in lists, and are not validated: it is for the step loop, which has made them. Raises
-    MessageError for values that such a message cannot have.
+    Numbers may be in lists, and are not validated: the step loop has made them. Raises MessageError for
+    values that such a message cannot have.
     """
     encoder = _encoder(model, lists=True)
     encoded = None if encoder is None else encoder.encode(values)
@@ -128,7 +128,7 @@ def _encoder(model: type[Message], *, lists: bool) -> Encoder | None:
 
 
 def _field(text: str, *, lists: bool) -> tuple[str, int, Encoder | None]:
-    """Return kind, count and, of a message, encoder of a field, from its type as a .msg file has it."""
+    """Return kind, count and, for a message, encoder of a field, from the field's type in a .msg file."""
     element, is_array, count = text.partition("[")
     number = int(count[:-1] or _SEQUENCE) if is_array else _ONE
     if element in _KINDS:
@@ -161,9 +161,9 @@ def decode(model: type[M], payload: bytes) -> M:
 
 
 def check_first_sequence(model: type[Message], length: bytes, order: Literal["big", "little"]) -> None:
-    """Refuse a message that begins with a longer sequence than its type allows, before it is read.
+    """Refuse a message with a first sequence longer than the type allows, before reading the message.
 
-    `length`: its first four bytes, in byte `order`. Raises MessageError.
+    `length`: first four bytes of the message, in byte `order`. Raises MessageError.
     """
     field, most = _first_sequence(model)
     if field and (count := int.from_bytes(length, order)) > most:
@@ -172,7 +172,7 @@ def check_first_sequence(model: type[Message], length: bytes, order: Literal["bi
 
 @cache
 def _first_sequence(model: type[Message]) -> tuple[str, int]:
-    """Return name and greatest length of the first field if that is a list of limited length."""
+    """Return name and greatest length of the first field if the field is a list of limited length."""
     for name, field in model.model_fields.items():
         for mark in field.metadata:
             if isinstance(mark, MaxLen):
@@ -182,9 +182,9 @@ def _first_sequence(model: type[Message]) -> tuple[str, int]:
 
 
 def validated(model: type[M], raw: object) -> M:
-    """Return the message of type `model` that has the fields of `raw`, a message of `rosbags`.
+    """Return the message of type `model` with the fields of `raw`, a message of `rosbags`.
 
-    Raises MessageError if a value is out of its range.
+    Raises MessageError if a value is out of range.
     """
     try:
         return model.model_validate(raw, from_attributes=True)
@@ -202,6 +202,6 @@ def rihs01(name: str) -> str:
 
 @cache
 def ros2msg_definition(name: str) -> str:
-    """Return the definition of `name` and of every type it contains, in MCAP's `ros2msg` schema encoding."""
+    """Return the definition of `name` and of every type contained, in MCAP's `ros2msg` schema encoding."""
     text, _ = typestore().generate_msgdef(name, ros_version=2)
     return text

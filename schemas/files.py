@@ -39,7 +39,7 @@ class Files:
         """Return the full path of a file or a directory of files; a missing file is left to its reader.
 
         Raises ValueError for a pipe, a device or any other irregular file, for a file that is too large, and
-        for contents that are not allowed.
+        for contents not allowed.
         """
         if str(self.directory / path).startswith(("\\\\", "//")) and self._hashes is not None:
             raise ValueError(f"the network path '{path}' is not looked at")

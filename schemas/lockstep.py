@@ -1,8 +1,8 @@
-"""Grants and acks as the step loop has them, to CDR and back: needed in every step.
+"""Grants and acks as the step loop uses them, to CDR and back: needed in every step.
 
-What they are made of is not validated once more (the tests compare their bytes with those of `GrantMessage`
-and `AckMessage`). Acks without an error are unpacked here, at a tenth of the cost of `decode`; those with one
-go through it, and so does a grant with samples.
+Values are not validated again (the tests compare the bytes with `GrantMessage` and `AckMessage`). Acks
+without an error are unpacked here, at a tenth of the cost of `decode`; acks with an error go through
+`decode`, and so does a grant with samples.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _GRANT = struct.Struct("<4sQI4xqqqI")
 
 
 class Entering(NamedTuple):
-    """An `InletSample` as the step loop makes it: at a fifth of the cost of a message."""
+    """An `InletSample` of the step loop: at a fifth of the cost of a message."""
 
     participant: str
     port: str
@@ -37,7 +37,7 @@ class Entering(NamedTuple):
 
 
 class Grant(NamedTuple):
-    """A `GrantMessage` as the step loop uses it: steps `step` to `end` (exclusive)."""
+    """A `GrantMessage` of the step loop: steps `step` to `end` (exclusive)."""
 
     run: int
     epoch: int
@@ -48,9 +48,9 @@ class Grant(NamedTuple):
 
 
 class Ack(NamedTuple):
-    """An `AckMessage` as the step loop uses it.
+    """An `AckMessage` of the step loop.
 
-    It has one hash and one compute time per step, and the works of all bonds per step.
+    There is a hash and a compute time per step, and the works of all bonds per step.
     """
 
     run: int
@@ -93,10 +93,10 @@ def pack_ack(ack: Ack) -> bytes:
 
 
 def unpack_ack(payload: bytes, steps: int, works: int) -> Ack:
-    """Return the `AckMessage` in `payload`, of which `steps` hashes and `works` works are expected.
+    """Return the `AckMessage` in `payload`, with `steps` hashes and `works` works.
 
-    Raises MessageError if it is none, has other lengths or a work that is not finite. An ack with an error
-    may have any lengths.
+    Raises MessageError for another message, wrong lengths or a work that is not finite. An ack with an
+    error may have any lengths.
     """
     layout = _ack(steps, works)
     if len(payload) == layout.size:

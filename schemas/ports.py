@@ -15,11 +15,11 @@ class Port(BaseModel):
     """A named, typed input or output of a participant.
 
         Port(name="PSM1/tip_wrench", causality="output", type="geometry_msgs/msg/WrenchStamped")
-        Port(name="force", causality="input", unit="N", start=(0.0,))     # an array of one number
+        Port(name="force", causality="input", unit="N", start=(0.0,))     # an array with a single number
 
     A *signal* has one value at a time, a float64 vector whenever the type has a fixed layout (see
-    `schemas.vectors`). An *event* port carries a queue of messages of which none is lost. A signal may feed
-    an event port: each new value is one message.
+    `schemas.vectors`). An *event* port carries a queue of messages without loss. A signal may feed an event
+    port: each new value is a message.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -32,11 +32,11 @@ class Port(BaseModel):
     size: int = Field(default=1, ge=1)
     """Number of elements where the type leaves it open (multi-arrays)."""
     shape: tuple[int, ...] = ()
-    """Of a multi-array that is a matrix, row after row: in the message's layout; the product is the size."""
+    """Shape of a matrix in a multi-array, row after row: in the message's layout; the product is the size."""
     names: tuple[str, ...] = ()
     """Joint names of a `JointState`."""
     fields: tuple[Literal["position", "velocity", "effort"], ...] = ("position",)
-    """The parts of a `JointState` that are stated, in this order in the vector."""
+    """The parts of a `JointState` stated, in this order in the vector."""
     unit: str = ""
     """Unit of a bare number or array; empty where the message type implies SI units."""
     frame: str = ""
@@ -52,14 +52,14 @@ class Port(BaseModel):
     description: str = ""
 
     def filled_from(self, other: Port) -> Port:
-        """Return this port with the frame and the joint names of `other` where it leaves them open."""
+        """Return this port with the open frame and joint names filled from `other`."""
         return self.model_copy(
             update={"frame": self.frame or other.frame, "names": self.names or other.names}
         )
 
 
 class BondSide(BaseModel):
-    """One end of a power bond.
+    """An end of a power bond.
 
         BondSide(name="tip", side="motion", dof=3, effective_mass=0.3)
         BondSide(name="probe", side="force", dof=3, stiffness=500.0, damping=1.0, proxy_mass=0.05)
@@ -87,9 +87,9 @@ class BondSide(BaseModel):
     proxy_mass: float | None = None
     """Force side: mass of the proxy, kg."""
     proxy_step: float = 0.0
-    """Force side: sub-step in which the proxy moves, s; 0: it moves continuously."""
+    """Force side: sub-step of the proxy's motion, s; 0: continuous motion."""
     contact_stiffness: float | None = None
-    """Force side: estimate of what the proxy presses on, N/m."""
+    """Force side: estimated stiffness in contact with the proxy, N/m."""
     effective_mass: float | None = None
     """Motion side: smallest effective mass at the bond, kg; known once the participant is configured.
 
@@ -117,8 +117,8 @@ class BondSide(BaseModel):
 def bond_ports(bond: BondSide) -> tuple[Port, Port, Port]:
     """Return the three ports of a bond side: position or pose, velocity or twist, force or wrench.
 
-    They are named `<bond>/pose`, `<bond>/twist`, `<bond>/wrench` for a frame and
-    `<bond>/position`, `<bond>/velocity`, `<bond>/force` for generalised coordinates, point after point.
+    The names are `<bond>/pose`, `<bond>/twist`, `<bond>/wrench` for a frame and `<bond>/position`,
+    `<bond>/velocity`, `<bond>/force` for generalised coordinates, point after point.
     """
     moves, takes = ("output", "input") if bond.side == "motion" else ("input", "output")
     if bond.dof == 6:

@@ -131,7 +131,7 @@ class StringMessage(Message):
 
 
 class MultiArrayDimension(Message):
-    """One dimension of a multi-array."""
+    """A dimension of a multi-array."""
 
     ros_type: ClassVar[str] = "std_msgs/msg/MultiArrayDimension"
     label: String = ""
@@ -351,7 +351,7 @@ class CompressedImage(Message):
 
 
 class RegionOfInterest(Message):
-    """The part of the full image that was taken; all zeros for the whole."""
+    """The part of the full image taken; all zeros for the whole."""
 
     ros_type: ClassVar[str] = "sensor_msgs/msg/RegionOfInterest"
     x_offset: UInt32 = 0
@@ -382,7 +382,7 @@ class CameraInfo(Message):
 
 
 class KeyValue(Message):
-    """One reading of a diagnosis."""
+    """A reading of a diagnosis."""
 
     ros_type: ClassVar[str] = "diagnostic_msgs/msg/KeyValue"
     key: String

@@ -55,7 +55,7 @@ __all__ = [
 
 
 class InletSample(Message):
-    """One device sample as it enters simulated time: its CDR bytes, or only a change of staleness."""
+    """A device sample as it enters simulated time: its CDR bytes, or only a change of staleness."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/InletSample"
     participant: String
@@ -226,7 +226,7 @@ class TaskEvent(Message):
 
 
 class ScoreValue(Message):
-    """One number of a score card."""
+    """A number of a score card."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ScoreValue"
     name: String
@@ -298,7 +298,7 @@ class DeviceStatus(Message):
     offset_ns: Int64 = 0
     """Monotonic clock of the hub minus the monotonic clock of the device's host."""
     round_trip_ns: Int64 = -1
-    """Round trip of the exchange that measured the offset; its half bounds the error of the offset.
+    """Round trip of the exchange that measured the offset; half of the round trip bounds the error.
 
     -1: there was no exchange yet, or the device is in the hub's process.
     """
@@ -315,7 +315,7 @@ class ObserverStatus(Message):
     step: Int64
     """Communication step of the last observed state; -1: none."""
     states: UInt64
-    """Number of observed states; a camera has drawn each of them."""
+    """Number of observed states; a camera has drawn each state."""
     dropped: UInt64
     """Number of due states not observed, because observer or network were too slow."""
     rate: Float64
@@ -332,7 +332,7 @@ class SessionStatus(Message):
     session: String
     run: UInt64
     state: String
-    """One of `starting`, `running`, `paused`, `done`, `failed`."""
+    """An of `starting`, `running`, `paused`, `done`, `failed`."""
     step: Int64
     sim_time_ns: Int64
     real_time_factor: Float64
@@ -354,7 +354,7 @@ class ProfileRow(Message):
     like.
     """
     phase: String = ""
-    """Phase of the step thread; empty for other threads."""
+    """Phase of the step thread; empty for the remaining threads."""
     wall_s: Float64 = 0.0
     """Wall time of a phase."""
     core_s: Float64
@@ -396,7 +396,7 @@ class Profile(Message):
 
 
 class GatewayClient(Message):
-    """A ROS program at the other side of a gateway."""
+    """A ROS program connected to a gateway."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/GatewayClient"
     name: String

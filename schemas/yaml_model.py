@@ -20,8 +20,8 @@ def load_yaml_model(
     """Return the content of `file`.
 
     Args:
-        model: its model.
-        file: its path.
+        model: model.
+        file: path.
         largest: bytes that it may have.
         writer: the command that writes such files, for error messages.
         error: raised if the file cannot be read or is not valid.

@@ -1,9 +1,9 @@
-"""One teleoperation component of the dVRK: a master, the arm that it leads, and the state of the pair.
+"""A teleoperation component of the dVRK: a master, the arm led by it, and the state of the pair.
 
 The states are those of mtsTeleOperationPSM.cpp (jhu-dvrk/sawIntuitiveResearchKit): DISABLED;
 SETTING_ARMS_STATE until master and arm are enabled and homed; ALIGNING_MTM until the master is turned like
-the tip and is held by a hand; ENABLED, in which the arm follows unless the clutch is pressed. The
-`teleoperation` knows where both are and decides when the hand takes over; the component only permits it.
+the tip and held by a hand; ENABLED, where the arm follows unless the clutch is pressed. The `teleoperation`
+knows the poses of both and decides when the hand takes over; the component only permits.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from schemas.ros import BoolMessage, Float64Message, Header, Joy, QuaternionStam
 __all__ = ["Component", "Published", "State"]
 
 _ALIGN_NS = 10_000_000
-"""Time from one command to turn to the next (RunAligningMTM)."""
+"""Time from a command to turn to the next command (RunAligningMTM)."""
 
 
 class State(IntEnum):
@@ -42,7 +42,7 @@ class State(IntEnum):
 
 
 class Published(IntEnum):
-    """What was published last of a condition."""
+    """Last published value of a condition."""
 
     NOTHING = -1
     FALSE = 0
@@ -53,14 +53,14 @@ _COMMANDS = {"enable": State.ENABLED, "disable": State.DISABLED, "align_mtm": St
 
 
 class ComponentState(Record):
-    """All of one component that lasts from step to step."""
+    """Everything in a component that lasts from step to step."""
 
     desired = choice(State.DISABLED)
     requested = choice(State.DISABLED)
-    """What the console requested last; `desired` follows it only when it changes."""
+    """Last request of the console; `desired` follows only when the request changes."""
     current = choice(State.DISABLED)
     phase = choice(Phase.DISABLED)
-    """What the `teleoperation` published last."""
+    """Last published phase of the `teleoperation`."""
     following = flag()
     leads = choice(Published.NOTHING)
     """Whether the hand may lead."""
@@ -68,7 +68,7 @@ class ComponentState(Record):
     scale = number()
     gripper = number(-1.0)
     align = flag()
-    """Whether the master is turned by its motors."""
+    """Whether the master is turned by motors."""
     rotation_locked = flag()
     translation_locked = flag()
     aligned_ns = integer()
@@ -76,10 +76,10 @@ class ComponentState(Record):
 
 
 class Component:
-    """One component, such as `MTMR_PSM1`."""
+    """A component, such as `MTMR_PSM1`."""
 
     def __init__(self, name: str, params: DvrkConsoleParams, events: EventOutputs) -> None:
-        """Take its name, the parameters of the console, and where it publishes."""
+        """Create a disabled component; `events`: the outputs."""
         self.name, self._events = name, events
         self.master, self.arm = name.split("_")
         self._commands = Master(self.master, events)
@@ -107,13 +107,13 @@ class Component:
     def step(
         self, now_ns: int, inputs: Inputs, requested: State, readiness: Readiness, *, clutched: bool
     ) -> None:
-        """Go towards the desired state, by one step that ends at `now_ns`.
+        """Go towards the desired state, by a step that ends at `now_ns`.
 
         Args:
             now_ns: simulated time, ns.
-            inputs: of the console.
-            requested: state that the console requests; it counts whenever it changes.
-            readiness: of arms and masters.
+            inputs: inputs of the console.
+            requested: requested state of the console; a request counts when it changes.
+            readiness: readiness of arms and masters.
             clutched: whether the clutch is pressed.
         """
         state = self.state
@@ -143,7 +143,7 @@ class Component:
         self._command_master(inputs, now_ns, floats=floats, clutched=clutched)
 
     def _receive(self, inputs: Inputs) -> None:
-        """Read what programs and the teleoperation have sent."""
+        """Read the messages of programs and of the teleoperation."""
         state = self.state
         for command in cast("tuple[StringStamped, ...]", inputs.events(f"{self.name}/state_command")):
             if command.string in _COMMANDS:
@@ -186,7 +186,10 @@ class Component:
         self._publish("desired_state", StringMessage(data=state.name))
 
     def _disable(self, lost: Set[str]) -> None:
-        """Stop when an arm is no longer ready; as on the real system only a command starts it again."""
+        """Stop when an arm is no longer ready.
+
+        Only a command starts the component again, as on the real system.
+        """
         if self.state.current >= State.ALIGNING_MTM:
             self.warn(
                 f"{' and '.join(sorted(lost))} not ENABLED and homed any more; send state_command enable"
@@ -203,14 +206,14 @@ class Component:
         return State.ENABLED if led and state.desired is State.ENABLED else State.ALIGNING_MTM
 
     def _permit(self, *, leads: bool) -> None:
-        """Let the hand lead, or free it: its teleoperation reads that as its clutch."""
+        """Enable or clutch the teleoperation."""
         if leads != self.state.leads:
             self.state.leads = Published(leads)
             joy = Joy(buttons=np.array([not leads], np.int32))
             self._events.publish(f"teleop/{self.name}/buttons", joy)
 
     def _set_arms(self, readiness: Readiness, names: Set[str]) -> None:
-        """Command arm and master, if they are among `names`, to be enabled and homed."""
+        """Command arm and master, if among `names`, to be enabled and homed."""
         for name in (self.arm, self.master):
             for command in readiness.orders(name) if name in names else ():
                 self._events.publish(f"{name}/state_command", StringStamped(string=command))

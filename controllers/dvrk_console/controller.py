@@ -1,6 +1,6 @@
 """The surgeon's console of a dVRK as a participant: which master leads which arm, and when.
 
-Power, home, enable, select, scale, operator, clutch and camera mean what they mean on the real system
+Power, home, enable, select, scale, operator, clutch and camera act as on the real system
 (jhu-dvrk/sawIntuitiveResearchKit, console.cpp, system.cpp, and mtsIntuitiveResearchKitConsole.cpp of 2.2,
 UpdateTeleopState); docs/decisions/0032 states where the sources leave room.
 """
@@ -26,11 +26,11 @@ from schemas.ros import BoolMessage, Float64Message, Joy, StringMessage
 __all__ = ["DvrkConsole"]
 
 _BUTTONS = {"operator_present": "operatorpresent", "clutch": "clutch", "camera": "camera"}
-"""What the console publishes of pedals: its name, which is a flag of its state, and the pedal's."""
+"""Published pedals: the name of the output, also a flag of the state, and the name of the pedal."""
 _POWER = {"power_on": "enable", "power_off": "disable", "home": "home"}
-"""State command that `system/...` sends to all arms."""
+"""State command for all arms, by topic of `system/...`."""
 _TAP = 2
-"""Of `buttons[0]`: pressed and released quickly, which does not count as held."""
+"""Value of `buttons[0]`: pressed and released quickly; does not count as held."""
 
 
 class DvrkConsoleState(Record):
@@ -79,7 +79,7 @@ class DvrkConsole(Controller):
     def ports(self) -> tuple[Port, ...]:
         """The topics of `console`, `system`, `footpedals` and of each teleoperation component.
 
-        Beside them `pedals/`, and `teleop/` to and from the teleoperations.
+        Beside these topics `pedals/`, and `teleop/` to and from the teleoperations.
         """
         return console_ports(self.params)
 
@@ -115,7 +115,7 @@ class DvrkConsole(Controller):
             component.publish_all()
 
     def _requested(self, component: Component) -> State:
-        """Return the state that the console requests of a component (UpdateTeleopState)."""
+        """Return the state of a component as requested by the console (UpdateTeleopState)."""
         if not (self._state.enabled and component.state.selected):
             return State.DISABLED
         if not self._state.operator_present:
@@ -180,16 +180,16 @@ class DvrkConsole(Controller):
             component.set_scale(accepted)
 
     def _rivals(self, component: Component) -> list[Component]:
-        """Return those that are selected and have the same master or the same arm."""
+        """Return the selected components with the same master or the same arm."""
         others = (
             other for other in self._components.values() if other is not component and other.state.selected
         )
         return [other for other in others if other.master == component.master or other.arm == component.arm]
 
     def _select(self, name: str, *, selected: bool) -> None:
-        """Select a component, instead of another one of the same master, or unselect it.
+        """Select a component, instead of another of the same master, or unselect the component.
 
-        An arm that is led by another master is refused.
+        An arm led by another master is refused.
         """
         component = self._components.get(name)
         if component is None:
@@ -214,7 +214,7 @@ class DvrkConsole(Controller):
             )
 
     def _lead_camera(self) -> None:
-        """Permit or stop leading the endoscope; enable and home it first."""
+        """Permit or stop leading the endoscope; enable and home the endoscope first."""
         state = self._state
         leads = state.enabled and state.operator_present and state.camera
         if leads != state.leads_camera:

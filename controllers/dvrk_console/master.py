@@ -1,7 +1,8 @@
 """Commands to a master with motors.
 
-It turns as the tip does, floats while it leads, and keeps its orientation while the clutch is pressed.
-As jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp (RunAligningMTM, EnterEnabled, Clutch) does.
+The master turns as the tip does, floats while leading, and keeps the orientation while the clutch is
+pressed. As jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp (RunAligningMTM, EnterEnabled, Clutch)
+does.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from schemas.vectors import Vector
 __all__ = ["Master", "offset", "opening"]
 
 _GRIPPER_ZERO, _GRIPPER_MAX = 0.0, radians(60.0)
-"""Angles of a gripper that is closed and open (mtsIntuitiveResearchKit.h: GripperZero, GripperMax)."""
+"""Angles of a gripper closed and open (mtsIntuitiveResearchKit.h: GripperZero, GripperMax)."""
 
 
 class Master:
-    """The commands to one master."""
+    """The commands to a master."""
 
     def __init__(self, name: str, events: EventOutputs) -> None:
-        """Take the master's name, `MTMR`, and where commands are published."""
+        """Create the outputs of a master, such as `MTMR`; `events`: destination of the commands."""
         self._name, self._events = name, events
 
     def hold(self) -> None:
@@ -44,7 +45,7 @@ class Master:
         self._events.publish(f"{self._name}/move_cp", PoseStamped(pose=pose))
 
     def float(self, locked: Vector | None) -> None:
-        """Follow the hand without a force; keep the orientation `locked` (x, y, z, w), if there is one."""
+        """Follow the hand without a force; keep the orientation `locked` (x, y, z, w), if any."""
         self._events.publish(f"{self._name}/use_gravity_compensation", BoolMessage(data=True))
         self._events.publish(f"{self._name}/body/servo_cf", WrenchStamped())
         if locked is None:
@@ -65,7 +66,7 @@ def opening(angle: float) -> float:
 def offset(master: Vector, tip: Vector) -> Quaternion:
     """Return the orientation of the tip relative to the master's.
 
-    Both are quaternions (x, y, z, w) in frames whose axes correspond: the camera's and the display's.
+    Both are quaternions (x, y, z, w) in frames with corresponding axes: the camera's and the display's.
     """
     return _quaternion(rotation.product(rotation.conjugate(master), tip))
 

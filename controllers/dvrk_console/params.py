@@ -12,11 +12,11 @@ from robots.dvrk.setup_joints import CartArm
 __all__ = ["ComponentName", "DvrkConsoleParams"]
 
 ComponentName = Annotated[str, Field(pattern=r"^MTM[LR]_PSM[123]$")]
-"""A master and the arm that it leads: `MTMR_PSM1`."""
+"""A master and its arm: `MTMR_PSM1`."""
 
 
 class DvrkConsoleParams(Params):
-    """Which arms there are, and which master may lead which of them."""
+    """The arms, and the pairs of master and arm."""
 
     open_to_pages: ClassVar[bool] = True
 

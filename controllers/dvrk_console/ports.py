@@ -1,6 +1,6 @@
 """The ports of the dVRK's console, named as its topics, and its event outputs.
 
-Beside them there are `pedals/`, from a device, and `teleop/`, to and from the teleoperations that lead arms.
+Beside the topics there are `pedals/`, from a device, and `teleop/`, to and from the teleoperations of arms.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from schemas.ros import BoolMessage, Float64Message, PoseStamped, StringMessage
 __all__ = ["NO_GRIPPER", "EventOutputs", "console_ports"]
 
 NO_GRIPPER = -pi
-"""rad; angle of a gripper that is not connected: no master's opens that far the other way."""
+"""rad; angle of a gripper not connected: no master's gripper opens that far the wrong way."""
 
 _SYSTEM_COMMANDS = ("power_on", "power_off", "home", "set_volume")
-"""A hub has no loudspeaker: the other commands of a dVRK's system are sounds."""
+"""A hub has no loudspeaker: the remaining commands of a dVRK's system are sounds."""
 _MASTER_COMMANDS = {
     name: (crtk.COMMANDS | crtk.MTM_COMMANDS)[name]
     for name in (

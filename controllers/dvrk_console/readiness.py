@@ -1,4 +1,4 @@
-"""Which arms and masters are enabled and homed, as far as they have published it."""
+"""Readiness of arms and masters (enabled and homed), as published by them."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ __all__ = ["Readiness"]
 
 
 class Readiness:
-    """The operating states of all arms and masters. All that lasts from step to step is in `state`."""
+    """The operating states of all arms and masters. Everything that lasts from step to step is in `state`."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._rows = {name: i for i, name in enumerate(names)}
         self.state = np.zeros((len(names), 3))
-        """For each: 1 if it has published anything, if it is ENABLED, if it is homed."""
+        """Flags of each arm or master: 1 if any state was published, if ENABLED, if homed."""
         self.lost: frozenset[str] = frozenset()
-        """Those that have stopped being ready in this step."""
+        """Names that have stopped being ready in this step."""
         self.new: frozenset[str] = frozenset()
-        """Those that have published something for the first time in this step."""
+        """Names that have published a state for the first time in this step."""
 
     def receive(self, inputs: Inputs) -> None:
-        """Read what they have published."""
+        """Read the published operating states."""
         if inputs.quiet:
             self.lost = self.new = frozenset()
             return
@@ -42,14 +42,14 @@ class Readiness:
         self.new = frozenset(name for name in silent if self.state[self._rows[name], 0])
 
     def is_ready(self, name: str) -> bool:
-        """Say whether it is ENABLED and homed."""
+        """Return whether an arm or master is ENABLED and homed."""
         return bool(self.state[self._rows[name]].all())
 
     def may_lead(self, master: str) -> bool:
-        """Say whether a master may lead: one that has no operating state, such as a stylus, may."""
+        """Return whether a master may lead: a master without an operating state, such as a stylus, may."""
         return self.is_ready(master) or not self.state[self._rows[master], 0]
 
     def orders(self, name: str) -> tuple[str, ...]:
-        """Return the state commands that make it ready; none before it has published its state."""
+        """Return the state commands to make an arm ready; none before the arm has published its state."""
         known, enabled, homed = self.state[self._rows[name]]
         return () if not known else (*(() if enabled else ("enable",)), *(() if homed else ("home",)))

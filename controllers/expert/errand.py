@@ -32,7 +32,7 @@ _AS_WIDE = 0.9
 
 
 class Errand:
-    """One hand's current transfer task."""
+    """A hand's current transfer task."""
 
     def __init__(self, hand: RobotHand, team: Team, objects: int) -> None:
         """`objects`: number of objects of the scene."""

@@ -33,7 +33,7 @@ class Refusals(Record):
 
 
 class TeamMember(Protocol):
-    """One hand with its task, as a team sees it."""
+    """A hand with its task, as a team sees it."""
 
     hand: RobotHand
     state: HandState
@@ -41,7 +41,7 @@ class TeamMember(Protocol):
 
 
 class Team:
-    """One hand, two hands side by side, or two hands with hand-over.
+    """A hand, two hands side by side, or two hands with hand-over.
 
     In a hand-over the hand on the object's side takes the object, and the second hand puts the object down on
     its own side. A ring dropped on its target side is therefore carried back first: without a hand-over the

@@ -1,9 +1,9 @@
-"""How far what is seen of a needle is from where a pose puts it: residuals of its arc and of its tip.
+"""Residuals of a needle's arc and tip: distances of the seen wire from the image of a pose.
 
-The wire's centre line is projected at many angles. What is seen belongs to the nearest of these, and counts
-by its distance along the normal of the projected line: along the line an arc says nothing. The distances of a
-piece of the line are averaged, so that pixels across the wire count once. The tip counts in both directions;
-it alone fixes the rotation about the arc's axis.
+The wire's centre line is projected at many angles. A seen point belongs to the nearest angle, and counts by
+its distance along the normal of the projected line: along the line an arc says nothing. The distances of a
+piece of the line are averaged, so that pixels across the wire count once. The tip counts in both
+directions; the tip alone fixes the rotation about the arc's axis.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from schemas.vectors import Vector
 __all__ = ["Arc", "Detection", "Fit", "fit"]
 
 _PIECE = 4
-"""Samples of the centre line in a piece whose distances are averaged."""
+"""Samples of the centre line in a piece; the distances of a piece are averaged."""
 _LEAST_COVER = 0.5
-"""Share of a piece that must be seen: of one whose wire is covered in part, the middle is elsewhere."""
+"""Least seen share of a piece: the middle of a wire covered in part is elsewhere."""
 _MOST_COVER = 1.5
-"""The same of a piece that is left out since other wire is seen in its place too."""
+"""Largest seen share of a piece; a piece with more has further wire in its place and is left out."""
 _BEYOND = 1.5
-"""Samples beyond an end of the line up to which something seen belongs to that end."""
+"""Samples beyond an end of the line; a point seen up to there belongs to the end."""
 
 
 @dataclass(frozen=True)
 class Detection:
-    """What one eye sees of the needle's colours, px."""
+    """The needle's colours as seen by an eye, px."""
 
     points: Vector
     """On the wire, shape (n, 2)."""
     lengths: Vector
-    """Of the wire that each point stands for, px, shape (n,)."""
+    """Length of wire that each point stands for, px, shape (n,)."""
     tips: Vector
-    """What may be its tip, shape (k, 2)."""
+    """Candidates for the tip, shape (k, 2)."""
 
 
 class Arc:
-    """The centre line of a needle, at angles from its base to its tip, and where its tip is seen."""
+    """The centre line of a needle, at angles from base to tip, and the place of the seen tip."""
 
     def __init__(self, needle: NeedleShape, tip_ahead: float = 0.0) -> None:
-        """Take the needle, and how far beyond its end the middle of what marks the tip is seen, m."""
+        """Sample the needle; `tip_ahead`: how far beyond its end the middle of the tip's mark is seen, m."""
         self.needle = needle
         half = needle.arc / 2.0
         angles = np.linspace(-half, half, _PIECE * PIECES + 1)

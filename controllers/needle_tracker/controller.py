@@ -68,7 +68,7 @@ centroid 2/3 (a^2 - c^2)^(3/2) / (pi a^2 - a^2 acos(c / a) + c sqrt(a^2 - c^2)).
 _KEPT = 16
 """Instants of which it is known where the arms were: pictures may be older by as many steps."""
 _REGION = 2.2
-"""Radius of the sphere that is looked at, in radii of the needle; its centre is fixed in the gripper, where
+"""Radius of the sphere looked at, in radii of the needle; its centre is fixed in the gripper, where
 the arc's centre was when the tracker started.
 """
 
@@ -85,7 +85,7 @@ class TrackerState(Record):
     """What is known of the needle, and where the arms were."""
 
     pose = array(4, 4)
-    """Of the needle in the gripper."""
+    """Pose of the needle in the gripper."""
     covariance = array(6, 6)
     doubts = integer()
     seen = flag()
@@ -99,13 +99,13 @@ class TrackerState(Record):
     grippers = array(_KEPT, 4, 4)
     """The gripper in the left camera's frame."""
     projections = array(2, 3, 4)
-    """From the left camera's frame to the pixels of each eye; zeros before camera_info."""
+    """Projections from the left camera's frame to the pixels of each eye; zeros before camera_info."""
     sizes = array(2, 2)
     """Width and height of the eyes' pictures, px."""
 
 
 class NeedleTracker(PictureController):
-    """One needle in one gripper, seen by one eye or two."""
+    """A needle in one gripper, seen by one eye or two."""
 
     params_model: ClassVar[type[Params]] = TrackerParams
     params: TrackerParams

@@ -1,6 +1,6 @@
 """An error-state extended Kalman filter of the needle's pose in the gripper; numpy alone.
 
-A needle that is held moves with the gripper, so what is estimated is its pose in the gripper's frame. The
+A needle held moves with the gripper, so what is estimated is its pose in the gripper's frame. The
 prediction of its pose in the camera's frame then is the kinematics of both arms, without integrating anything
 (the gripper's twist moves the mean exactly), and what is left to be estimated hardly changes: it drifts by
 what the kinematics do not know, and jumps when the needle slips.
@@ -47,7 +47,7 @@ class View:
     """What one eye sees, and from where."""
 
     projection: Vector
-    """From the gripper's frame to pixels, shape (3, 4)."""
+    """Projection from the gripper's frame to pixels, shape (3, 4)."""
     seen: Detection
 
 
@@ -63,7 +63,7 @@ class Update:
     innovation: float
     """Mean squared innovation before the update, in variances: 1 where all is as the filter believes."""
     explained: float
-    """Share of the wire that is seen where it should be, the mean of the eyes that see any."""
+    """Share of the wire seen where it should be, the mean of the eyes that see any."""
     unexplained: float
     """Length of what has the wire's colour elsewhere, as a share of the wire's."""
     tip: bool

@@ -2,7 +2,7 @@
 
 A wire is brighter on the side of the lamp, so what is seen of it is drawn aside, by the same way in both eyes
 and from picture to picture; a filter that takes such errors for independent ones becomes too sure. Here they
-are common errors of a picture, few numbers, which are not estimated. A share of the wire's width that
+are common errors of a picture, few numbers, not estimated. A share of the wire's width that
 is not seen says by how much more the middle of the rest may be aside.
 """
 
@@ -18,7 +18,7 @@ from schemas.vectors import Vector
 __all__ = ["PIECES", "Lasting", "Noise"]
 
 PIECES = 24
-"""Of the wire, whose distances are averaged."""
+"""Pieces of the wire; the distances of a piece are averaged."""
 _LASTS = 25
 """Pictures in which an error that lasts is the same: those of a second.
 
@@ -41,9 +41,9 @@ class Noise:
     lasting: float = 0.0
     """px: of what lasts, and changes slowly along the wire."""
     shading: float = 0.0
-    """By which the lit side draws all of the wire aside, as a share of its width; it lasts."""
+    """Displacement of the whole wire towards the lit side, as a share of the wire's width; lasting."""
     capping: float = 0.0
-    """By which the tip, of which wire and light hide a part, is seen aside, likewise."""
+    """Displacement of the seen tip, partly hidden by wire and light, likewise."""
 
     def of_pieces(self, seen: Vector, expected: Vector, width: float) -> Vector:
         """Return the variances, px^2, of pieces of which such lengths (px) are seen and expected."""

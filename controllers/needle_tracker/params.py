@@ -20,7 +20,7 @@ _BASELINE = endoscope.BASELINE
 
 
 class GraspParams(Params):
-    """Where the needle's frame is in the gripper's, when the tracker starts, and how well that is known."""
+    """Where the needle's frame is in the gripper's, when the tracker starts, and how well known."""
 
     position: tuple[Length, Length, Length] = Field(description="of the arc's centre in the frame of the tip")
     orientation: UnitQuaternion = Field(description="of the needle's frame: quaternion x, y, z, w")

@@ -23,13 +23,13 @@ A wire is brighter on the side of the lamp: were pixels weighted by all of their
 there. Only those at its edges, which it fills in part, count less.
 """
 _POINTS = 2500
-"""Pixels of the wire that are used; of more, every second or third."""
+"""Pixels of the wire used; of more, every second or third."""
 _TIP_AREA = 2
 """px: a smaller spot is no tip."""
 
 
 class Region(NamedTuple):
-    """The part of a picture that is looked at, px: columns and rows from the first ones up to the last."""
+    """The part of a picture looked at, px: columns and rows from the first ones up to the last."""
 
     left: int
     top: int

@@ -31,7 +31,7 @@ _LEAST, _MOST = 0.35, 0.3
 _SUSPECT = 2
 """Pictures in a row that do not fit until the needle is searched for."""
 _SLIPPED = 0.06
-"""rad by which a needle that was doubted must have turned to be said to have slipped."""
+"""rad by which a needle doubted must have turned to be said to have slipped."""
 _DOUBT = 0.02
 """Share of a slip's variance that a picture which does not fit adds."""
 _AGAIN = 8
@@ -56,7 +56,7 @@ class Settings:
     drift: tuple[float, float] = (0.2e-3, 0.01)
     """How far a held needle moves in the gripper, and is turned, in a second: standard deviations, m, rad."""
     slip: tuple[float, float] = (2e-3, 0.35)
-    """Of a slip: displacement and turn about the point where it is held, standard deviations, m, rad."""
+    """Slip: displacement and turn about the holding point, standard deviations, m, rad."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Belief:
     slipped: bool = False
     """Whether it has just been found elsewhere."""
     share: float = 0.0
-    """Of the wire, in its place in the newest picture."""
+    """Share of the wire in its place in the newest picture."""
 
 
 def followed(arc: Arc, belief: Belief, views: Sequence[View], seconds: float, settings: Settings) -> Belief:

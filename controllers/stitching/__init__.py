@@ -1,1 +1,1 @@
-"""A scripted surgeon that makes stitches from the poses it is given, with two needle drivers."""
+"""A scripted surgeon that makes stitches from measured poses, with two needle drivers."""

@@ -48,7 +48,7 @@ def pick(
     session: Session = None,
     connect: HubEndpoints = None,
 ) -> None:
-    """Pick where the needle goes in, and where it comes out; the path is shown, or why there is none."""
+    """Pick entry and exit of the needle; the path is shown, or why there is none."""
     points = [[each * 1e-3 for each in place] for place in (entry, exit_)]
     _tell(lead, [("pick", _point(frame, *point)) for point in points], session, connect)
 
@@ -66,7 +66,7 @@ def click(
     session: Session = None,
     connect: HubEndpoints = None,
 ) -> None:
-    """Pick entry and exit by what is seen: the points of the pad under two pixels of a picture."""
+    """Pick entry and exit in the picture: the points of the pad under two pixels."""
     frame = f"{camera}_{eye}_image"
     _tell(lead, [("pick", _point(frame, x, y, 0.0)) for x, y in (entry, exit_)], session, connect)
 
@@ -82,7 +82,7 @@ def say(
     session: Session = None,
     connect: HubEndpoints = None,
 ) -> None:
-    """Consent to the path that is shown; pause, resume, take over or cancel."""
+    """Consent to the path shown; pause, resume, take over or cancel."""
     from controllers.stitching.stage import COMMANDS
 
     text = " ".join(words)
@@ -98,9 +98,9 @@ def _point(frame: str, x: float, y: float, z: float) -> dict[str, Any]:
 def _tell(
     lead: str, values: Sequence[tuple[str, dict[str, Any]]], session: str | None, connect: list[str] | None
 ) -> None:
-    """Write values to the ports of a person, each once the one before was answered, and print the answers.
+    """Write values to a person's ports, each after the previous answer, and print the answers.
 
-    Raises MotionError if one is refused, ConnectError if there is no answer.
+    Raises MotionError if a value is refused, ConnectError if there is no answer.
     """
     from zenoh.handlers import Callback
 

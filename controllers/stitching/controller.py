@@ -1,4 +1,4 @@
-"""The stitching expert as a participant: what it measures, and the commands that it sends."""
+"""The stitching expert as a participant: measurements in, commands out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Stitching"]
 
 
 class Stitching(TwoHands):
-    """Makes stitches: picks the needle up, drives it in, hands it over, pulls it out."""
+    """Makes stitches: picks the needle up, drives, hands over and pulls it out."""
 
     params_model: ClassVar[type[Params]] = StitchingParams
     params: StitchingParams
@@ -35,7 +35,7 @@ class Stitching(TwoHands):
 
     @property
     def ended(self) -> str:
-        """Ends the session once all stitches are made, or one has failed."""
+        """Ends the session once all stitches are made, or a stitch has failed."""
         state = self._surgeon.state
         if not self.params.end:
             return ""
@@ -51,7 +51,7 @@ class Stitching(TwoHands):
         return outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
-        """Read what is measured, do what comes next, and send the commands.
+        """Read the measurements, advance the procedure, and send the commands.
 
         Raises SessionError if a command is refused.
         """

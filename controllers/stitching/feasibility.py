@@ -1,4 +1,4 @@
-"""Whether an arm can hold a needle along a way, and how far its joints stay from their ends. SI units."""
+"""Whether an arm can hold a needle along a way, and how far the joints stay from their ends. SI units."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from schemas.vectors import Vector
 __all__ = ["MARGIN", "Reach", "reach", "room"]
 
 MARGIN = 0.05
-"""Least share of half a joint's range that a way leaves, 4 degrees of a wrist.
+"""Least share of half a joint's range left by a way, 4 degrees of a wrist.
 
-Measured on drives of `suturing`: wrists follow their setpoints within 0.4 degrees, and a needle that turns in
+Measured on drives of `suturing`: wrists follow their setpoints within 0.4 degrees, and a needle turning in
 the jaw moves a wrist by 2 degrees more than planned.
 """
 _TURNS = (-2.0 * pi, 0.0, 2.0 * pi)
-"""By which the shaft's roll may begin on or back, rad."""
+"""Turns by which the shaft's roll may begin on or back, rad."""
 _JUMP = 0.7
-"""Most that a joint may turn between two poses of a way, rad: beyond, the arm would change its branch."""
+"""Largest turn of a joint between two poses of a way, rad: beyond, the arm would change its branch."""
 
 
 class Reach:
-    """What one arm makes of a way: its best branch."""
+    """The best branch of an arm along a way."""
 
     def __init__(self, chain: SerialChain, q: Vector) -> None:
-        """Take the joint positions, shape (poses, 6)."""
+        """Choose the margin of joint positions of shape (poses, 6)."""
         self._chain, self._q = chain, q
         self._free = _free(chain, q)
         turns = np.abs(np.diff(q, axis=0))
         self._jump = float(np.delete(turns, chain.prismatic, axis=1).max(initial=0.0))
         self.margin = float(self._free.min()) if self._jump <= _JUMP else -1.0 - self._jump
-        """Least share of half a joint's range that is left; below `MARGIN` the way is not feasible."""
+        """Least share of half a joint's range left; below `MARGIN` the way is not feasible."""
 
     @property
     def problem(self) -> str:
-        """Why the way is not feasible: the number that fails; empty: it is."""
+        """Why the way is not feasible, with the number that fails; empty: feasible."""
         if self.margin >= MARGIN:
             return ""
         if self._jump > _JUMP:
@@ -60,9 +60,9 @@ class Reach:
 
 
 def room(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
-    """Return what is left of half a joint's range at each of `tips`, shape (n, 4, 4), as (n,), alone.
+    """Return the free share of half a joint's range at each of `tips`, shape (n, 4, 4), as (n,), alone.
 
-    `base`: of the arm in the world, shape (4, 4). Below 0 a pose is out of reach.
+    `base`: pose of the arm's base in the world, shape (4, 4). Below 0 a pose is out of reach.
     """
     found = np.stack([_wound(q, turn) for q in _two(chain, base, tips) for turn in _TURNS])  # (6, n, joints)
     most: Vector = _free(chain, found).min(axis=-1).max(axis=0)
@@ -70,10 +70,10 @@ def room(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
 
 
 def reach(chain: SerialChain, base: Vector, tips: Vector, roll: float | None = None) -> Reach:
-    """Return the best of all ways of the joints along `tips`, shape (poses, 4, 4), in the world.
+    """Return the best of all joint paths along `tips`, shape (poses, 4, 4), in the world.
 
-    `base`: of the arm in the world, shape (4, 4). Its roll begins nearest to `roll` (rad); without,
-    it may begin a turn on or back.
+    `base`: pose of the arm's base in the world, shape (4, 4). The shaft's roll begins nearest to `roll`
+    (rad); without, the roll may begin a turn on or back.
     """
     found = list[Reach]()
     turning = [joint.kind == "revolute" for joint in chain.joints]
@@ -85,13 +85,13 @@ def reach(chain: SerialChain, base: Vector, tips: Vector, roll: float | None = N
 
 
 def _free(chain: SerialChain, q: Vector) -> Vector:
-    """Return the share of half of each joint's range that is left, of the shape of `q`, (..., joints)."""
+    """Return the share of half of each joint's range left, of the shape of `q`, (..., joints)."""
     free: Vector = 2.0 * np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)
     return free
 
 
 def _two(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
-    """Return the joint positions of both branches that an arm has, shape (2, poses, 6)."""
+    """Return the joint positions of both branches of an arm, shape (2, poses, 6)."""
     return branches(chain, inverse_transform(base) @ tips)[:2]
 
 

@@ -1,4 +1,4 @@
-"""How near two instruments come to each other where one gives the other a needle. Metres, world."""
+"""Least distance of two instruments while a needle is handed over. Metres, world."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ ROOM = 2.0 * SHAFT_RADIUS + 1.6e-3
 
 
 def gap(one: RobotHand, tips: Vector, other: RobotHand, others: Vector) -> Vector:
-    """Return the least distance of two instruments, shape (n,), their tips at poses of shape (n, 4, 4).
+    """Return the least distance of two instruments, shape (n,), with tips at poses of shape (n, 4, 4).
 
-    An instrument is two lines: from its remote centre to the wrist, and on to the ends of its fingers.
+    An instrument is two lines: from the remote centre to the wrist, and on to the ends of the fingers.
     """
     pairs = product(_lines(one, tips), _lines(other, others))
     return np.min([_distance(*a, *b) for a, b in pairs], axis=0)

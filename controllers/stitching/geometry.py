@@ -1,11 +1,11 @@
-"""The way of a curved needle through two holes, and how a jaw holds it. Metres, radians.
+"""The way of a curved needle through two holes, and the hold of a jaw. Metres, radians.
 
-The needle turns about the middle of a circle through both holes, in the plane that they span with the normal
-of the skin: constant curvature is what guidelines ask for, since the needle then follows itself. Its angle is
-that of the tip: 0 towards the side it comes from, a quarter of a turn where it points straight down.
+The needle turns about the middle of a circle through both holes, in the plane of the holes and the normal
+of the skin: guidelines ask for constant curvature, since the needle then follows itself. The needle's angle
+is that of the tip: 0 towards the side of approach, a quarter of a turn where the tip points straight down.
 
-A jaw holds the wire across: its fingers point along the needle's axis z, or against it, so that a turn of the
-jaw about its own axis drives the needle on, and close along the radius.
+A jaw holds the wire across: the fingers point along the needle's axis z, or against it, so that a turn of
+the jaw about its own axis drives the needle on, and close along the radius.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ __all__ = ["Grip", "Stitch", "before", "grip_pose", "stitch_between"]
 
 @dataclass(frozen=True)
 class Stitch:
-    """One way through the tissue, in the frame that the holes were given in."""
+    """A way through the tissue, in the frame of the holes."""
 
     centre: Vector
-    """Of the circle, shape (3,), m."""
+    """Centre of the circle, shape (3,), m."""
     axes: Vector
-    """Columns: against the way on the skin, down into the tissue, about which the needle turns; (3, 3)."""
+    """Columns: against the way on the skin, down into the tissue, the needle's axis of rotation; (3, 3)."""
     entry: float
-    """Angle of the tip where it goes in, rad."""
+    """Angle of the tip at the entry, rad."""
     exit: float
-    """Where it comes out."""
+    """Angle of the tip at the exit, rad."""
     needle: NeedleShape
 
     def pose(self, tip: float, lift: float = 0.0) -> Vector:
-        """Return the needle's pose, shape (4, 4), with its tip at an angle (rad), raised by `lift` (m)."""
+        """Return the needle's pose, shape (4, 4), for a tip at an angle (rad), raised by `lift` (m)."""
         turn = tip - self.needle.arc / 2.0
         pose = np.eye(4)
         pose[:3, 0] = self.axes[:, :2] @ [cos(turn), sin(turn)]
@@ -48,13 +48,13 @@ class Stitch:
         return pose
 
     def angle(self, pose: Vector) -> float:
-        """Return the tip's angle (rad), from 0 to a whole turn, of a needle whose pose is on this way."""
+        """Return the tip's angle (rad), from 0 to a whole turn, of a needle with a pose on this way."""
         x = self.axes.T @ pose[:3, 0]
         return float(np.mod(np.arctan2(x[1], x[0]) + self.needle.arc / 2.0, 2.0 * pi))
 
     @property
     def out(self) -> float:
-        """Angle of the tip at which the base has left the tissue, rad."""
+        """Angle of the tip when the base has left the tissue, rad."""
         return self.exit + self.needle.arc
 
     @property
@@ -64,7 +64,7 @@ class Stitch:
 
 
 def stitch_between(entry: Vector, leave: Vector, up: Vector, needle: NeedleShape) -> Stitch:
-    """Return the way from one hole to another, both shape (3,), m; `up`: out of the tissue, shape (3,).
+    """Return the way between two holes, both shape (3,), m; `up`: out of the tissue, shape (3,).
 
     Raises MotionError if the needle is too small.
     """
@@ -117,7 +117,7 @@ def grip_pose(grip: Grip, needle: NeedleShape, reach: float) -> Vector:
 
 
 def before(tip: Vector, away: float) -> Vector:
-    """Return a pose of the tip, shape (7,), `away` metres against its fingers from `tip`, shape (4, 4)."""
+    """Return a pose of the tip, shape (7,), `away` metres against the fingers from `tip`, shape (4, 4)."""
     pose = matrix_to_pose(tip)
     pose[:3] -= away * tip[:3, 2]
     return pose

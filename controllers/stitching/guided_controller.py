@@ -1,4 +1,4 @@
-"""The guided stitch as a participant: what a person picks and says, the commands, and what is shown."""
+"""The guided stitch as a participant: points and words of a person in, commands and pictures out."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _FIRST_WORDS = "Pick entry and exit"
 
 
 class GuidedStitchingParams(StitchParams):
-    """The scene, the two hands, and the camera in whose pictures the stitch is shown."""
+    """The scene, the two hands, and the camera that shows the stitch."""
 
     open_to_pages: ClassVar[bool] = True
 
@@ -53,13 +53,13 @@ class _Shown(Record):
     published = integer(-1)
     """Stage of the last `state`."""
     picked = integer(-1)
-    """Number of points that are drawn."""
+    """Number of points drawn."""
     led = array(2)
     """Whether a person's hand leads driver and puller."""
 
 
 class GuidedStitching(TwoHands):
-    """Makes the stitches that a person picks, one after the other, each with the person's consent."""
+    """Makes the stitches picked by a person, in turn, each with the person's consent."""
 
     params_model: ClassVar[type[Params]] = GuidedStitchingParams
     params: GuidedStitchingParams
@@ -76,7 +76,7 @@ class GuidedStitching(TwoHands):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Those of the expert; setpoints, points and words in; stage and markers out."""
+        """Ports of the expert; setpoints, points and words in; stage and markers out."""
         return (*guided_ports(self._hands, self._needle), *self._frames.ports)
 
     def configure(self, setup: Setup) -> Outputs:
@@ -85,7 +85,7 @@ class GuidedStitching(TwoHands):
         return super().configure(setup)
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
-        """Hear what the person says, and go on with what was consented to.
+        """Hear the person, and advance the stitch with consent.
 
         Raises SessionError if a command is refused.
         """
@@ -110,7 +110,7 @@ class GuidedStitching(TwoHands):
         return self._outputs
 
     def _hear(self, inputs: Inputs) -> Iterator[str]:
-        """Do what the person picks and says; yield why something cannot be done."""
+        """Execute the points and words of the person; yield why something cannot be done."""
         surgeon = self._surgeon
         for source in SOURCES:
             for picked in cast("tuple[PointStamped, ...]", inputs.events(f"{source}pick")):
@@ -132,7 +132,7 @@ class GuidedStitching(TwoHands):
         self._shown.phase[0], self._shown.stitch[0] = surgeon.state.phase, surgeon.state.made[0] + 1.0
 
     def _show(self, said: list[str]) -> None:
-        """Publish the stage and the markers that have changed."""
+        """Publish the stage and the changed markers."""
         guided, seen, params = self._surgeon.guided, self._seen, self.params
         stage, markers = guided.stage, list[Marker]()
         self._outputs["state"] = (StringMessage(data=stage.name),) if seen.published != stage else ()

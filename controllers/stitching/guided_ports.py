@@ -1,4 +1,4 @@
-"""The ports of a guided stitch: those of the stitching expert, and what a person says and sees."""
+"""The ports of a guided stitch: the stitching expert's, and a person's words and markers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from schemas.visualization import MarkerArray
 __all__ = ["SOURCES", "guided_ports"]
 
 SOURCES = ("", "operator/")
-"""Prefixes of what a person says: by a program that is connected, and by hand, with `trocar stitch`."""
+"""Prefixes of a person's ports: for a connected program, and by hand, with `trocar stitch`."""
 
 
 def guided_ports(hands: tuple[RobotHand, RobotHand], needle: str) -> Iterator[Port]:

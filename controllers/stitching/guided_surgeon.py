@@ -1,8 +1,8 @@
-"""The procedure of a stitch, led by a person, who picks where to stitch and consents before anything moves.
+"""The procedure of a stitch led by a person: the person picks the points, and consents before any motion.
 
 Pause and resume are a pace between 0 and 1 at which the procedure's own time passes. After a take-over, and
 after a failure, the stitch is planned anew from where needle and hands are: the free hand opens and goes
-clear, then each hand goes on a line from its present setpoint to where the procedure goes on.
+clear, then each hand goes on a line from the present setpoint to where the procedure goes on.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ from schemas.vectors import Vector
 __all__ = ["GuidedSurgeon"]
 
 _ABOVE = 5.0e-3
-"""m; a point so far from the skin is still meant to be on it."""
+"""Distance from the skin up to which a point counts as on the skin, m."""
 _LEAST = 2.0e-3
 """m; of a bite."""
 _TURNS = (15, -15, 30, -30, 45, -45, 60, -60, 90, -90, 135, -135, 180)
-"""Degrees about the skin's normal, by which a stitch that is not feasible is tried; least first."""
+"""Turns about the skin's normal to try for a stitch that is not feasible, degrees; least first."""
 _HANDED = ("", ", handed over once", ", handed over twice")
 _NAME_BYTES = 4
-"""Size of the hash that names a proposal: eight digits that a person can type."""
+"""Size of the hash of a proposal's name: eight digits to type."""
 _RAMP = 0.2
-"""s in which a pause stops all motion."""
+"""Time in which a pause stops all motion, s."""
 _MOVED, _TURNED = 0.5e-3, 0.01
-"""m, and of a quaternion's parts: a hand this far from where it paused was moved by somebody."""
+"""m, and of a quaternion's parts: a hand this far from its paused place was moved by somebody."""
 
 
 class GuidedState(Record):
-    """What a person has said, and how it is carried out."""
+    """The points and words of a person, and the progress of the stitch."""
 
     stage = choice(Stage.PICKING)
     picked = integer()
@@ -54,7 +54,7 @@ class GuidedState(Record):
     points = array(2, 3)
     """Entry and exit on the skin, in the phantom's frame."""
     pace = number()
-    """At which the procedure's time passes, 0 to 1."""
+    """Pace of the procedure's time, 0 to 1."""
     begun = flag()
 
 
@@ -68,17 +68,17 @@ class GuidedSurgeon(Procedure):
         self.led = False
         """Whether a person's hand leads an arm now."""
         self.sure = True
-        """Whether it is known where the tips are."""
+        """Whether the places of the tips are known."""
 
     @property
     def stitch(self) -> Stitch:
-        """The stitch through the picked points. Raises MotionError if it is not feasible."""
+        """The stitch through the picked points. Raises MotionError if the stitch is not feasible."""
         phantom, (entry, leave) = self.params.phantom, self.guided.points
         return stitch_through(phantom.measures, phantom.pose, entry, leave, self._needle, "the stitch")
 
     @property
     def moves(self) -> bool:
-        """Whether it commands the arms in this step."""
+        """Whether the procedure commands the arms in this step."""
         return self.guided.pace > 0.0
 
     def measure(self, setpoints: Vector, *, led: bool) -> None:
@@ -89,9 +89,9 @@ class GuidedSurgeon(Procedure):
             self._enter(Phase.DONE)
 
     def pick(self, point: Vector) -> None:
-        """Take the next point, shape (3,), in the world: an entry, then its exit, then the next entry.
+        """Store the next point, shape (3,), in the world: an entry, then an exit, then the next entry.
 
-        Raises MotionError if it is no point of the skin, or not the time to pick.
+        Raises MotionError for a point off the skin, or outside the time to pick.
         """
         guided, phantom = self.guided, self.params.phantom
         if guided.stage in (Stage.RUNNING, Stage.PAUSED):
@@ -132,12 +132,12 @@ class GuidedSurgeon(Procedure):
         return f"consent {self._name(plan)}? {who} drives{pulls}{over}; {left}"
 
     def _name(self, plan: WayOn) -> str:
-        """Return the name of a plan: a hash of the picked points, and of which arm does what."""
+        """Return the name of a plan: a hash of the picked points and of the parts of the arms."""
         roles = bytes([plan.exchanged, plan.alone, len(plan.handed)])
         return blake2b(self.guided.points.tobytes() + roles, digest_size=_NAME_BYTES).hexdigest()
 
     def _consent(self, name: str) -> None:
-        """Do what was proposed under this name. Raises MotionError if something else is proposed now."""
+        """Start the proposal of this name. Raises MotionError if another proposal is valid now."""
         plan = self._way_on()
         if name != (proposed := self._name(plan)):
             self._status.append(self._question(plan))  # what is shown last is the question
@@ -145,7 +145,7 @@ class GuidedSurgeon(Procedure):
         self._go_on(plan)
 
     def _feasible_turn(self) -> str:
-        """Say by which least turn about its middle the picked stitch becomes feasible; empty: by none."""
+        """Return the least turn about its middle by which the picked stitch becomes feasible; empty: none."""
         points = self.guided.points
         picked, middle = points.copy(), points.mean(axis=0)
         try:
@@ -162,9 +162,9 @@ class GuidedSurgeon(Procedure):
         return ""
 
     def command(self, word: str) -> None:
-        """Do what a person says, one of COMMANDS, `consent` with the name of a proposal.
+        """Execute a word of a person: a member of COMMANDS, `consent` with the name of a proposal.
 
-        Raises MotionError if that cannot be done now.
+        Raises MotionError for a word that cannot be executed now.
         """
         guided, word = self.guided, word.strip().lower()
         if word.startswith("consent "):
@@ -233,7 +233,7 @@ class GuidedSurgeon(Procedure):
         return plan
 
     def _go_on(self, plan: WayOn) -> None:
-        """Let the hands go to where a plan begins, each from its setpoint."""
+        """Send the hands to the beginning of a plan, each from the present setpoint."""
         for hand, setpoint in zip(self.hands, self._setpoints, strict=True):
             hand.state.correction[:] = 0.0
             hand.state.start[:] = hand.state.goal[:] = setpoint
@@ -242,7 +242,7 @@ class GuidedSurgeon(Procedure):
         self._stage(Stage.RUNNING)
 
     def step(self) -> None:
-        """Let time pass at the present pace, and do what comes next."""
+        """Let time pass at the present pace, and advance the procedure."""
         guided, share = self.guided, self.driver.period / _RAMP
         if self.led and guided.stage in (Stage.RUNNING, Stage.PAUSED, Stage.STOPPED):
             self.take_over()
@@ -254,7 +254,7 @@ class GuidedSurgeon(Procedure):
             super().step()
 
     def _begin(self) -> None:
-        """Do nothing: what a person picks is the beginning."""
+        """Do nothing: a person's points are the beginning."""
 
     def _raise(self) -> None:
         """Let the puller hold the needle over the skin until the next stitch is picked."""
@@ -265,7 +265,7 @@ class GuidedSurgeon(Procedure):
             self._stage(Stage.PICKING)
 
     def _recover(self, why: str) -> None:
-        """Stop: a person decides whether it goes on."""
+        """Stop: a person decides whether the stitch goes on."""
         self._fail(f"{why}; say 'resume' to let it go on from there")
 
     def _fail(self, why: str) -> None:

@@ -1,8 +1,9 @@
-"""How the needle comes into the jaw that is to drive it, over as many hands as that needs. SI units, world.
+"""Search for the hand-overs that bring the needle into the driving jaw. SI units, world.
 
-A needle is driven by fingers along its axis or against it, and from either side of the wound: that decides
-which directions of a stitch an arm can make. A jaw that holds the needle the other way round, or at the wrong
-place of its arc, hands it to the other arm, which takes it from the other side; if need be it comes back.
+A needle is driven by fingers along its axis or against it, and from either side of the wound: so an arm can
+make only some directions of a stitch. A jaw that holds the needle the wrong way round, or at the wrong
+place of the arc, hands the needle to the second arm, from the opposite side; if need be the needle comes
+back.
 """
 
 from __future__ import annotations
@@ -32,24 +33,24 @@ from schemas.vectors import Vector
 __all__ = ["Handing", "Hold"]
 
 _APART = radians(45.0)
-"""Of the arc: so far from one jaw the other takes hold."""
+"""Arc between the two jaws at a hand-over."""
 _HEIGHTS = (0.0, 0.02)
-"""m, over the least height at which the needle is handed over."""
+"""Heights over the least height of a hand-over, m."""
 _NEARER = 0.5
 """To the surgeon, of the height over the skin."""
 _SPINS = 8
-"""Orientations of the needle about each axis that are tried for a hand-over."""
+"""Orientations of the needle about each axis tried for a hand-over."""
 _TRIED = 24
-"""Ways that are looked at in full, those with the most room where hands meet first."""
+"""Ways examined in full; the most room at a hand-over comes first."""
 _JAW = 0.012
-"""m: that a jaw reaches from its tip frame, and 2 mm."""
+"""Reach of a jaw from its tip frame, and 2 mm, m."""
 _DOWN = 0.7
-"""Cosine of the angle between fingers that pick a needle up and straight down, at least."""
+"""Least cosine of the angle between picking fingers and straight down."""
 
 
 @dataclass(frozen=True, eq=False)
 class Hold:
-    """One way to hold the needle."""
+    """A way to hold the needle."""
 
     hand: RobotHand
     grip: Vector
@@ -65,7 +66,7 @@ class _Goal:
     driver: Hold
     puller: RobotHand
     pullers: tuple[Vector, ...]
-    """How the puller can hold it."""
+    """Possible grips of the puller."""
     margin: float
     exchanged: bool
     alone: bool
@@ -76,11 +77,11 @@ class Handing:
 
     Args:
         params: how a stitch is made.
-        hands: driver and puller; they may exchange their parts.
+        hands: driver and puller; the hands may exchange their parts.
         stitch: the stitch.
-        needle: where the needle is, shape (4, 4), out of the tissue.
-        held: by whom and how; None: it lies there.
-        rests: where the tips of the hands stand when they have nothing to do, shape (2, 7).
+        needle: pose of the needle, shape (4, 4), out of the tissue.
+        held: hand and grip; None: the needle lies in the scene.
+        rests: poses of the resting tips of the hands, shape (2, 7).
     """
 
     def __init__(
@@ -102,7 +103,7 @@ class Handing:
         self._places = _places(stitch, params)
 
     def plan(self) -> WayOn | None:
-        """Return how the stitch is made; None if it cannot be made."""
+        """Return how the stitch is made; None if there is no way."""
         for alone in (False, True):
             goals = self._goals(alone=alone)
             for way in (self._in_hand, self._once, self._twice):
@@ -111,7 +112,7 @@ class Handing:
         return None
 
     def _goals(self, *, alone: bool) -> list[_Goal]:
-        """Return how the stitch can be driven and pulled, by two hands or by one alone, the best first."""
+        """Return how the stitch can be driven and pulled, by two hands or by a hand alone, the best first."""
         params, stitch, found = self._params, self._stitch, list[_Goal]()
         require_room(params.grip, stitch, params.emerge)
         for exchanged, driver in enumerate(self._hands):
@@ -125,7 +126,7 @@ class Handing:
         return sorted(found, key=lambda goal: -goal.margin)
 
     def _drivers(self, driver: RobotHand) -> list[Hold]:
-        """Return how a hand may hold the needle to drive it: as it does now, or as the parameters say."""
+        """Return the holds of a driving hand: the present hold, or the hold of the parameters."""
         params, stitch, held = self._params, self._stitch, self._held
         holds = [Hold(driver, grip, params.grip) for grip in _grips(driver, params.grip, stitch)]
         if held is not None and held.hand is driver:
@@ -158,7 +159,7 @@ class Handing:
         ]
 
     def _in_hand(self, goals: Sequence[_Goal]) -> WayOn | None:
-        """Return the best way without a hand-over: it is picked up, or held, as it is driven."""
+        """Return the best way without a hand-over: the needle is picked up, or held, as for the drive."""
         for goal, start in product(goals, self._starts):
             same = start.hand is goal.driver.hand and np.allclose(start.grip, goal.driver.grip)
             if same and (found := self._along([start], [], goal)) is not None:
@@ -166,11 +167,11 @@ class Handing:
         return None
 
     def _once(self, goals: Sequence[_Goal]) -> WayOn | None:
-        """Return the best way with one hand-over."""
+        """Return the best way with a single hand-over."""
         return self._best(((start, goal.driver), goal) for goal in goals for start in self._starts)
 
     def _twice(self, goals: Sequence[_Goal]) -> WayOn | None:
-        """Return the best way by the other hand and back."""
+        """Return the best way by the second hand and back."""
         return self._best(
             ((start, between, goal.driver), goal)
             for goal in goals
@@ -179,7 +180,7 @@ class Handing:
         )
 
     def _best(self, chains: Iterator[tuple[Sequence[Hold], _Goal]]) -> WayOn | None:
-        """Return the first way, in the order of the room where hands meet, that is feasible throughout."""
+        """Return the first way, in the order of the room at the hand-over, feasible throughout."""
         scored = list[tuple[float, Sequence[Hold], list[int], _Goal]]()
         for holds, goal in chains:
             pairs = list(pairwise(holds))
@@ -197,7 +198,7 @@ class Handing:
         return None
 
     def _room(self, hold: Hold) -> Vector:
-        """Return what is left of the joints' ranges at each place for a hand-over, shape (n,)."""
+        """Return the free share of the joints' ranges at each place for a hand-over, shape (n,)."""
         if hold not in self._rooms:
             tips = self._places @ hold.grip
             away = tips.copy()
@@ -219,7 +220,7 @@ class Handing:
         return self._meetings[key]
 
     def _along(self, holds: Sequence[Hold], needles: Sequence[Vector], goal: _Goal) -> WayOn | None:
-        """Return a way, if the joints of both hands can follow it from where they are now to its end."""
+        """Return a way, if the joints of both hands can follow from their present positions to the end."""
         going = {hand: Itinerary(hand) for hand in self._hands}
         rests = dict(zip(self._hands, self._rests, strict=True))
         first, driver = holds[0], goal.driver
@@ -249,12 +250,12 @@ class Handing:
         return None
 
     def _can_take_out(self, driver: Hold, puller: RobotHand, grip: Vector) -> bool:
-        """Say whether the puller can take the needle where it has come out, beside the driver."""
+        """Return whether the puller can take the needle after its exit, beside the driver."""
         end = self._drive[-1:]
         return bool(gap(driver.hand, end @ driver.grip, puller, end @ grip)[0] >= ROOM)
 
     def _is_clear(self, going: dict[RobotHand, Itinerary]) -> bool:
-        """Say whether each hand with the needle keeps away from where the other one rests."""
+        """Return whether each hand with the needle keeps away from the resting place of the second hand."""
         least = self._stitch.needle.radius + _JAW
         places = zip(self._hands[::-1], self._rests, strict=True)
         return all(going[hand].distance(rest[:3]) > least for hand, rest in places)
@@ -290,7 +291,7 @@ class Handing:
 
 
 def _grips(hand: RobotHand, behind: float, stitch: Stitch) -> list[Vector]:
-    """Return all four ways to hold the needle `behind` its tip (rad)."""
+    """Return all four holds of the needle `behind` its tip (rad)."""
     return [grip for side in (False, True) for grip in grips_of(hand, behind, stitch.needle, backwards=side)]
 
 
@@ -303,9 +304,9 @@ def _can_meet(giver: Hold, taker: Hold) -> bool:
 
 
 def _places(stitch: Stitch, params: StitchParams) -> Vector:
-    """Return where a needle may be handed over, shape (n, 4, 4).
+    """Return the places for a hand-over, shape (n, 4, 4).
 
-    On the way from the middle of the pad to the endoscope, which looks there from the surgeon's side, y < 0.
+    The places are on the way from the middle of the pad to the endoscope, on the surgeon's side, y < 0.
     """
     middle, up = params.phantom.pose[:3, 3], params.phantom.pose[:3, 2]
     to_eyes = up - _NEARER * params.phantom.pose[:3, 1]

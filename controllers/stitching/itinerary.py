@@ -1,7 +1,7 @@
-"""The way of one hand through all that it does in a stitch, and whether its joints follow. SI units, world.
+"""The way of a hand through a whole stitch, and whether the joints can follow. SI units, world.
 
-The range of the shaft's roll is more than a turn: the same pose of the tip may be near one end of it or near
-the other, by how the arm came there. So a way is looked at as a whole, from the roll that the arm has now.
+The range of the shaft's roll is more than a turn: the same pose of the tip may be near either end of the
+range, by the history of the arm. So a way is examined as a whole, from the arm's present roll.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from schemas.vectors import Vector
 __all__ = ["Itinerary"]
 
 _SLICE, _TURN = 5.0e-3, 0.2
-"""m and rad: at most between two poses of a line that are looked at."""
+"""m and rad: at most between two poses of a line looked at."""
 
 
 class Itinerary:
-    """Straight lines of a `RobotHand` from its present pose, and paths of the needle in its jaw."""
+    """Straight lines of a `RobotHand` from the present pose, and paths of the needle in the jaw."""
 
     def __init__(self, hand: RobotHand) -> None:
         self.hand = hand
@@ -33,7 +33,7 @@ class Itinerary:
         self._carrying = list[tuple[Vector, Vector]]()
 
     def copy(self) -> Itinerary:
-        """Return an itinerary that may go on in another way."""
+        """Return an itinerary that can continue differently."""
         other = Itinerary(self.hand)
         other._tips, other._carrying = list(self._tips), list(self._carrying)
         return other
@@ -48,7 +48,7 @@ class Itinerary:
         self._carrying.append((self._tips[-1], grip))
 
     def follow(self, needles: Vector, grip: Vector) -> None:
-        """Lead the needle through poses, shape (n, 4, 4), that are near to each other."""
+        """Lead the needle through poses, shape (n, 4, 4), near to each other."""
         self._tips.append(needles @ grip)
 
     def take(self, needle: Vector, grip: Vector) -> None:
@@ -57,14 +57,14 @@ class Itinerary:
         self.go(needle @ grip)
 
     def leave(self, rest: Vector | None = None) -> None:
-        """Go back along the fingers, and to where it rests, shape (7,)."""
+        """Go back along the fingers, and to the resting pose, shape (7,)."""
         self.go(_away(self._tips[-1][-1]))
         if rest is not None:
             self.go(pose_to_matrix(rest))
 
     @property
     def margin(self) -> float:
-        """Least share of half a joint's range that is left; below 0 the joints cannot follow."""
+        """Least share of half a joint's range left; below 0 the joints cannot follow."""
         return reach(self.hand.chain, self.hand.base, np.concatenate(self._tips), self.hand.roll).margin
 
     def distance(self, place: Vector) -> float:
@@ -76,7 +76,7 @@ class Itinerary:
 
 
 def _away(tip: Vector) -> Vector:
-    """Return the pose (4, 4) from which a tip comes to `tip`, and to which it goes back."""
+    """Return the pose (4, 4) of a tip on approach to `tip` and on retreat."""
     return pose_to_matrix(before(tip, BACK))
 
 

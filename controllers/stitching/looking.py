@@ -1,6 +1,6 @@
-"""Before a stitch, each hand in turn comes over the pad, until a tracker has shown where its tip is.
+"""Before a stitch, each hand in turn comes over the pad, until a tracker has shown the tip.
 
-The way there is blind, as far off as the joints are. The hands go in turn, so they do not meet. SI units.
+The way there is blind, as wrong as the joints are. The hands go in turn and do not meet. SI units.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from schemas.vectors import Vector
 __all__ = ["Looking"]
 
 _ABOVE = 0.03
-"""m over the skin: twice what the bounds of the joint errors make of a tip 130 mm from its remote centre."""
+"""m over the skin: twice the effect of the bounds of joint errors on a tip 130 mm from its remote centre."""
 _PATIENCE = 10.0
 """s there without knowing where the tip is."""
 
 
 class Going(IntEnum):
-    """What the hand at work does."""
+    """Motion of the hand at work."""
 
     NOWHERE = 0
     INTO_VIEW = 1
@@ -39,22 +39,22 @@ class LookingState(Record):
     """Number of the hand."""
     going = choice(Going.NOWHERE)
     waited = number()
-    """s since it has come into view."""
+    """Time in view, s."""
     back = array(7)
-    """Where it was."""
+    """Pose before the motion."""
 
 
 class Looking:
-    """The hands that are to be seen."""
+    """Brings the hands into view."""
 
     def __init__(self, hands: Sequence[RobotHand], sights: Sequence[Sight], pad: Vector) -> None:
-        """Take the hands with their sights, and the pad's pose in the world, shape (4, 4)."""
+        """Accept the hands with their sights, and the pad's pose in the world, shape (4, 4)."""
         self._hands, self._sights = hands, sights
         self._over = pad[:3, 3] + _ABOVE * pad[:3, 2]
         self.state = LookingState()
 
     def step(self) -> bool:
-        """Do what comes next, and return whether it is known where all tips are.
+        """Advance the motion, and return whether the places of all tips are known.
 
         Raises MotionError if a tip is not seen in time.
         """

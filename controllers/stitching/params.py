@@ -1,4 +1,4 @@
-"""Parameters of the stitching expert: the scene it works in, and which stitches it makes. SI units."""
+"""Parameters of the stitching expert: the scene, and the stitches to make. SI units."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ class StitchParams(Params):
 
     @property
     def grip(self) -> float:
-        """How far behind its tip the driver holds the needle, rad."""
+        """How far behind the tip the driver holds the needle, rad."""
         most = self.needle[1].shape.arc - radians(20.0)
         return min(radians(155.0), most) if self.held is None else self.held
 
     @property
     def phantom(self) -> PhantomParams:
-        """The phantom, and where it stands."""
+        """The phantom at its place."""
         return next(one for one in self.fixtures.values() if isinstance(one, PhantomParams))
 
     @property
@@ -76,7 +76,7 @@ class StitchParams(Params):
 
 
 class StitchingParams(StitchParams):
-    """Which stitches are made, one after the other."""
+    """The stitches to make, in turn."""
 
     open_to_pages: ClassVar[bool] = True
 

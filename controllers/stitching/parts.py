@@ -1,4 +1,4 @@
-"""Which hand does what: driver and puller are parts that the two hands of a stitch may exchange. SI units."""
+"""The parts of driver and puller; the two hands of a stitch may exchange them. SI units."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["HandingState", "Parts", "ProcedureState"]
 
 
 class ProcedureState(Record):
-    """All of the procedure that changes."""
+    """Everything in the procedure that changes."""
 
     phase = choice(Phase.BEGIN)
     stitch = integer(1)
@@ -19,49 +19,49 @@ class ProcedureState(Record):
     attempts = integer()
     """To take hold of the needle, in succession."""
     recoveries = integer()
-    """Of a needle that was lost, in this stitch."""
+    """Recoveries from a lost needle in this stitch."""
     free = flag()
-    """Whether no jaw is to hold the needle, though the phase is one in which a hand does."""
+    """Whether no jaw is to hold the needle, though a hand holds the needle in this phase."""
     picked_for = choice(Phase.LIFT)
-    """The phase that follows when the driver has taken the needle up."""
+    """Phase after the driver has taken the needle up."""
     waited = number()
     """s since the hand at work has arrived."""
     unheld = number()
-    """s for which nothing has held the needle."""
+    """Time without a holder of the needle, s."""
     needle = array(4, 4)
     holder = number()
     grip = array(4, 4)
     """Pose of the holding hand's tip in the needle's frame."""
     planned = array(2, 4, 4)
-    """Of driver and puller, as planned."""
+    """Planned grips of driver and puller."""
     park = array(2, 7)
-    """Where the hands stand when they have nothing to do."""
+    """Resting poses of the hands."""
     angle = array(1)
-    """Of the needle's tip on its way, commanded, rad."""
+    """Commanded angle of the needle's tip on its way, rad."""
     deviation = array(1)
-    """Of the measured needle from its way, m."""
+    """Deviation of the measured needle from its way, m."""
     made = array(1)
     done = array(1)
     failed = array(1)
 
 
 class HandingState(Record):
-    """Which hand does what, and how the needle comes into the jaw that drives it."""
+    """The parts of the hands, and the hand-overs into the driving jaw."""
 
     exchanged = flag()
     """Whether driver and puller have exchanged their parts."""
     alone = flag()
     """Whether the driver pulls, too."""
     pending = flag()
-    """Whether the needle, once picked up, is handed over before it is driven."""
+    """Whether the picked needle is handed over before the drive."""
     left = integer()
-    """RobotHand-overs that follow the next one: after an even number the driver has it."""
+    """Hand-overs after the next one: after an even number the driver has the needle."""
     needles = array(2, 4, 4)
     """Where the needle is handed over, the last place first."""
     between = array(4, 4)
-    """How the puller takes it, to give it back."""
+    """Grip of the puller before giving the needle back."""
     pick = array(4, 4)
-    """How it is picked up, if it is handed over then."""
+    """Grip for picking up, in case of a hand-over."""
 
 
 class Parts:
@@ -73,17 +73,17 @@ class Parts:
 
     @property
     def driver(self) -> RobotHand:
-        """The hand that drives the needle in."""
+        """The driving hand."""
         return self.hands[self.handing.exchanged]
 
     @property
     def puller(self) -> RobotHand:
-        """The hand that pulls it out."""
+        """The pulling hand."""
         return self.driver if self.handing.alone else self._other(self.driver)
 
     @property
     def settles(self) -> tuple[bool, bool]:
-        """Whether the tips of the hands are to be brought exactly where they were sent."""
+        """Whether the tips of the hands are to be brought exactly to their goals."""
         phase = self.state.phase
         if phase in (Phase.HOVER, Phase.DESCEND):
             at_work = self._picker
@@ -112,14 +112,14 @@ class Parts:
 
     @property
     def _taker(self) -> RobotHand:
-        """The hand that takes the needle over next."""
+        """The next taker of the needle."""
         if self.handing.pending or Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK:
             return self._other(self.driver) if self.handing.left % 2 else self.driver
         return self.puller
 
     @property
     def _giver(self) -> RobotHand:
-        """The hand that gives it."""
+        """The giving hand."""
         return self._other(self._taker)
 
     def _other(self, hand: RobotHand) -> RobotHand:
@@ -127,11 +127,11 @@ class Parts:
 
     @property
     def _picker(self) -> RobotHand:
-        """The hand that picks it up."""
+        """The picking hand."""
         return self._giver if self.handing.pending else self.driver
 
     def _assign(self, plan: WayOn) -> None:
-        """Let each hand do what a plan says."""
+        """Assign the parts of a plan to the hands."""
         handing, handed = self.handing, plan.handed
         handing.exchanged, handing.alone = plan.exchanged, plan.alone
         handing.left = max(0, len(handed) - 1)

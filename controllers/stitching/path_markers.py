@@ -1,7 +1,7 @@
-"""What a person sees of a picked stitch in the endoscope's pictures: points, path, plane and a banner.
+"""Markers of a picked stitch in the endoscope's pictures: points, path, plane and a banner.
 
-Colours are those of `controllers.vrep_sutures`: blue where the needle goes in, red where it comes out. SI
-units, in the world.
+Colours as in `controllers.vrep_sutures`: blue where the needle goes in, red where it comes out. SI units,
+in the world.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ _WORDS = ColorRGBA(r=1.0, g=0.9, b=0.2, a=1.0)
 _POINT, _LINE, _THICKNESS, _LETTERS = 2.0e-3, 0.6e-3, 0.2e-3, 3.0e-3
 """m; of a point, of the path, of the disc, and of the banner: our choice."""
 _LONGEST = 48
-"""Letters of a line of the banner: what the picture is wide."""
+"""Letters of a line of the banner: the width of the picture."""
 _LINES = 24
-"""Of the path."""
+"""Lines of the path."""
 
 
 def point(number: int, place: Vector | None) -> Marker:
-    """Return the entry (0) or the exit (1) at `place`, shape (3,), or its deletion."""
+    """Return the entry (0) or the exit (1) at `place`, shape (3,), or a deletion."""
     if place is None:
         return _marker(("entry", "exit")[number], action=MarkerAction.DELETE)
     x, y, z = place.tolist()
@@ -47,7 +47,7 @@ def point(number: int, place: Vector | None) -> Marker:
 
 
 def path(stitch: Stitch | None, emerge: float) -> Iterator[Marker]:
-    """Yield the way of the tip until it is taken and the needle's plane, or their deletion."""
+    """Yield the way of the tip until the take-over and the needle's plane, or their deletion."""
     if stitch is None:
         yield from (_marker(name, action=MarkerAction.DELETE) for name in ("path", "disc"))
         return

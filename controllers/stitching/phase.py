@@ -1,4 +1,4 @@
-"""What the stitching expert does, one thing after the other."""
+"""The phases of a stitch."""
 
 from __future__ import annotations
 
@@ -34,5 +34,5 @@ class Phase(IntEnum):
     DONE = 21
     FAILED = 22
     LET_GO = 23
-    """Of one hand alone, between DRIVE and COME."""
+    """Phase of a hand alone, between DRIVE and COME."""
     STEP_BACK = 24

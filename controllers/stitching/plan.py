@@ -32,9 +32,9 @@ __all__ = [
 ]
 
 BEFORE, BEYOND = radians(12.0), radians(8.0)
-"""Of the arc: from a tip that is brought in line to the skin; from the last of the needle to the skin."""
+"""Arcs: from a tip in line to the skin; from the end of the needle to the skin."""
 DEEP = 1.0e-3
-"""From the ends of the fingers to the wire that they hold, m."""
+"""Distance from the ends of the fingers to a held wire, m."""
 _STEP = radians(5.0)
 
 
@@ -45,13 +45,13 @@ class Plan:
     driver: Vector
     puller: Vector
     margin: float
-    """Least share of half a joint's range that is left on all ways."""
+    """Least share of half a joint's range left on all ways."""
 
 
 def make_stitch(phantom: Phantom, pose: Vector, number: int, needle: NeedleShape) -> Stitch:
-    """Return the stitch through a pair of holes, in the world, counted from 1; `pose`: of the phantom.
+    """Return the stitch through a pair of holes, in the world, counted from 1; `pose`: pose of the phantom.
 
-    Raises MotionError if it is not feasible for this needle and pad, with the number that fails.
+    Raises MotionError if the stitch is not feasible for this needle and pad, with the number that fails.
     """
     entry, leave = (holes[number - 1, :3, 3] for holes in (phantom.entries, phantom.exits))
     return stitch_through(phantom, pose, entry, leave, needle, f"stitch {number}")
@@ -62,7 +62,7 @@ def stitch_through(
 ) -> Stitch:
     """Return the stitch through two points of the skin, shape (3,), in the phantom's frame.
 
-    Raises MotionError, which begins with `name`, if it is not feasible for this needle and pad.
+    Raises MotionError, beginning with `name`, if the stitch is not feasible for this needle and pad.
     """
     for end, point in (("entry", entry), ("exit", leave)):
         over = np.abs(point[:2]) - np.array(phantom.skin[:2]) / 2.0
@@ -92,7 +92,7 @@ def make_plan(
     emerge: float,
     lift: float,
 ) -> Plan:
-    """Return how to hold the needle, which lies at `start` (4, 4); the angles are those of the parameters.
+    """Return the holds for a needle at `start` (4, 4), with the angles of the parameters.
 
     Raises MotionError if no grip will do, with the joint that fails.
     """
@@ -112,7 +112,7 @@ def make_plan(
 
 
 def require_room(held: float, stitch: Stitch, emerge: float) -> None:
-    """Raise MotionError if a jaw that is `held` rad behind the tip would be driven into the skin."""
+    """Raise MotionError if a jaw `held` rad behind the tip would be driven into the skin."""
     inside = emerge + stitch.exit - stitch.entry
     if held > stitch.needle.arc or inside > held:
         raise MotionError(
@@ -123,7 +123,7 @@ def require_room(held: float, stitch: Stitch, emerge: float) -> None:
 
 
 def grips_of(hand: RobotHand, behind: float, needle: NeedleShape, *, backwards: bool = False) -> list[Vector]:
-    """Return both ways to hold the needle `behind` its tip (rad), as in a `Plan`, from one of its sides."""
+    """Return both holds of the needle `behind` its tip (rad), as in a `Plan`, from the same side."""
     length = hand.jaw.length - DEEP
     return [grip_pose(Grip(behind, side, backwards), needle, length) for side in (False, True)]
 
@@ -131,7 +131,7 @@ def grips_of(hand: RobotHand, behind: float, needle: NeedleShape, *, backwards: 
 def best_grip(
     hand: RobotHand, grips: Sequence[Vector], ways: Sequence[Sequence[Vector]]
 ) -> tuple[Vector, Reach, int]:
-    """Return the grip with the most room on its worst way, the reach on that way, and its number."""
+    """Return the grip with the most room on its worst way, the reach on that way, and the grip's number."""
     found = [[reach(hand.chain, hand.base, np.array(way) @ grip) for way in ways] for grip in grips]
     worst = [min(each, key=lambda one: one.margin) for each in found]
     chosen = max(range(len(grips)), key=lambda i: worst[i].margin)
@@ -139,7 +139,7 @@ def best_grip(
 
 
 def driving(stitch: Stitch, emerge: float, lift: float, start: float | None = None) -> list[Vector]:
-    """Return poses of the needle (4, 4) from over the skin, or from `start` (rad), to where it is taken."""
+    """Return poses of the needle (4, 4) from over the skin, or from `start` (rad), to the take-over."""
     end = stitch.exit + emerge
     if start is not None:
         return [stitch.pose(angle) for angle in _angles(min(start, end), end)]
@@ -148,7 +148,7 @@ def driving(stitch: Stitch, emerge: float, lift: float, start: float | None = No
 
 
 def pulling(stitch: Stitch, emerge: float, lift: float, start: float | None = None) -> list[Vector]:
-    """Return poses of the needle (4, 4) from where it is taken, or `start`, until it is out and raised."""
+    """Return poses of the needle (4, 4) from the take-over, or `start`, until out and raised."""
     end = stitch.out + BEYOND
     angles = _angles(stitch.exit + emerge if start is None else min(start, end), end)
     return [*(stitch.pose(angle) for angle in angles), stitch.pose(angles[-1], lift)]

@@ -1,4 +1,4 @@
-"""The ports of the stitching expert: those of CRTK's clients for the hands, and of the engine."""
+"""The ports of the stitching expert: CRTK clients of the hands, and the engine's ports."""
 
 from __future__ import annotations
 

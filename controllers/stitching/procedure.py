@@ -1,8 +1,8 @@
-"""What the two hands do, one thing after the other, and when it goes on: all by what is measured.
+"""The procedure of two hands at a needle; measurements end each phase.
 
-The needle is led by its own measured pose: the tip of the hand that holds it goes where the needle will be
-where it should, by how that needle lies in the jaw now. So what slips in the jaw is made good. SI units,
-poses in the world.
+The needle is led by its own measured pose: the goal of the holding hand's tip follows from the goal of the
+needle and the present lie of the needle in the jaw. So slip in the jaw is made good. SI units, poses in the
+world.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from schemas.vectors import Vector
 __all__ = ["ATTEMPTS", "HOVER", "Procedure"]
 
 HOVER = 0.020
-"""m, against its fingers: from where the driver picks the needle up, to where it comes down from."""
+"""Distance against the fingers, m: before the driver picks the needle up, and on the way down."""
 _ACCURATE, _ALIGNED = 0.15e-3, 0.20e-3
-"""m: of a tip where it takes hold; of the needle before it goes in."""
+"""m: accuracy of a tip that takes hold; accuracy of the needle before the entry."""
 _PATIENCE = 1.5
-"""s: for these; then it goes on with what has been reached."""
+"""Patience for these accuracies, s; then the procedure goes on with the present accuracy."""
 _PRESSED = 0.5
 """s: for a jaw to close."""
 _HELD_OPEN = 0.02
-"""rad: a jaw commanded to shut that stays this far open has something between its fingers."""
+"""rad: a jaw commanded to shut but at least this far open has an object between the fingers."""
 _UNHELD = 0.3
-"""s without a holder after which the needle is lost."""
+"""Time without a holder after which the needle is lost, s."""
 _GENTLE = 0.35
 _LEARNING = 0.15
-"""Time constant (s) with which it is learnt how the needle lies in the jaw."""
+"""Time constant of learning the lie of the needle in the jaw, s."""
 _PULL_SPEED = radians(45.0)
 """rad/s."""
 ATTEMPTS = 3
-"""To take hold of the needle, and to go on with a stitch in which it was lost."""
+"""Attempts to take hold of the needle, and to continue after a loss."""
 
 
 class Procedure(Parts, ABC):
-    """Two hands and a needle; which stitch it is, and what comes before and after, others say."""
+    """Two hands and a needle; subclasses choose the stitches and the phases before and after."""
 
     def __init__(self, params: StitchParams, driver: RobotHand, puller: RobotHand) -> None:
         super().__init__((driver, puller))
@@ -91,34 +91,34 @@ class Procedure(Parts, ABC):
     @property
     @abstractmethod
     def stitch(self) -> Stitch:
-        """The stitch at work. Raises MotionError if it is not feasible."""
+        """The stitch at work. Raises MotionError if the stitch is not feasible."""
 
     @abstractmethod
     def _begin(self) -> None:
-        """Do what comes before the first stitch."""
+        """Perform the phase before the first stitch."""
 
     @abstractmethod
     def _raise(self) -> None:
-        """Do what comes when the needle is out and raised."""
+        """Perform the phase after the needle is out and raised."""
 
     @abstractmethod
     def _recover(self, why: str) -> None:
         """Go on, or do not, after a failure."""
 
     def statuses(self) -> tuple[str, ...]:
-        """Return what was said in this step, and forget it."""
+        """Return and clear the statuses of this step."""
         said = tuple(self._status)
         self._status.clear()
         return said
 
     def sense(self, needle: Vector, holder: float) -> None:
-        """Take the measured pose of the needle, shape (7,), and the number of the arm that holds it."""
+        """Store the measured pose of the needle, shape (7,), and the number of the holding arm."""
         state = self.state
         state.needle[:], state.holder = pose_to_matrix(needle), holder
         state.unheld = 0.0 if holder else state.unheld + self.driver.period
 
     def step(self) -> None:
-        """Do what comes next."""
+        """Advance the procedure."""
         state = self.state
         try:
             self._watch()
@@ -134,7 +134,7 @@ class Procedure(Parts, ABC):
 
     @property
     def _held(self) -> Hold | None:
-        """How the needle is held, by which hand. Raises MotionError if it is another one."""
+        """The holding hand and its grip. Raises MotionError for a hand of another part."""
         for hand in self.hands:
             if hand.number == self.state.holder:
                 grip = inverse_transform(self.state.needle) @ pose_to_matrix(hand.measured)
@@ -162,7 +162,7 @@ class Procedure(Parts, ABC):
             self._enter(self.rejoin.state.then)
 
     def _watch(self) -> None:
-        """Learn how the needle lies in the jaw; notice if it does not lie there any more."""
+        """Learn the lie of the needle in the jaw; notice a lost needle."""
         state, hand = self.state, self._holding
         if hand is None:
             return
@@ -191,18 +191,18 @@ class Procedure(Parts, ABC):
         self._enter(Phase.FAILED)
 
     def _arrived(self, hand: RobotHand, within: float | None = None) -> bool:
-        """Say whether a hand is where it was sent, as near as it gets."""
+        """Return whether a hand is at its goal, as near as possible."""
         if not hand.has_arrived:
             return False
         self.state.waited += hand.period
         return within is None or hand.error <= within or self.state.waited > _PATIENCE
 
     def _lead(self, hand: RobotHand, needle: Vector, share: float = 1.0) -> None:
-        """Send a hand, on a line, where the needle that it holds comes to a pose, shape (4, 4)."""
+        """Send a hand, on a line, so that its needle comes to a pose, shape (4, 4)."""
         hand.go(matrix_to_pose(needle @ self.state.grip), share)
 
     def _track(self, hand: RobotHand, angle: float) -> None:
-        """Bring the needle to an angle of its way, at once."""
+        """Bring the needle to an angle of the way, at once."""
         state, wanted = self.state, self.stitch.pose(angle)
         goal = matrix_to_pose(wanted @ state.grip)
         hand.state.start[:] = hand.state.goal[:] = goal
@@ -213,7 +213,7 @@ class Procedure(Parts, ABC):
         state.deviation[0] = float(np.sqrt((off * off).sum(axis=1).max()))
 
     def _pick(self, away: float) -> Vector:
-        """Return the tip's pose, shape (7,), where the needle is picked up, or so far before it."""
+        """Return the tip's pose, shape (7,), for picking the needle up, or so far before."""
         grip = self.handing.pick if self.handing.pending else self.state.planned[0]
         return before(self.state.needle @ grip, away)
 
@@ -252,7 +252,7 @@ class Procedure(Parts, ABC):
             self._enter(Phase.HOVER)
 
     def _grasped(self, hand: RobotHand) -> None:
-        """Take how the needle lies in the jaw of a hand for how it holds it."""
+        """Store the present lie of the needle in a hand's jaw as the hand's hold."""
         self.state.grip[:] = inverse_transform(self.state.needle) @ pose_to_matrix(hand.measured)
         self.state.free = False
 
@@ -266,7 +266,7 @@ class Procedure(Parts, ABC):
             self._to_approach()
 
     def _to_present(self, hand: RobotHand) -> None:
-        """Let the hand that holds the needle bring it where it is handed over next."""
+        """Let the holding hand bring the needle to the next hand-over."""
         self._lead(hand, self.handing.needles[self.handing.left])
         self._enter(Phase.PRESENT)
 
@@ -284,7 +284,7 @@ class Procedure(Parts, ABC):
             self._enter(Phase.ALIGN)
 
     def _require_room(self) -> None:
-        """Raise MotionError if the joints cannot drive the needle as it lies in the jaw now."""
+        """Raise MotionError if the joints cannot drive the needle with its present lie in the jaw."""
         params, hand = self.params, self.driver
         way = driving(self.stitch, params.emerge, params.lift, self.stitch.entry - BEFORE)
         if problem := reach(hand.chain, hand.base, np.array(way) @ self.state.grip).problem:
@@ -328,7 +328,7 @@ class Procedure(Parts, ABC):
         self._enter(Phase.COME)
 
     def _taking(self, hand: RobotHand, away: float) -> Vector:
-        """Return the pose, shape (7,), where a hand takes over the needle, or so far before it."""
+        """Return the pose, shape (7,), of a hand taking over the needle, or so far before."""
         handed = Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK
         if not handed:
             grip = self.state.planned[1]
@@ -377,7 +377,7 @@ class Procedure(Parts, ABC):
         self._enter(after)
 
     def _leave(self) -> None:
-        """Let the driver go clear, then to its place, and pull."""
+        """Let the driver go clear, then to the resting place, and pull."""
         if self._arrived(self.driver):
             self._park(self.driver)
             self._to_pull()
@@ -404,7 +404,7 @@ class Procedure(Parts, ABC):
             self._enter(Phase.COME_BACK)
 
     def _leave_back(self) -> None:
-        """Let the giver go clear, then to its place, and hand the needle back or begin with the stitch."""
+        """Let the giver go clear, then to its place, and hand the needle back or begin the stitch."""
         giver, taker = self._giver, self._taker
         if self._arrived(giver):
             self._park(giver)
@@ -415,5 +415,5 @@ class Procedure(Parts, ABC):
                 self._to_approach()
 
     def _park(self, hand: RobotHand) -> None:
-        """Send a hand where it stands when it has nothing to do."""
+        """Send a hand to the resting place."""
         hand.go(self.state.park[self.hands.index(hand)])

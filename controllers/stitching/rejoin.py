@@ -1,6 +1,7 @@
-"""How the hands come from where they are to where a stitch goes on. SI units, world.
+"""How the hands come from their present places to where a stitch goes on. SI units, world.
 
-The free hand opens and goes clear of the needle, then each hand goes on a line to where its phase begins.
+The free hand opens and goes clear of the needle, then each hand goes on a line to the beginning of its
+phase.
 """
 
 from __future__ import annotations
@@ -20,18 +21,18 @@ from schemas.vectors import Vector
 __all__ = ["BACK", "OPEN", "OPENED", "SHUT", "Rejoin"]
 
 OPEN, SHUT = 0.70, -0.30
-"""Of the jaw, rad: around a wire, and while it holds."""
+"""Jaw openings, rad: around a wire, and holding."""
 OPENED = 0.3
 """s: for a jaw to let go."""
 BACK = 0.016
-"""From where a jaw takes hold, m, against its fingers: clear of the wire."""
+"""Distance from a hold, m, against the fingers: clear of the wire."""
 _CLEAR = 0.04
-"""m; a free hand that is nearer to the needle goes back before it goes elsewhere."""
+"""m; a free hand nearer to the needle goes back first."""
 _GENTLE = 0.35
 
 
 class Going(IntEnum):
-    """What the hands do."""
+    """Motion of the hands."""
 
     NOWHERE = 0
     OPEN = 1
@@ -44,9 +45,9 @@ class RejoinState(Record):
 
     going = choice(Going.NOWHERE)
     then = choice(Phase.BEGIN)
-    """The phase that they rejoin."""
+    """Phase after the motion."""
     goals = array(2, 7)
-    """Of driver and puller, where they rejoin it."""
+    """Goals of driver and puller, the poses at the start of the phase."""
     holder = number()
     waited = number()
 
@@ -63,12 +64,12 @@ class Rejoin:
         return self.state.going is not Going.NOWHERE
 
     def begin(self, plan: WayOn, grip: Vector, park: Vector) -> None:
-        """Open what does not hold the needle.
+        """Open the jaws that do not hold the needle.
 
         Args:
             plan: how the stitch goes on.
             grip: pose of the holding hand's tip in the needle's frame, shape (4, 4).
-            park: where driver and puller stand when they have nothing to do, shape (2, 7).
+            park: resting poses of driver and puller, shape (2, 7).
         """
         state = self.state
         for hand in self._hands:
@@ -92,7 +93,7 @@ class Rejoin:
         self.state.going = Going.NOWHERE
 
     def step(self, needle: Vector) -> None:
-        """Go on; `needle`: its pose, shape (4, 4)."""
+        """Go on; `needle`: pose of the needle, shape (4, 4)."""
         state, hands = self.state, self._hands
         state.waited += hands[0].period
         if state.going is Going.OPEN and state.waited >= OPENED:

@@ -1,8 +1,8 @@
-"""The frames of a scene in which a person may pick points, under the names of /tf. SI units.
+"""The frames of a scene for picked points, under the names of /tf. SI units.
 
 A point may also be a pixel of the endoscope's pictures, in the frame `<camera>_left_image` or
-`<camera>_right_image`: x to the right and y down from the middle of the first pixel. It is then the point of
-the pad under that pixel.
+`<camera>_right_image`: x to the right and y down from the middle of the first pixel. The pixel means the
+point of the pad under it.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ __all__ = ["SceneFrames"]
 
 
 class SceneFrames:
-    """Where the frames are: those that stand fast, the tips of the arms, the camera and the needle."""
+    """Poses of the frames: the fixed ones, the tips of the arms, the camera and the needle."""
 
     def __init__(self, params: StitchParams, name: str, camera: StereoCamera) -> None:
-        """`name`: of the endoscope, whose left optical frame is one of them; `camera`: what it sees with."""
+        """Create the frames; `name`: the endoscope; `camera`: the stereo camera."""
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
         self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.driven}
         self._fixed = {crtk.WORLD_FRAME: np.eye(4)}
@@ -48,7 +48,7 @@ class SceneFrames:
             {} if self._left is None else {f"{name}_{eye}_image": eye for eye in EYES}
         )
         self.others = tuple(arm for arm in self._bases if arm not in (params.driver, params.puller))
-        """Arms that do not stitch, whose tips are measured all the same."""
+        """Arms without a part in the stitch; their tips are measured all the same."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -58,14 +58,14 @@ class SceneFrames:
 
     @property
     def ports(self) -> Iterator[Port]:
-        """The measured tips of the other arms."""
+        """The measured tips of the arms that do not stitch."""
         for arm in self.others:
             yield signal_in(f"{arm}/local/measured_cp", PoseStamped, frame=crtk.base_frame(arm))
 
     def in_world(self, picked: PointStamped, inputs: Inputs) -> Vector:
         """Return a point in the world, shape (3,).
 
-        Raises MotionError if its frame is unknown, or if it is a pixel in which there is no pad.
+        Raises MotionError for an unknown frame, or for a pixel without a pad.
         """
         point = picked.point
         if (eye := self._pictures.get(picked.header.frame_id)) is not None:
@@ -105,6 +105,6 @@ class SceneFrames:
 
 
 def _left_in_tip(arm: MountedEcm, baseline: float) -> Vector:
-    """Return the left camera's optical frame in that of the ECM's tip, shape (4, 4), as on /tf."""
+    """Return the left camera's optical frame in the ECM's tip frame, shape (4, 4), as on /tf."""
     left = translation(-0.5 * baseline, 0.0, 0.0)
     return inverse_transform(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left

@@ -1,9 +1,9 @@
-"""What the pictures of an arm's tip tell of its joint errors: by how much yaw, pitch and insertion are off.
+"""An arm's joint errors (yaw, pitch and insertion) from pictures of its tip.
 
-An arm that measures q, and whose first three joints are off by e, has its tip at f(q + e). A Kalman filter of
-the constant e takes each sighting of the tip with its covariance; three numbers of a point give three joints.
-To all others the arm then seems to stand a little elsewhere: where its measured tip is the one that is seen.
-SI units, radians.
+An arm that measures q, with its first three joints off by e, has the tip at f(q + e). A Kalman filter of
+the constant e processes each sighting of the tip with its covariance; three numbers of a point give three
+joints. To everything else the arm then seems to stand a little elsewhere: at the place that makes the
+measured tip agree with the pictures. SI units, radians.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from schemas.vectors import Vector
 __all__ = ["Sight"]
 
 _WITHIN = np.array([radians(5.0), radians(5.0), 5e-3])
-"""Bounds of the errors (rules of the Surgical Robotics Challenge); equally likely between them."""
+"""Bounds of the errors (rules of the Surgical Robotics Challenge); all values between are equally likely."""
 _KNOWN = 0.3e-3
-"""m; standard deviation of the tip, along the worst axis, with which the arm goes to work: a tenth of what an
-open jaw has on either side of a wire.
+"""Largest standard deviation of the tip, along the worst axis, before the arm goes to work, m: a tenth of
+the room of an open jaw on either side of a wire.
 """
 _ITERATIONS = 5
-"""Each leaves the square of what was wrong, in shares of the way to the remote centre: 1e-1 at first."""
+"""Each leaves the square of the remaining error, in shares of the way to the remote centre: 1e-1 at first."""
 _SLOW = 10e-3
-"""m/s; faster, a tip is too far from where the picture has it by the time that the picture comes."""
+"""m/s; faster, a tip has moved too far from its place in the picture when the picture comes."""
 
 
 class SightState(Record):
-    """What is known of an arm's joints."""
+    """Estimate of an arm's joint errors."""
 
     error = array(3)
     """True less measured positions of yaw, pitch (rad) and insertion (m)."""
@@ -44,10 +44,10 @@ class SightState(Record):
 
 
 class Sight:
-    """One arm as the cameras see it."""
+    """An arm in the pictures of the cameras."""
 
     def __init__(self, chain: SerialChain, base: Vector) -> None:
-        """Take the arm's kinematics, and where it stands in the world, shape (4, 4)."""
+        """Accept the arm's kinematics and the pose of its base in the world, shape (4, 4)."""
         self._chain, self._base = chain, base
         self.state = SightState()
         self.state.covariance[:] = np.diag(_WITHIN**2 / 3.0)
@@ -76,10 +76,10 @@ class Sight:
         return true
 
     def _learn(self, q: Vector, seen: PoseWithCovarianceStamped) -> None:
-        """Take one sighting, the slope being that where the estimate ends (an iterated Kalman filter).
+        """Process a sighting, with the slope at the end of the estimate (an iterated Kalman filter).
 
-        With the slope where it begins, 5 degrees off, the first sighting would be wrong by ten times the
-        noise across the line of sight, and all later ones too sure of it.
+        With the slope at the beginning, 5 degrees off, the first sighting would be wrong by ten times the
+        noise across the line of sight, and all later sightings too sure.
         """
         state, place = self.state, seen.pose.pose.position
         noise, begun = seen.pose.covariance.reshape(6, 6)[:3, :3], state.error.copy()

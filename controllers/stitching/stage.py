@@ -1,4 +1,4 @@
-"""How far a person and the procedure are with a stitch, and what the person may say then."""
+"""The stages of a guided stitch, and the words of a person allowed in each."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["COMMANDS", "Stage"]
 
 
 class Stage(IntEnum):
-    """The stages of one stitch; the arms are moved in RUNNING alone."""
+    """The stages of a stitch; the arms are moved in RUNNING alone."""
 
     PICKING = 0
     """Points are awaited: first the entry, then the exit."""
@@ -20,7 +20,7 @@ class Stage(IntEnum):
     TAKEN_OVER = 4
     """A person has the arms; nothing is commanded until `resume`."""
     STOPPED = 5
-    """It cannot go on as planned, and has said why; the arms hold."""
+    """The planned stitch cannot go on; the reason was published; the arms hold."""
 
 
 COMMANDS: dict[str, tuple[Stage, ...]] = {
@@ -30,4 +30,4 @@ COMMANDS: dict[str, tuple[Stage, ...]] = {
     "take over": (Stage.RUNNING, Stage.PAUSED, Stage.STOPPED),
     "cancel": (Stage.PICKING, Stage.PROPOSED, Stage.PAUSED, Stage.TAKEN_OVER, Stage.STOPPED),
 }
-"""What a person may say, and in which stages."""
+"""Words of a person, with the stages that allow each word."""

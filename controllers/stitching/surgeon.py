@@ -25,17 +25,17 @@ class Surgeon(Procedure):
         self._row = params
         self.state.stitch = params.first
         self.looking: Looking | None = None
-        """How the hands look before they go to work; None: there is no tracker."""
+        """How the tips are shown to the tracker before a stitch; None: there is no tracker."""
 
     @property
     def stitch(self) -> Stitch:
-        """The stitch at work. Raises MotionError if it is not feasible."""
+        """The stitch at work. Raises MotionError if the stitch is not feasible."""
         phantom = self.params.phantom
         return make_stitch(phantom.measures, phantom.pose, self.state.stitch, self._needle)
 
     @property
     def looks(self) -> bool:
-        """Whether the hands are looked at; one that has arrived then keeps its last command."""
+        """Whether the hands are looked at; a hand that has arrived then keeps its last command."""
         return self.looking is not None and self.state.phase is Phase.BEGIN
 
     def _begin(self) -> None:
@@ -83,7 +83,7 @@ class Surgeon(Procedure):
             return plan
 
     def _recover(self, why: str) -> None:
-        """Go on from where the needle is now, if that can be done, and has not been done too often."""
+        """Go on from the present place of the needle, if possible and not done too often."""
         state = self.state
         if state.phase is Phase.BEGIN or state.recoveries == ATTEMPTS:
             self._fail(why)
@@ -109,7 +109,7 @@ class Surgeon(Procedure):
             self._enter(Phase.PRESENT)
 
     def _made_the_last(self) -> bool:
-        """Count a stitch, and return whether it was the last one."""
+        """Count a stitch, and return whether it was the last."""
         state = self.state
         state.made[0] += 1.0
         state.recoveries = 0

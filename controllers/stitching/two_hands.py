@@ -1,4 +1,4 @@
-"""Two hands at a needle, as a participant: what all kinds that stitch measure, see and publish."""
+"""Two hands at a needle, as a participant: measurements and publications of all kinds of stitching."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _Shown(Record):
 
 
 class TwoHands(Controller):
-    """The hands, and a procedure that uses them."""
+    """The hands, and a procedure for them."""
 
     def __init__(self, name: str, params: StitchParams) -> None:
         super().__init__(name, params)
@@ -41,7 +41,7 @@ class TwoHands(Controller):
         }
 
     def publish(self, surgeon: Procedure, *more: Record) -> None:
-        """Keep the state of a procedure, and `more`; publish what others see of it."""
+        """Store the state of a procedure, and `more`; publish the procedure's outputs."""
         state = surgeon.state
         self._outputs |= {each: state.part(each) for each in ("made", "angle", "deviation", "done", "failed")}
         kept = (*self._hands, *self._sights, surgeon.rejoin)
@@ -67,7 +67,7 @@ class TwoHands(Controller):
         return self._outputs
 
     def _sense(self, surgeon: Procedure, inputs: Inputs) -> bool:
-        """Read what is measured and seen; return whether it is known where the tips are."""
+        """Read the measurements and sightings; return whether the places of the tips are known."""
         for hand, sight in zip(self._hands, self._sights, strict=True):
             arm = hand.arm
             self._refuse(arm, surgeon, inputs)

@@ -1,4 +1,4 @@
-"""How a stitch goes on from where the needle is: who does what next, or why it cannot. SI units, world."""
+"""How a stitch goes on from the present place of the needle, or why it cannot. SI units, world."""
 
 from __future__ import annotations
 
@@ -31,45 +31,45 @@ __all__ = ["HandOver", "WayOn", "behind_tip", "is_inside", "raised", "way_on"]
 _UNDER = 0.5e-3
 """m; a needle with a point so far under the skin is in the tissue."""
 _BESIDE = 2.0e-3
-"""m; of a needle in the tissue from its way: what pad and jaw can make good."""
+"""m; deviation of a needle in the tissue that pad and jaw can make good."""
 
 _NEARLY = radians(5.0)
-"""Of the arc: so much less than planned may have come out for the puller to take it."""
+"""Arc by which less than planned may have come out for the puller to take hold."""
 
 
 class HandOver(NamedTuple):
-    """From one hand to the other."""
+    """From the giving hand to the taking hand."""
 
     needle: Vector
     """Where the needle is given, shape (4, 4)."""
     grip: Vector
-    """How it is taken, as in a `Plan`."""
+    """Grip of the taking hand, as in a `Plan`."""
 
 
 @dataclass(frozen=True)
 class WayOn:
-    """The first phase, and what it begins with."""
+    """The first phase, with the needle's pose and the parts of the hands."""
 
     phase: Phase
     holder: RobotHand | None
     needle: Vector
     """Where the needle is brought first, shape (4, 4)."""
     angle: float
-    """Of its tip on its way, rad."""
+    """Angle of the needle's tip on its way, rad."""
     driver: Vector
     puller: Vector
     """How the hands hold the needle, as in a `Plan`."""
     margin: float
     picked_for: Phase = Phase.LIFT
-    """What follows when the needle has been taken up: it is in the tissue, or it is not."""
+    """Phase after the needle has been taken up: in the tissue, or not."""
     exchanged: bool = False
-    """Whether the other arm than planned drives."""
+    """Whether the arms have exchanged their planned parts."""
     alone: bool = False
-    """Whether the arm that drives also pulls: it lets go, and takes hold anew."""
+    """Whether the driving arm also pulls: lets go, and takes hold anew."""
     handed: tuple[HandOver, ...] = ()
-    """What comes between the first phase and the way, in turn."""
+    """Hand-overs between the first phase and the way, in turn."""
     pick: Vector | None = None
-    """How it is picked up, if that is not how the driver holds it."""
+    """Grip for picking the needle up, if different from the driver's hold."""
 
 
 def is_inside(params: StitchParams, needle: Vector) -> bool:
@@ -78,7 +78,7 @@ def is_inside(params: StitchParams, needle: Vector) -> bool:
 
 
 def _lowest(params: StitchParams, needle: Vector) -> float:
-    """Return the height of its lowest point over the skin, m."""
+    """Return the height of the needle's lowest point over the skin, m."""
     shape, pad = params.needle[1].shape, params.phantom.pose
     wire = shape.points(np.linspace(-shape.arc / 2.0, shape.arc / 2.0, 60))
     heights = (wire @ needle[:3, :3].T + needle[:3, 3] - pad[:3, 3]) @ pad[:3, 2]
@@ -86,7 +86,7 @@ def _lowest(params: StitchParams, needle: Vector) -> float:
 
 
 def raised(params: StitchParams, needle: Vector) -> Vector:
-    """Return a pose of shape (4, 4), if need be raised so that all of the needle is over the skin."""
+    """Return a pose of shape (4, 4), if need be raised until all of the needle is over the skin."""
     up = needle.copy()
     up[:3, 3] += max(0.0, params.lift - _lowest(params, needle)) * params.phantom.pose[:3, 2]
     return up
@@ -95,7 +95,7 @@ def raised(params: StitchParams, needle: Vector) -> Vector:
 def way_on(
     params: StitchParams, driver: RobotHand, puller: RobotHand, stitch: Stitch, needle: Vector, holder: float
 ) -> WayOn:
-    """Plan `stitch` from where the needle is, shape (4, 4), in the jaw of arm number `holder` (0: none).
+    """Plan `stitch` from the needle's pose, shape (4, 4), in the jaw of arm number `holder` (0: none).
 
     Raises MotionError, with the number that fails, if there is no way.
     """
@@ -146,7 +146,7 @@ def _pulls(
     stitch: Stitch,
     needle: Vector,
 ) -> bool:
-    """Say whether a hand holds a needle in the tissue as one that pulls it."""
+    """Return whether a hand holds a needle in the tissue for pulling."""
     if driver is puller:
         behind = behind_tip(inverse_transform(needle) @ pose_to_matrix(holding.measured), holding, stitch)
         return behind < (params.grip + params.taken) / 2.0
@@ -156,7 +156,7 @@ def _pulls(
 def _taken_again(
     params: StitchParams, driver: RobotHand, puller: RobotHand, stitch: Stitch, needle: Vector, angle: float
 ) -> WayOn:
-    """Plan how a needle that the tissue alone holds, its tip at `angle` (rad), is taken hold of."""
+    """Plan how a needle held by the tissue alone, the tip at `angle` (rad), is taken hold of."""
     emerge, lift = params.emerge, params.lift
     if angle > stitch.exit + emerge - _NEARLY:
         grip, margin = _from_a_side(puller, params.taken, stitch, [pulling(stitch, emerge, lift, angle)])
@@ -169,7 +169,10 @@ def _taken_again(
 
 
 def _on_its_way(stitch: Stitch, needle: Vector, angle: float) -> float:
-    """Return the angle of a needle in the tissue, on from its entry. Raises MotionError if it is beside."""
+    """Return the angle of a needle in the tissue, on from the entry.
+
+    Raises MotionError for a needle beside its way.
+    """
     wanted, marks = stitch.pose(angle), stitch.needle.marks
     off = marks @ (needle[:3, :3] - wanted[:3, :3]).T + needle[:3, 3] - wanted[:3, 3]
     beside = float(np.sqrt((off * off).sum(axis=1).max()))
@@ -182,7 +185,7 @@ def _on_its_way(stitch: Stitch, needle: Vector, angle: float) -> float:
 
 
 def behind_tip(grip: Vector, hand: RobotHand, stitch: Stitch) -> float:
-    """Return how far behind the tip (rad) a jaw holds the needle, by the pose of its tip in the needle's."""
+    """Return how far behind the needle's tip (rad) a jaw holds; `grip`: jaw's tip in the needle's frame."""
     x, y, _ = (grip[:3, 3] + (hand.jaw.length - DEEP) * grip[:3, 2]).tolist()
     return stitch.needle.arc / 2.0 - atan2(y, x)
 
@@ -190,7 +193,7 @@ def behind_tip(grip: Vector, hand: RobotHand, stitch: Stitch) -> float:
 def _from_a_side(
     hand: RobotHand, behind: float, stitch: Stitch, ways: list[list[Vector]]
 ) -> tuple[Vector, float]:
-    """Return how a hand takes the needle `behind` its tip (rad): from the other side if it has to."""
+    """Return how a hand takes the needle `behind` its tip (rad): from the second side if necessary."""
     side, other = (
         best_grip(hand, grips_of(hand, behind, stitch.needle, backwards=each), ways) for each in (False, True)
     )
@@ -198,7 +201,7 @@ def _from_a_side(
 
 
 def _kept(hand: RobotHand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
-    """Return how the hand holds the needle now, and the margin with which it goes like that."""
+    """Return the hand's present hold of the needle, and the margin with this hold."""
     return _chosen(hand, [inverse_transform(needle) @ pose_to_matrix(hand.measured)], ways)
 
 

@@ -2,7 +2,7 @@
 
 A disc is seen as an ellipse. A white spot is one if its area is that of the ellipse with its second moments,
 if it is evenly bright, and if red is around it; so paper, light reflexes and grey instruments are none, nor
-is a disc that is covered in part or cut by the edge of the picture.
+is a disc covered in part or cut by the edge of the picture.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["find_blobs"]
 _LEAST_AREA = 30
 """px: a disc of 25 mm is that small at 1.3 m."""
 _MOST = 6
-"""Blobs that are considered, the largest ones; more make too many quadruples."""
+"""Blobs considered, the largest ones; more make too many quadruples."""
 _BRIGHT, _GREY = 60, 0.75
 """White: at least so bright (of 255), with the weakest of the three colours at least this share of the
 strongest.
@@ -33,7 +33,7 @@ pi/3 - 1 = 0.047.
 _EVEN = 0.75
 """Least brightness inside a spot as a share of its median: less is something before it."""
 _RING = (2, 5)
-"""From and to how many pixels around a spot its ground is looked at."""
+"""Ring around a spot, examined for its ground, px from the spot."""
 
 
 def find_blobs(cv2: Any, picture: NDArray[np.uint8]) -> Vector:

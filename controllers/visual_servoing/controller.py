@@ -2,7 +2,7 @@
 
 With each picture it finds the discs, and from then to the next one it moves the command by the law's joint
 velocities. It holds while the arm is not ready, while no picture comes, and while fewer than four discs are
-seen: it neither moves blindly nor towards what it guesses. Discs that are seen again are recognised again by
+seen: it neither moves blindly nor towards what it guesses. Discs seen again are recognised again by
 where they were last.
 """
 
@@ -80,7 +80,7 @@ class ServoingState(Record):
     """The same in pixels."""
     shown_goal = array(4, 2)
     pose = array(7)
-    """Of the target in the camera's frame: position and quaternion."""
+    """Pose of the target in the camera's frame: position and quaternion."""
     camera = array(6)
     """fx, fy, cx, cy, width and height, px; zeros before the first camera_info."""
     error = number()
@@ -96,7 +96,7 @@ class ServoingState(Record):
 
 
 class VisualServoing(PictureController):
-    """One endoscope, one target of four discs."""
+    """An endoscope, one target of four discs."""
 
     params_model: ClassVar[type[Params]] = ServoingParams
     params: ServoingParams

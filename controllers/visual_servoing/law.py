@@ -27,7 +27,7 @@ __all__ = ["Law", "Limits", "interaction", "joint_velocities", "twist"]
 Law = Literal["direct", "twist"]
 
 _DAMPING = 1e-5
-"""Of a joint velocity, in units of the features' own, so that the system has full rank where L J has not."""
+"""Weight of a joint velocity, in units of the features, for full rank of the system without that of L J."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Limits:
     """What a motion keeps."""
 
     lower: Vector
-    """Of the joints, rad and m, shape (n,)."""
+    """Lower joint limits, rad and m, shape (n,)."""
     upper: Vector
     velocity: Vector
     """rad/s and m/s, shape (n,)."""

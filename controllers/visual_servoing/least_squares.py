@@ -15,7 +15,7 @@ from schemas.vectors import Vector
 __all__ = ["constrained", "non_negative"]
 
 _TOLERANCE = 1e-11
-"""Of what is compared with 0, relative to numbers of the order of 1."""
+"""Tolerance of comparisons with 0, relative to numbers of the order of 1."""
 
 
 def constrained(a: Vector, b: Vector, g: Vector, h: Vector) -> Vector:

@@ -1,7 +1,7 @@
-"""Which blob is which point of the target, and where that makes the target be.
+"""Which blob is which point of the target, and the pose of the target.
 
-A rectangle of equal discs looks the same after half a turn. Of the orders that a rigid rectangle in front of
-the camera explains, that is taken which is nearest to where the points are expected.
+A rectangle of equal discs looks the same after half a turn. Of the orders explained by a rigid rectangle in
+front of the camera, the order nearest to the expected points is taken.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Sight:
     features: Vector
     """The images of the discs' centres, normalised, shape (4, 2), in the target's order."""
     pose: Vector
-    """Of the target in the camera's frame, shape (4, 4)."""
+    """Pose of the target in the camera's frame, shape (4, 4)."""
 
 
 def recognised(

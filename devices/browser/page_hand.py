@@ -19,7 +19,7 @@ class PageInput:
 
     wish: Wish
     drag: Vector3 = (0.0, 0.0, 0.0)
-    """Way of the pointer since the page leads, m: ahead, left, up; a message that is lost is in the next."""
+    """Way of the pointer since the page leads, m: ahead, left, up; a message lost is in the next."""
     tracked: tuple[Vector3, Quaternion] | None = None
     """Where a headset has the head or hand, in the base frame, in place of shares and way. Its own
     axes, too, are x ahead, y left, z up."""

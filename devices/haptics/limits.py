@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 __all__ = ["TOUCH", "DeviceLimits", "Limits"]
 
 _SHARE_OF_NOMINAL = 0.6
-"""Share of a device's nominal maximum force that is used: the nominal force is a peak that the motors hold
+"""Share of a device's nominal maximum force used: the nominal force is a peak that the motors hold
 in the best posture only, and not for long.
 """
 
@@ -28,7 +28,7 @@ class DeviceLimits:
 
     @property
     def usable_force(self) -> float:
-        """The largest force (N) that is commanded."""
+        """The largest force (N) commanded."""
         return _SHARE_OF_NOMINAL * self.force
 
 

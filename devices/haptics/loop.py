@@ -59,7 +59,7 @@ class HapticLoop:
 
         Args:
             planes: of the model, base frame.
-            stamp_ns: its stamp, ns.
+            stamp_ns: stamp, ns.
             arrived: when it arrived here, s of the clock of `tick`.
         """
         if stamp_ns <= self._stamp_ns and arrived - self._arrived <= self._limits.silence:

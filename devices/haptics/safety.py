@@ -46,7 +46,7 @@ class SafetyChain:
     def reset(self) -> None:
         """Set the force to zero; it rises again as at the start.
 
-        For a device that was lost, and for the last frame before it stops.
+        For a device lost, and for the last frame before it stops.
         """
         self._off(Condition.OFF)
 

@@ -16,7 +16,7 @@ LAYOUT = (
 )
 _FULL = 32767
 _DEAD_ZONE = 7849 / _FULL
-"""Of a stick at rest (XINPUT_GAMEPAD_LEFT_THUMB_DEADZONE of Microsoft's XInput)."""
+"""Dead zone of a stick at rest (XINPUT_GAMEPAD_LEFT_THUMB_DEADZONE of Microsoft's XInput)."""
 
 
 class Gamepad:

@@ -25,9 +25,9 @@ KEYS: dict[str, tuple[str, Wish]] = {
     "c": ("button 1, and close the gripper", Wish(gripper=-1.0, jaw=True)),
     "v": ("open the gripper", Wish(gripper=1.0)),
 }
-"""By the key's name in pygame: its meaning in words, and its command."""
+"""Meaning in words and command of each key, by the key's name in pygame."""
 
 
 def wish_of(pressed: Collection[str]) -> Wish:
-    """Return the sum of the commands of the keys that are held down."""
+    """Return the sum of the commands of the keys held down."""
     return sum((wish for key, (_, wish) in KEYS.items() if key in pressed), NOTHING)

@@ -74,7 +74,7 @@ class VirtualStylus:
         self._position, self._orientation = np.zeros(3), _LEVEL
         self._linear, self._angular = np.zeros(3), np.zeros(3)
         self.gripper = 1.0
-        """From 0, closed, to 1, open."""
+        """Opening of the gripper: 0 closed, 1 open."""
 
     def advance(self, wish: Wish, dt: float) -> None:
         """Move for `dt` seconds by the command `wish`."""

@@ -49,9 +49,9 @@ __all__ = [
 ]
 
 MINOR_VERSION = 32
-"""Of the last SDK, 1.32."""
+"""Minor version of the last SDK, 1.32."""
 REQUEST_VERSION, INVISIBLE = 0x4, 0x10
-"""Flags of ovrInitParams: use the minor version asked for; be a client that is not seen in the headset."""
+"""Flags of ovrInitParams: use the minor version asked for; be a client not seen in the headset."""
 ORIENTATION_TRACKED, POSITION_TRACKED = 0x1, 0x2
 """Status flags of ovrTrackingState."""
 ORIGINS = {"eye": 0, "floor": 1}

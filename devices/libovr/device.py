@@ -73,7 +73,7 @@ class LibOvr(Headset):
 
 
 class _Session:
-    """One session with the runtime."""
+    """A session with the runtime."""
 
     def __init__(self, api: ovr.Api, params: LibOvrParams) -> None:
         self._api, self._params = api, params

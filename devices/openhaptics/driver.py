@@ -127,7 +127,7 @@ class HdapiDriver(Driver):
 
 
 class _Device:
-    """One open device. All methods are for the servo callback."""
+    """An open device. All methods are for the servo callback."""
 
     def __init__(self, hd: Hdapi, handle: int, spec: StylusSpec) -> None:
         self._hd, self._handle = hd, handle

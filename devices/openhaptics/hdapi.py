@@ -2,7 +2,7 @@
 
 They are from its public reference. The library is proprietary, comes with the driver or the SDK, and is
 loaded from where these install it. It needs a program of its own word size: the driver's hd.dll is 64-bit.
-A library that was unloaded does not load again (CHAI3D, CPhantomDevices.cpp): a process loads it once, and
+A library unloaded does not load again (CHAI3D, CPhantomDevices.cpp): a process loads it once, and
 a new process is how to recover.
 """
 

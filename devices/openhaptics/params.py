@@ -15,7 +15,7 @@ __all__ = ["StylusParams", "TouchParams"]
 
 
 class StylusParams(ServoStylusParams):
-    """One stylus."""
+    """A stylus."""
 
     tip_offset: Annotated[
         Length, Field(ge=0.0, le=0.2, description="from the centre of the gimbal to the tip")

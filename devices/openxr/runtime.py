@@ -1,4 +1,4 @@
-"""One session with an OpenXR runtime, without pictures: states, user presence, and the head's pose."""
+"""A session with an OpenXR runtime, without pictures: states, user presence, and the head's pose."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from schemas.errors import DeviceError
 __all__ = ["ORIGINS", "OpenXrRuntime", "lacking", "offered"]
 
 HEADLESS, PRESENCE = "XR_MND_headless", "XR_EXT_user_presence"
-"""A session without graphics, which is required; events about whether the headset is worn, optional."""
+"""A session without graphics, required; events about whether the headset is worn, optional."""
 ORIGINS = {"eye": xr.ReferenceSpaceType.LOCAL, "floor": xr.ReferenceSpaceType.STAGE}
 _VALID = xr.SpaceLocationFlags.ORIENTATION_VALID_BIT | xr.SpaceLocationFlags.POSITION_VALID_BIT
 """Not those that say `tracked`: some runtimes, among them those of simulated headsets, never set that of the
@@ -162,7 +162,7 @@ class OpenXrRuntime:
                 raise DeviceError("the OpenXR runtime ends; start it again")
 
     def _change_to(self, state: xr.SessionState) -> None:
-        """Handle a change of the session's state; in states that are not named here it continues."""
+        """Handle a change of the session's state; in states not named here it continues."""
         assert self._session is not None
         if state == xr.SessionState.READY:
             xr.begin_session(self._session, xr.SessionBeginInfo())

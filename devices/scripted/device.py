@@ -79,7 +79,7 @@ class ScriptedDevice(Device):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """One output per topic: a signal where the type has a vector form, else an event port."""
+        """An output per topic: a signal where the type has a vector form, else an event port."""
         return self._ports
 
     @cached_property
@@ -102,7 +102,7 @@ class ScriptedDevice(Device):
         self._playback = Playback(self._play(played, makers))
 
     def read(self, t: int) -> list[Sample]:
-        """Return the samples up to time `t` that were not returned before, oldest first."""
+        """Return the samples up to time `t` not returned before, oldest first."""
         return self._playback.due(t)
 
     def close(self) -> None:

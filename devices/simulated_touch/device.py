@@ -69,7 +69,7 @@ class SimulatedTouch(Device):
         return [sample for stylus in self._styluses.values() for sample in stylus.read(t)]
 
     def write(self, port: str, value: Value) -> None:
-        """Pass on a contact model, which is rendered from the next `read` on.
+        """Pass on a contact model, rendered from the next `read` on.
 
         Raises MessageError for another port or type.
         """
@@ -92,7 +92,7 @@ def _diagnosis(participant: str, stylus: str) -> Diagnosis:
 
 
 class _Stylus:
-    """One stylus: at every tick the force follows from the hand's position, and the hand moves under it."""
+    """A stylus: at every tick the force follows from the hand's position, and the hand moves under it."""
 
     def __init__(
         self, participant: str, stylus: str, params: SimulatedStylusParams, ports: StylusPorts

@@ -59,7 +59,7 @@ class HandParams(Params):
 
 
 class SimulatedStylusParams(Params):
-    """One stylus, the hand that holds it, and the limits of the force on that hand."""
+    """A stylus, the hand that holds it, and the limits of the force on that hand."""
 
     path: Annotated[
         Annotated[tuple[Waypoint, ...], Tag("waypoints")] | Annotated[Path, Tag("recording")],

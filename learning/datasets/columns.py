@@ -1,4 +1,4 @@
-"""Which numbers of a recording are state and action of a data set, and their values at its frames."""
+"""Choice of the recorded numbers for state and action of a data set, and their values at the frames."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from trocar import Recording, Series
 __all__ = ["Columns", "chosen", "commanded", "measured"]
 
 _MEASURED = re.compile(r"([A-Za-z0-9]+)/(?:(jaw|hand)/)?measured_js")
-"""A port with measured joints: arm, and which part of it. Setup joints do not match, nor do phalanges."""
+"""A port with measured joints: arm, and part of the arm. Setup joints do not match, nor do phalanges."""
 _BEST = ("motion", "mujoco")
-"""Kinds whose joints are taken if several participants publish those of an arm: its controller, else its
-simulator, else whatever is first.
+"""Preferred kinds if several participants publish the joints of an arm: the controller, else the simulator,
+else the first.
 """
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Numbers of one recorded port that are columns of a data set."""
+    """Numbers of a recorded port for columns of a data set."""
 
     port: str
     names: tuple[str, ...]
     times_ns: NDArray[np.int64]
     """Shape (n,), ascending."""
     values: NDArray[np.float64]
-    """Shape (n, len(names)); rad, m and what else the port has."""
+    """Shape (n, len(names)); rad, m and further units of the port."""
 
     def at(self, times_ns: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the newest values up to each of `times_ns`, shape (k,), as shape (k, len(names))."""
@@ -40,7 +40,7 @@ class Columns:
 
 
 def measured(recording: Recording) -> list[Columns]:
-    """Return the measured joints of each arm, with its jaw or hand, arms in alphabetical order.
+    """Return the measured joints of each arm, with jaw or hand, arms in alphabetical order.
 
     Raises RecordingError if there is none.
     """
@@ -59,8 +59,8 @@ def measured(recording: Recording) -> list[Columns]:
 def commanded(recording: Recording) -> list[Columns]:
     """Return the commanded joints of each arm, in the order of `measured`.
 
-    They are the arm's setpoints; of what has none, the commands that its connection brings. What nothing
-    commands has no columns. Raises RecordingError if nothing is commanded.
+    Columns are the arm's setpoints; without setpoints, the commands from the arm's connection. Joints
+    without a command have no columns. Raises RecordingError if nothing is commanded.
     """
     sources = {
         f"{one.target}.{one.target_port}": f"{one.source}.{one.source_port}"
@@ -81,13 +81,13 @@ def commanded(recording: Recording) -> list[Columns]:
 def chosen(recording: Recording, names: Sequence[str]) -> list[Columns]:
     """Return the numbers of `PORT` or `PORT.FIELD`, such as `tissue.probe/wrench.force`.
 
-    Raises RecordingError for a port or a field that is not recorded, or that has no numbers.
+    Raises RecordingError for a port or a field not recorded or without numbers.
     """
     return [_chosen(recording, name) for name in names]
 
 
 def _measured_ports(recording: Recording) -> Iterator[tuple[str, str, str, str]]:
-    """Yield participant, port, arm and part of each port with measured joints that is taken."""
+    """Yield participant, port, arm and part of each port with measured joints taken."""
     kinds = {name: spec.kind for name, spec in recording.scenario().participants.items()}
     found: dict[tuple[str, str], tuple[int, str, str]] = {}
     for name in recording.ports:

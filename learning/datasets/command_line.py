@@ -23,7 +23,7 @@ app = typer.Typer()
 
 _PACKAGES = ("av", "mujoco", "pandas", "PIL", "pyarrow")
 _LEAST, _MOST = 64, 2048
-"""Of a side of a picture: the encoder takes no smaller ones, the endoscope draws no larger ones."""
+"""Least and largest side of a picture: limits of the encoder and of the endoscope's drawing."""
 
 
 @app.command()
@@ -64,8 +64,8 @@ def dataset(
 ) -> None:
     """Write recordings as a LeRobotDataset: states, actions, stereo video, task text.
 
-    Pictures that a session has not recorded are drawn from its states. A recording that cannot be used is
-    left out, and the exit code is then 1.
+    Pictures missing in a session's recording are drawn from its states. An unusable recording is left out,
+    and the exit code is then 1.
     """
     if output.exists() and (not output.is_dir() or any(output.iterdir())):
         raise typer.BadParameter(f"'{output}' exists already; name a new directory.", param_hint="--output")

@@ -1,4 +1,4 @@
-"""Makes a data set of recordings, one after the other; what cannot be used is left out with a reason."""
+"""Makes a data set of recordings, in turn; an unusable recording is left out with a reason."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class Conversion:
     """A data set in the making."""
 
     def __init__(self, directory: Path, wanted: Wanted) -> None:
-        """Begin with what is `wanted` of each recording; `directory` holds no data set."""
+        """Begin a data set with the `wanted` parts of each recording; `directory` holds no data set."""
         self._directory, self._wanted = directory, wanted
         self._writer: Writer | None = None
         self._size = wanted.size
         self.left_out = 0
-        """Recordings that could not be used."""
+        """Unusable recordings."""
         self.is_whole = False
         """Whether the files are finished, with an episode at least."""
 
@@ -44,7 +44,7 @@ class Conversion:
             self.is_whole = self._writer.episodes > 0
 
     def add(self, path: Path) -> str:
-        """Append the recording at `path`; return what is to be said about it, or nothing.
+        """Append the recording at `path`; return a remark, or nothing.
 
         Raises TrocarError without OpenGL.
         """
@@ -61,7 +61,7 @@ class Conversion:
         return f"'{path}' was cut short: its first {seconds:g} s are taken" if cut_short else ""
 
     def _add(self, path: Path, recording: Recording) -> float:
-        """Append a recording; return how long its episode is, s."""
+        """Append a recording; return the episode's length, s."""
         wanted = self._wanted
         episode = Episode.of(recording, wanted)
         size = self._size or recorded_size(recording) or DEFAULT_SIZE
@@ -80,7 +80,7 @@ class Conversion:
         return pictures.count / wanted.fps
 
     def summary(self) -> str:
-        """Return what has been made, in one line. Raises RecordingError if nothing has."""
+        """Return a summary of the data set, in a line. Raises RecordingError if nothing was made."""
         if self._writer is None or not self._writer.episodes:
             raise RecordingError("no recording could be used, so there is no data set")
         count, left_out = self._writer.episodes, f", {self.left_out} left out" if self.left_out else ""

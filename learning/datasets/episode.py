@@ -1,4 +1,4 @@
-"""An episode of a data set: the numbers of one recording at the times of its frames."""
+"""An episode of a data set: the numbers of a recording at the times of its frames."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["Episode", "Wanted", "opened"]
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a data set takes from each recording."""
+    """Parts of each recording wanted in a data set."""
 
     fps: int = 25
     size: tuple[int, int] | None = None
-    """Width and height of the pictures; None: as the first recording has them, else 640 x 480."""
+    """Width and height of the pictures; None: as in the first recording, else 640 x 480."""
     task: str = ""
-    """What the robot does, in words; empty: the description of each recording's scenario."""
+    """The robot's task in words; empty: the description of each recording's scenario."""
     state: tuple[str, ...] = ()
     """Ports, or fields of ports; empty: measured joints of all arms."""
     action: tuple[str, ...] = ()
@@ -44,11 +44,11 @@ class Episode:
     """The newest values at each frame, shape (n, len(state_names))."""
     action_names: tuple[str, ...]
     action: NDArray[np.float32]
-    """What is commanded when the next frame is taken, shape (n, len(action_names))."""
+    """Commands at the time of the next frame, shape (n, len(action_names))."""
 
     @classmethod
     def of(cls, recording: Recording, wanted: Wanted) -> Episode:
-        """Return the numbers of `recording`, from when all are known until one of the state ends.
+        """Return the numbers of `recording`, from when all are known until a number of the state ends.
 
         Each frame has its action, a frame later. Raises RecordingError if the recording lacks numbers, or
         lasts for less than a frame.
@@ -85,9 +85,9 @@ def _names(columns: Sequence[Columns]) -> tuple[str, ...]:
 
 
 def opened(path: Path, scratch: Path) -> tuple[Recording, bool]:
-    """Open a recording; return also whether it was cut short, and its readable part saved in `scratch`.
+    """Open a recording; return also whether the recording was cut short and saved in `scratch`.
 
-    Raises RecordingError if nothing in it can be read.
+    `scratch` then has the readable part. Raises RecordingError if nothing can be read.
     """
     try:
         return Recording(path), False

@@ -1,4 +1,4 @@
-"""What `meta/info.json` of a LeRobotDataset says of each column and each video."""
+"""Descriptions of columns and videos in `meta/info.json` of a LeRobotDataset."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ FORMAT = "v3.0"
 """`codebase_version` of the layout (LeRobot 0.4)."""
 VIDEO_KEYS = tuple(f"observation.images.{eye}" for eye in EYES)
 INDICES = ("frame_index", "episode_index", "index", "task_index")
-"""Columns of whole numbers that every data set has: the frame in its episode, the episode, the frame in the
-data set, the task.
+"""Columns of whole numbers of every data set: the frame in its episode, the episode, the frame in the data
+set, the task.
 """
 
 

@@ -1,4 +1,4 @@
-"""Stereo pictures of a recording at the frames of an episode: those that it has, else drawn."""
+"""Stereo pictures of a recording at the frames of an episode: recorded, else drawn."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["DEFAULT_SIZE", "EYES", "Pair", "Stereo", "recorded_size", "stereo"]
 
 EYES = ("left", "right")
 DEFAULT_SIZE = (640, 480)
-"""Of pictures that are drawn where none are recorded: the SD camera of the dVRK Classic (decision 13)."""
+"""Size of drawn pictures where none are recorded: the SD camera of the dVRK Classic (decision 13)."""
 _NS = 1_000_000_000
 _NEVER_NS = -(2**62)
 
@@ -32,17 +32,17 @@ class Stereo:
     """The pictures of an episode."""
 
     count: int
-    """Frames that have pictures: all, or all but the last, which a camera has not delivered at the end."""
+    """Frames with pictures: all, or all but the last, if a camera has not delivered at the end."""
     recorded: bool
-    """Whether the session recorded them; else they are drawn from its states."""
+    """Whether the session recorded the pictures; else the session's states are drawn."""
     pairs: Iterator[Pair]
 
 
 def stereo(recording: Recording, times_ns: NDArray[np.int64], fps: int, size: tuple[int, int]) -> Stereo:
     """Return the pictures at `times_ns`, shape (n,), recorded or drawn.
 
-    Recorded ones are taken if they have this size and each frame has one of its own. Raises RecordingError
-    if there is nothing to draw, TrocarError without OpenGL; so may the pictures.
+    Recorded pictures are used if the size is right and each frame has its own picture. Raises
+    RecordingError if there is nothing to draw, TrocarError without OpenGL; so may the pictures.
     """
     ports = _ports(recording)
     if ports and recorded_size(recording) == size:
@@ -69,9 +69,9 @@ def recorded_size(recording: Recording) -> tuple[int, int] | None:
 
 
 def _ports(recording: Recording) -> tuple[str, ...]:
-    """Return the ports with the pictures of both eyes; empty if they are not recorded.
+    """Return the ports with the pictures of both eyes; empty if not recorded.
 
-    They are those of the ECM's tip, if there is one, and uncompressed if they are recorded both ways.
+    The ECM's tip is preferred, and uncompressed pictures if recorded both ways.
     """
     participants = recording.scenario().participants
     cameras = [(name, spec.params) for name, spec in participants.items() if spec.kind == "endoscope"]
@@ -96,7 +96,7 @@ def _newest(recording: Recording, port: str, times_ns: NDArray[np.int64]) -> NDA
 def _recorded(
     recording: Recording, port: str, taken_ns: NDArray[np.int64], size: tuple[int, int]
 ) -> Iterator[NDArray[np.uint8]]:
-    """Yield the pictures that were taken at `taken_ns`, each once."""
+    """Yield the pictures taken at `taken_ns`, each once."""
     wanted = iter(taken_ns.tolist())
     next_ns = next(wanted, None)
     for stamp_ns, pixels in _pictures(recording, port):
@@ -132,7 +132,7 @@ def _decoded(recording: Recording, topic: str, type_name: str, payload: bytes) -
 
 
 def _pixels(picture: Image | CompressedImage) -> NDArray[np.uint8]:
-    """Return a picture, shape (height, width, 3), RGB. Raises OSError or ValueError if it is damaged."""
+    """Return a picture, shape (height, width, 3), RGB. Raises OSError or ValueError if damaged."""
     if isinstance(picture, Image):
         if picture.encoding != "rgb8":
             raise ValueError(f"encoding '{picture.encoding}', expected 'rgb8'")

@@ -1,4 +1,4 @@
-"""Statistics by which a learner normalises: least, largest, mean, deviation and quantiles of each feature."""
+"""Statistics for a learner's normalisation: least, largest, mean, deviation and quantiles of each feature."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["PictureCounts", "vector_statistics"]
 
 _QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 _EVERY = 4
-"""Of both sides of a picture: the pixels that are counted, which is what LeRobot does from 600 pixels on."""
+"""Step between counted pixels on both sides of a picture, as in LeRobot from 600 pixels on."""
 _LEVELS = 256
 
 
@@ -25,7 +25,7 @@ def vector_statistics(rows: NDArray[Any]) -> dict[str, list[Any]]:
 
 
 class PictureCounts:
-    """How often each level of each channel is in pictures; all statistics follow from that, exactly."""
+    """Counts of each level of each channel in pictures; all statistics follow exactly."""
 
     def __init__(self) -> None:
         self._levels = np.zeros((3, _LEVELS), np.int64)

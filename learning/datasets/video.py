@@ -1,4 +1,4 @@
-"""A video file of one camera, written frame by frame."""
+"""A video file of a camera, written frame by frame."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ __all__ = ["CODEC", "PIXEL_FORMAT", "Video"]
 CODEC, PIXEL_FORMAT = "av1", "yuv420p"
 _ENCODER = "libsvtav1"
 _OPTIONS = {"crf": "30", "g": "2", "preset": "12"}
-"""Those with which LeRobot encodes its own: a frame that is sought is at most one after a key frame."""
+"""Options of LeRobot's own encoding: a sought frame is at most a frame after a key frame."""
 
 
 class Video:
-    """An MP4 file that grows."""
+    """An MP4 file in the making."""
 
     def __init__(self, file: Path, size: tuple[int, int], fps: int) -> None:
         """Create the file; `size` is width and height, pixels."""
@@ -29,9 +29,9 @@ class Video:
 
         file.parent.mkdir(parents=True, exist_ok=True)
         self.frames = 0
-        """That were added."""
+        """Number of frames added."""
         self.size_bytes = 0
-        """Of what is encoded so far."""
+        """Size of the encoded part, bytes."""
         self._frame_time = Fraction(1, fps)
         self._container = av.open(str(file), "w")
         self._stream: Any = self._container.add_stream(_ENCODER, rate=fps, options=_OPTIONS)

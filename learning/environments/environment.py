@@ -1,4 +1,4 @@
-"""The Gymnasium environment: a stepped session, whose task watches and whose `actions` lead the hands."""
+"""The Gymnasium environment: a stepped session with a watching task and `actions` for the hands."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ __all__ = ["ActionError", "Environment"]
 Observation = dict[str, NDArray[Any]]
 
 _FAR = 2.0
-"""m; coordinates are clipped to this, so that spaces are bounded."""
+"""m; coordinates are clipped to this bound, for bounded spaces."""
 _SETTLING_NS = 20_000_000
-"""Until the first action is due where things are put: the period at which the scenes report them."""
+"""Time until the first action if objects are put: the period of the scenes' reports."""
 _EYES = ("left", "right")
 
 
 class ActionError(MessageError, InvalidAction):
-    """An action is not what the action space holds."""
+    """An action outside the action space."""
 
 
 class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
-    """One exercise as a goal environment.
+    """An exercise as a goal environment.
 
     Args:
         exercise: Its class.
@@ -123,7 +123,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def layout(self) -> dict[str, slice]:
-        """Where each part of `observation` stands in it, by name."""
+        """Slice of each part of `observation`, by name."""
         layout: dict[str, slice] = {}
         at = 0
         for name, size in self._view.names().items():
@@ -139,10 +139,10 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode; the `seed` decides where things start, and the goal.
+        """Begin an episode; the `seed` decides the starting places and the goal.
 
-        `options`: none are known. Things are put and seen before the first action is due, after 20 ms; where
-        none are put, it is due at once.
+        `options`: none are known. Objects are put and seen before the first action is due, after 20 ms;
+        without any, the first action is due at once.
         """
         self._require_open()
         super().reset(seed=seed)
@@ -165,7 +165,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         return place
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Act for one step. What is out of range is clipped.
+        """Act for a step. Values out of range are clipped.
 
         Raises ActionError for anything but finite numbers of the right shape, SessionError after `close`.
         """
@@ -205,7 +205,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         desired_goal: NDArray[Any],
         info: Mapping[str, Any] | Sequence[Mapping[str, Any]] | NDArray[Any],
     ) -> NDArray[np.float64]:
-        """Return the reward of goals, shape (..., size): one, or many at once as hindsight replay asks."""
+        """Return the reward of goals, shape (..., size): a single goal, or many as for hindsight replay."""
         return reward(self.reward, self.exercise.tolerance, achieved_goal, desired_goal, info)
 
     def _observe(self) -> Observation:

@@ -1,6 +1,6 @@
-"""What is to be done in each environment: its scene, where things start, and which goals are drawn.
+"""The exercises of the environments: scene, starting places, and drawn goals.
 
-Metres, in the world of the scene; quaternions (x, y, z, w). Numbers of SurRoL are those of med-air/SurRoL at
+Metres, in the world of the scene; quaternions (x, y, z, w). Numbers of SurRoL are from med-air/SurRoL at
 a903fa6, in its unscaled lengths.
 """
 
@@ -41,19 +41,19 @@ _NEAR = Tolerance(5e-3)
 
 
 class Exercise(ABC):
-    """One environment's task."""
+    """An environment's task."""
 
     scene: ClassVar[str]
     hands: ClassVar[tuple[str, ...]] = ("PSM1",)
     goal_size: ClassVar[int] = 3
     tolerance: ClassVar[Tolerance] = _NEAR
     floor: ClassVar[float] = -0.05
-    """Height under which a thing is lost, m."""
+    """Height below which an object is lost, m."""
     puts: ClassVar[bool] = True
     """Whether things are put where an episode starts."""
 
     def __init__(self, task: Task) -> None:
-        """Take the task that watches the scene, which knows where its things belong."""
+        """Begin with the task that watches the scene and knows the objects' targets."""
         self.task = task
 
     @abstractmethod
@@ -62,10 +62,10 @@ class Exercise(ABC):
 
     @abstractmethod
     def achieved(self, view: View) -> Vector:
-        """Return what has been achieved of the goal, shape (goal_size,)."""
+        """Return the achieved part of the goal, shape (goal_size,)."""
 
     def lost(self, view: View) -> bool:
-        """Say whether a thing has fallen out of the scene."""
+        """Return whether a thing has fallen out of the scene."""
         return bool((view.poses[:, 2] < self.floor).any())
 
 
@@ -85,13 +85,13 @@ class Reach(Exercise):
 
 
 _RADIUS, _WIRE = 11.44e-3, 0.4e-3
-"""Of the needle (engines.mujoco.object_params), m."""
+"""Radius and wire of the needle (engines.mujoco.object_params), m."""
 _SPREAD = 10e-3
 """SurRoL's: where a needle starts, to either side, and the standard deviation of a goal, m."""
 
 
 def _needle_at(x: float, y: float, yaw: float) -> Vector:
-    """Return the pose of a needle on the table whose middle is at (x, y), with its x axis at `yaw` (rad)."""
+    """Return the pose of a needle on the table with its middle at (x, y) and its x axis at `yaw` (rad)."""
     turn = rotation.exp(np.array([0.0, 0.0, yaw]))
     centre = np.array([x, y, _WIRE]) - _RADIUS * np.array([np.cos(yaw), np.sin(yaw), 0.0])
     return np.concatenate([centre, turn])
@@ -103,7 +103,7 @@ def _middle(pose: Vector) -> Vector:
 
 
 class NeedlePick(Exercise):
-    """Take up a needle by its middle and bring that to a goal over the table. SurRoL's NeedlePick."""
+    """Take up a needle by the middle and bring the middle to a goal over the table. SurRoL's NeedlePick."""
 
     scene = "needle-pick"
 
@@ -120,7 +120,7 @@ class NeedlePick(Exercise):
 
 
 class NeedleHandOver(Exercise):
-    """Take up a needle with PSM1, give it to PSM2, and bring it to a goal on that one's side."""
+    """Take up a needle with PSM1, hand over to PSM2, and bring the needle to a goal on PSM2's side."""
 
     scene = "needle-hand-over"
     hands = ("PSM1", "PSM2")
@@ -135,12 +135,12 @@ class NeedleHandOver(Exercise):
         return {"needle": _needle_at(x, y, yaw)}, np.array([gx, gy, 0.04, 1.0])
 
     def achieved(self, view: View) -> Vector:
-        """Return where the middle of the needle is, and whether PSM2 holds it."""
+        """Return the middle of the needle, and whether PSM2 holds the needle."""
         return np.append(_middle(view.poses[0]), view.held[0, 1])
 
 
 class PegTransfer(Exercise):
-    """Carry a ring from a post of one side to a given post of the other. SurRoL's PegTransfer."""
+    """Carry a ring from a post to a given post of the opposite side. SurRoL's PegTransfer."""
 
     scene = "peg-transfer"
     tolerance = Tolerance(5e-3, 4e-3)
@@ -148,7 +148,7 @@ class PegTransfer(Exercise):
     task: PegBoardTask
 
     def draw(self, rng: Generator) -> tuple[Starts, Vector]:
-        """Draw the ring's post, its turn, and the post where it belongs."""
+        """Draw the ring's post, its turn, and the target post."""
         goals = self.task.goals
         assert goals.positions is not None
         start, target = rng.choice(self.starts), rng.choice(sorted(goals.targets[0]))
@@ -157,7 +157,7 @@ class PegTransfer(Exercise):
 
     @property
     def starts(self) -> tuple[int, ...]:
-        """The posts that rings start on."""
+        """The starting posts of rings."""
         return self.task.params.board.measures.starts
 
     def achieved(self, view: View) -> Vector:
@@ -166,7 +166,7 @@ class PegTransfer(Exercise):
 
 
 class TwoHandedPegTransfer(PegTransfer):
-    """Carry a ring over the wall of the board of ICRA 2026, from one hand to the other."""
+    """Carry a ring over the wall of the board of ICRA 2026, from hand to hand."""
 
     scene = "bi-peg-transfer"
     hands = ("PSM1", "PSM2")
@@ -174,7 +174,7 @@ class TwoHandedPegTransfer(PegTransfer):
 
 
 class PickAndPlace(Exercise):
-    """Carry a piece from the table into one of two dishes."""
+    """Carry a piece from the table into a dish of two."""
 
     scene = "pick-and-place"
     tolerance = Tolerance(DISH.inner_radius, 0.5 * DISH.height)
@@ -182,7 +182,7 @@ class PickAndPlace(Exercise):
     task: PickAndPlaceTask
 
     def draw(self, rng: Generator) -> tuple[Starts, Vector]:
-        """Draw where the piece stands, its turn, and the dish."""
+        """Draw the piece's place, turn, and dish."""
         x, y = rng.uniform([-0.01, -0.035], [0.01, -0.015])
         height = PIECE.size[2] / 2.0
         turn = rotation.exp(np.array([0.0, 0.0, rng.uniform(-pi / 4.0, pi / 4.0)]))
@@ -196,7 +196,7 @@ class PickAndPlace(Exercise):
 
 
 class Retraction(Exercise):
-    """Grasp the free edge of the liver's left lobe and lift it to a height."""
+    """Grasp the free edge of the liver's left lobe and lift the edge to a height."""
 
     scene = "retraction"
     goal_size = 1
@@ -208,5 +208,5 @@ class Retraction(Exercise):
         return {}, rng.uniform(0.012, 0.025, 1)
 
     def achieved(self, view: View) -> Vector:
-        """Return how far what is held has been lifted, 0 while nothing is."""
+        """Return the lifted height of the held tissue, 0 while nothing is held."""
         return view.tissue[1:] * view.tissue[0]

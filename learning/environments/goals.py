@@ -1,7 +1,7 @@
-"""Goals of environments: when one is reached, and what a step is worth. For one goal, or for many at once.
+"""Goals of environments: the test of a reached goal, and rewards. For a single goal, or for many at once.
 
-A goal is a place, m, shape (..., 3), or (..., 4) with a fourth number that has to be the same: whether the
-hand that is to hold a thing does. Where only a height counts it has one number.
+A goal is a place, m, shape (..., 3), or (..., 4) with a fourth number to be matched: whether the receiving
+hand holds the object. A goal of height alone has a single number.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ __all__ = ["Reward", "Tolerance", "bonus", "reward"]
 Reward = Literal["sparse", "shaped"]
 
 WORTH = {"grasped": 0.5, "lifted": 0.5, "handed over": 1.0, "placed": 1.0, "dropped": -1.0}
-"""Of the task's events, in the shaped reward. An event counts when it first happens in an episode; a drop
-counts each time.
+"""Values of the task's events in the shaped reward. An event counts when first happening in an episode; a
+drop counts each time.
 """
 LENGTH = 0.1
 """m; a goal so far away costs 1 in the shaped reward."""
@@ -27,15 +27,15 @@ LENGTH = 0.1
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How near to its goal is near enough, m."""
+    """Distance from a goal that is near enough, m."""
 
     across: float
-    """In the horizontal plane; of a distance, if `along` is None."""
+    """Tolerance in the horizontal plane, or in distance if `along` is None."""
     along: float | None = None
     """Along z."""
 
     def reached(self, achieved: NDArray[Any], desired: NDArray[Any]) -> NDArray[np.bool_]:
-        """Say of goals of shape (..., size) whether they are reached, shape (...)."""
+        """Return whether goals of shape (..., size) are reached, shape (...)."""
         off = np.abs(achieved - desired)
         if self.along is None:
             near = distance(achieved, desired) < self.across
@@ -57,7 +57,7 @@ def reward(
     desired: NDArray[Any],
     info: Mapping[str, Any] | Sequence[Mapping[str, Any]] | NDArray[Any],
 ) -> NDArray[np.float64]:
-    """Return what steps are worth, shape (...).
+    """Return the rewards of steps, shape (...).
 
     sparse: 0 where the goal is reached, else -1. shaped: minus the distance in units of 0.1 m, plus the
     `bonus` in `info`.
@@ -73,7 +73,7 @@ def reward(
 
 
 def bonus(events: Sequence[str], seen: set[str]) -> float:
-    """Return what the kinds of a step's events are worth, and add them to those `seen` in the episode."""
+    """Return the value of a step's kinds of events, and add the kinds to those `seen` in the episode."""
     total = 0.0
     for kind in events:
         if kind == "dropped" or kind not in seen:

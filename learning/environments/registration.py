@@ -22,7 +22,7 @@ ENVIRONMENTS: Mapping[str, tuple[str, int]] = MappingProxyType(
         "trocar/Retraction-v0": ("Retraction", 50),
     }
 )
-"""By id: the class of its exercise, and the steps of an episode."""
+"""Class of the exercise and steps of an episode, by id."""
 
 
 def make(exercise: str, **arguments: Any) -> Environment:

@@ -1,4 +1,4 @@
-"""What an environment sees of its session at one instant: tips, jaws, things and tissue, in the world.
+"""Observations of a session at an instant: tips, jaws, objects and tissue, in the world.
 
 Metres and radians; quaternions (x, y, z, w).
 """
@@ -19,7 +19,7 @@ __all__ = ["View"]
 
 
 class View:
-    """Reads the newest outputs of a session's robot, and of its tissue if it has one."""
+    """Reads the newest outputs of a session's robot, and of its tissue if present."""
 
     def __init__(self, session: trocar.SteppedSession, task: Task, arms: Sequence[str]) -> None:
         self._session, self.arms, self.things = session, tuple(arms), task.things
@@ -33,7 +33,7 @@ class View:
         self.poses, self.held = np.zeros((n, 7)), np.zeros((n, m))
         """Poses of the things, shape (n, 7), and whether each hand holds each, shape (n, m)."""
         self.tissue = np.zeros(2)
-        """Whether tissue is held, and how far what is held has been lifted, m."""
+        """Whether tissue is held, and the lifted height of the held tissue, m."""
 
     def read(self) -> None:
         """Read the present instant."""
@@ -61,7 +61,7 @@ class View:
         return names | ({"tissue/held": 1, "tissue/lift": 1} if self._tissue else {})
 
     def vector(self) -> Vector:
-        """Return all of it in a row, shape (size,), as `names` says."""
+        """Return all values in a row, shape (size,), in the order of `names`."""
         hands = np.column_stack([self.tips, self.jaws])
         things = np.column_stack([self.poses, self.held])
         return np.concatenate([hands.ravel(), things.ravel(), self.tissue if self._tissue else ()])

@@ -1,4 +1,4 @@
-"""An exciting motion as a recording that a session plays: CRTK's `servo_jp` of an arm and its jaw."""
+"""An exciting motion as a recording for a session to play: CRTK's `servo_jp` of an arm and its jaw."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ _INCHES, _INCHES_A_JOINT, _DPI = 10.0, 1.6, 120
 
 
 def write_figure(file: Path, found: Fit, joints: Sequence[str]) -> None:
-    """Write the efforts over time to `file`, as its suffix says; what the fit has not seen is shaded."""
+    """Write the efforts over time to `file`, in the suffix's format; held-back data is shaded."""
     figure = Figure(figsize=(_INCHES, _INCHES_A_JOINT * len(joints)), layout="constrained")
     FigureCanvasAgg(figure)
     unseen = found.time[found.test]

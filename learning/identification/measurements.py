@@ -1,4 +1,4 @@
-"""Joint states of one arm from recordings: our MCAP, a ROS bag of either version, or a CSV file."""
+"""Joint states of an arm from recordings: our MCAP, a ROS bag of either version, or a CSV file."""
 
 from __future__ import annotations
 
@@ -21,12 +21,11 @@ _TOPIC = "measured_js"
 
 
 def measurements(path: Path, arm: str, joints: Sequence[str], owner: str = "") -> Measured:
-    """Return the states of n joints of `arm` as `path` records them, by receipt or message time.
+    """Return the states of n joints of `arm` as recorded in `path`, by receipt or message time.
 
-    A bag has `<arm>/measured_js` at the end of a topic, and `<arm>/jaw/measured_js` for the jaw, the last
-    joint if it is one; `owner` is the participant of a session whose topics count. A CSV file has a line of
+    A bag has `<arm>/measured_js` at the end of a topic, and `<arm>/jaw/measured_js` for a jaw as the last
+    joint; `owner` is the participant of a session with the topics that count. A CSV file has a line of
     names: `time` (s), `position.<joint>` (rad, m) and `effort.<joint>` (N m, N), the joints in any order.
-
     Raises RecordingError where the topic, a column or the effort is missing.
     """
     return (
@@ -79,9 +78,9 @@ def _at(clock: Vector, states: Measured, values: Vector) -> Vector:
 
 
 def _states(path: Path, bag: RosBag, ending: str, count: int) -> Measured:
-    """Return the first `count` numbers of the joint states on the topic that ends in `ending`.
+    """Return the first `count` numbers of the joint states on the topic ending in `ending`.
 
-    Of several, such as those of an engine and its controller, it is the one with the most messages.
+    Of several, such as an engine's and its controller's, the topic with the most messages counts.
     """
     times: list[float] = []
     states: list[tuple[Any, Any]] = []

@@ -1,1 +1,1 @@
-"""`trocar sweep`: the same scenario many times, with other values of its parameters."""
+"""`trocar sweep`: the same scenario many times, with varied parameters."""

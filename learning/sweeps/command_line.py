@@ -62,10 +62,10 @@ def sweep(
     ] = None,
     record: Annotated[bool, typer.Option(help="Keep a recording of each trial.")] = True,
 ) -> None:
-    """Run a scenario many times with other values, and write one table of all trials.
+    """Run a scenario many times with varied values, and write a table of all trials.
 
-    Each trial is a process of its own. One that fails is repeated once and marked. A sweep that was
-    interrupted goes on with the same command.
+    Each trial is a process. A trial that fails is repeated once and marked. The same command continues an
+    interrupted sweep.
     """
     needed = _PACKAGES | ({"ray": "ray"} if ray else {})
     for package, extra in needed.items():

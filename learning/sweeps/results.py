@@ -1,4 +1,4 @@
-"""The results of a sweep: one table of all trials, and plots of what it varied."""
+"""The results of a sweep: a table of all trials, and plots over the varied parameters."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _ABOUT_THE_RUN = {
     "steps", "sim_time_s", "wall_time_s", "real_time_factor", "late_steps", "dropped_messages", "state_hash",
     "recording_complete", "energy_residual_j",
 }  # fmt: skip
-"""Columns that are not plotted: they say how a trial went, not what came out."""
+"""Columns about the run itself, not plotted."""
 _MOST_PLOTS = 12
 _LARGEST = 1e300
-"""Absolute value of a number that is drawn; a damaged row may hold any."""
+"""Absolute value of a number drawn; a damaged row may hold any."""
 
 
 def flat(row: Mapping[str, Any], variations: Sequence[Variation]) -> dict[str, Any]:
-    """Return a row without mappings in it, and varied values as numbers where they have a common unit."""
+    """Return a row without mappings in it, and varied values as numbers if their unit is common."""
     units = {variation.path: variation.unit for variation in variations}
     made: dict[str, Any] = {}
     for name, value in row.items():
@@ -38,7 +38,7 @@ def flat(row: Mapping[str, Any], variations: Sequence[Variation]) -> dict[str, A
 
 
 def write_table(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variation], file: Path) -> None:
-    """Write all rows as one parquet file; the unit of a varied parameter is in its column's metadata."""
+    """Write all rows as a parquet file; the unit of a varied parameter is in the column's metadata."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -102,7 +102,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _draw(axis: Any, rows: Sequence[Mapping[str, Any]], variation: Variation, measure: str) -> None:
-    """Draw all trials as points, and the mean of those with the same value as a line."""
+    """Draw all trials as points, and the mean of trials with the same value as a line."""
     points = [(row[variation.path], row[measure]) for row in rows if _is_number(row.get(measure))]
     if variation.unit is None:
         points = [(str(x), y) for x, y in points]

@@ -1,13 +1,13 @@
-"""A sweep and its directory: which trials are done, and what they gave.
+"""A sweep and its directory: finished trials and their results.
 
     DIR/.trocar                 marks a sweep's directory; locked while the sweep runs
-    DIR/sweep.json              what is swept
-    DIR/trials/00007.json       the row of a trial that is done
+    DIR/sweep.json              the settings of the sweep
+    DIR/trials/00007.json       the row of a finished trial
     DIR/trials/00007/           its recording
     DIR/results.parquet, .png   the table and its plots, written anew after each run
 
-A trial counts as done when its row stands there, which is written in one piece: a sweep that was interrupted,
-however it ended, goes on where it stopped.
+A trial counts as done when its row stands there, written in a single piece: an interrupted sweep, however
+ended, goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ _Call = tuple[str, list[str], str | None]
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is swept, and where the results go."""
+    """The trials to run, and the directory of the results."""
 
     scenario: str
-    """A name or a path, as `trocar run` takes it."""
+    """A name or a path, as for `trocar run`."""
     variations: tuple[Variation, ...]
     directory: Path
     repeat: int = 1
     seed: str | None = None
-    """The path of a parameter that gets the number of the repetition."""
+    """Path of a parameter set to the number of the repetition."""
     overrides: tuple[str, ...] = ()
-    """What every trial has, as `--set` takes it."""
+    """Settings of every trial, as for `--set`."""
     recorded: bool = True
 
     @property
@@ -68,7 +68,7 @@ class Sweep:
 
     @cached_property
     def scenario_hash(self) -> str:
-        """SHA-256 of the scenario of the first trial as it is now; comments are not in it.
+        """SHA-256 of the first trial's scenario, as loaded now; comments do not count.
 
         Raises ScenarioError if the scenario is not valid.
         """
@@ -77,9 +77,10 @@ class Sweep:
         return hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()
 
     def open(self) -> None:
-        """Begin in the directory, or go on with the sweep in it; the caller has claimed it.
+        """Begin in the directory, or go on with the sweep there; the caller has claimed the directory.
 
-        Raises ScenarioError if it holds another sweep or something else, or if the scenario has changed.
+        Raises ScenarioError if the directory holds another sweep or something else, or if the scenario has
+        changed.
         """
         file, described = self.directory / "sweep.json", self._described()
         if file.exists():
@@ -101,7 +102,7 @@ class Sweep:
         _write(file, json.dumps(described, indent=2) + "\n")
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return the rows of all trials that are done, in order; raises ScenarioError for a damaged row."""
+        """Return the rows of all finished trials, in order; raises ScenarioError for a damaged row."""
         rows: list[dict[str, Any]] = []
         for trial in self.trials:
             if (file := self._row(trial)).exists():
@@ -113,13 +114,13 @@ class Sweep:
         return rows
 
     def pending(self) -> list[Trial]:
-        """Return the trials that are not done yet."""
+        """Return the trials not done yet."""
         return [trial for trial in self.trials if not self._row(trial).exists()]
 
     def run(self, jobs: int, *, ray: str | None = None) -> Iterator[dict[str, Any]]:
-        """Run what is pending, `jobs` trials at a time, and yield each row when it is there and written.
+        """Run the pending trials, `jobs` at a time, and yield each row once written.
 
-        `ray` is the address of a Ray cluster, whose nodes run the trials; `jobs` is then left to it.
+        `ray` is the address of a Ray cluster with nodes for the trials; `jobs` is then left to Ray.
         """
         pending = self.pending()
         made = _on_ray(ray, self._calls(pending)) if ray else _here(jobs, self._calls(pending))
@@ -144,7 +145,7 @@ class Sweep:
         return {path: value for path, _, value in (each.partition("=") for each in self.overrides)}
 
     def _described(self) -> dict[str, Any]:
-        """Return what the sweep is, as `sweep.json` keeps it."""
+        """Return the settings of the sweep for `sweep.json`."""
         return {
             "scenario": self.scenario,
             "scenario_hash": self.scenario_hash,
@@ -187,7 +188,7 @@ def _numbered(number: int, call: _Call) -> tuple[int, dict[str, Any]]:
 
 
 def _texts(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Return values as `--set` reads them."""
+    """Return values as texts for `--set`."""
     return {path: json.dumps(value) for path, value in settings.items()}
 
 
@@ -205,6 +206,6 @@ def _read(file: Path) -> dict[str, Any]:
 
 
 def _write(file: Path, text: str) -> None:
-    """Write a file in one piece."""
+    """Write a file in a single piece."""
     with whole_file(file) as part:
         part.write_text(text, encoding="utf-8")

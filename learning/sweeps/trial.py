@@ -1,4 +1,4 @@
-"""One trial of a sweep: `trocar run` in a process of its own, whose end, however it comes, is a row."""
+"""A trial of a sweep: `trocar run` in its own process; every end of the process is a row."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["Trial", "planned", "run_trial"]
 _ATTEMPTS = 2
 _LAST_LINES = 3
 _LEFT_OUT = {"latency", "observers", "profile", "session", "recording"}
-"""Of a summary: what has no place in a row, and what the row has under another name."""
+"""Entries of a summary left out of a row, or present there under another name."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Which values a trial has, and which repetition of them it is, from 0."""
+    """The values of a trial, and the number of the repetition, from 0."""
 
     number: int
     repetition: int
@@ -34,14 +34,14 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """The name of its files."""
+        """The name of the trial's files."""
         return f"{self.number:05d}"
 
 
 def planned(variations: Sequence[Variation], repeat: int, seed: str | None) -> list[Trial]:
     """Return all trials: each combination of values, `repeat` times, the last variation changing fastest.
 
-    `seed` is the path of a parameter that gets the number of the repetition, from 0.
+    `seed` is the path of a parameter set to the number of the repetition, from 0.
     """
     combinations = product(*(variation.values for variation in variations))
     settings = [
@@ -54,12 +54,12 @@ def planned(variations: Sequence[Variation], repeat: int, seed: str | None) -> l
 
 
 def run_trial(scenario: str, overrides: Sequence[str], recording: str | None) -> dict[str, Any]:
-    """Run a trial, again if its process ends with a failure, and return its row.
+    """Run a trial, again if the process ends with a failure, and return the row.
 
     Args:
-        scenario: the name or path that `trocar run` is given.
-        overrides: what its `--set` is given.
-        recording: the directory of its recording; whatever stands there is removed first.
+        scenario: name or path for `trocar run`.
+        overrides: values for `--set`.
+        recording: the directory of the recording; present contents are removed first.
     """
     command = [sys.executable, "-P", "-m", "hub.command_line.child", str(os.getpid())]
     command += ["run", scenario, "--pace", "fast", "--json"]
@@ -77,7 +77,7 @@ def run_trial(scenario: str, overrides: Sequence[str], recording: str | None) ->
 
 
 def _run_child(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    """Run a command that ends with this process: where the kernel does not end it, its input does."""
+    """Run a command that ends with this process: by the kernel, or else by the end of its input."""
     reading, writing = os.pipe()
     try:
         return subprocess.run(command, stdin=reading, capture_output=True, text=True, check=False)
@@ -87,7 +87,7 @@ def _run_child(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
 
 
 def _ending(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
-    """Return what a process has left: its summary, or why there is none."""
+    """Return the result of a process: the summary, or why there is none."""
     if done.returncode == 0:
         summary: dict[str, Any] = json.loads(done.stdout)
         kept = {name: value for name, value in summary.items() if name not in _LEFT_OUT}

@@ -1,4 +1,4 @@
-"""What a sweep varies: one parameter of a scenario, and the values that it takes."""
+"""A variation of a sweep: a parameter of a scenario, and the values to try."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from schemas.errors import ScenarioError
 __all__ = ["MAX_VALUES", "Variation", "number_and_unit", "parse"]
 
 MAX_VALUES = 10_000
-"""Of one parameter: a range with more is a slip of the keyboard."""
+"""Largest number of values of a parameter: a range with more is a slip of the keyboard."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _QUANTITY = re.compile(rf"({_NUMBER})\s*([^\d\s.:][^.:]*)?")
@@ -25,23 +25,23 @@ _RANGE = re.compile(
 
 @dataclass(frozen=True)
 class Variation:
-    """A parameter and its values."""
+    """A parameter and the values to try."""
 
     path: str
-    """As `--set` of `trocar run` names it."""
+    """Path of the parameter, as for `--set` of `trocar run`."""
     values: tuple[Any, ...]
-    """As they stand in a scenario: numbers, texts such as `5 kPa`, lists."""
+    """Values as in a scenario: numbers, texts such as `5 kPa`, lists."""
 
     @property
     def unit(self) -> str | None:
-        """The unit that all values have in common, empty for plain numbers; None if a value is no number."""
+        """The common unit of all values, empty for plain numbers; None if a value is no number."""
         found = [number_and_unit(value) for value in self.values]
         units = {each[1] for each in found if each is not None}
         return units.pop() if None not in found and len(units) == 1 else None
 
 
 def number_and_unit(value: Any) -> tuple[float, str] | None:
-    """Return a number and its unit; None for what is no number."""
+    """Return a number and its unit; None for anything but a number."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
     if not isinstance(value, str):

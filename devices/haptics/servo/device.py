@@ -54,7 +54,7 @@ class HapticDevice(Device):
 
         Args:
             name: the participant's name.
-            params: its parameters.
+            params: parameters.
             styluses: parameters of each stylus.
             max_age_ns: age at which a pose or twist is marked stale.
         """
@@ -104,7 +104,7 @@ class HapticDevice(Device):
         ]
 
     def write(self, port: str, value: Value) -> None:
-        """Pass on a contact model, which is rendered from the next tick on.
+        """Pass on a contact model, rendered from the next tick on.
 
         Raises MessageError for another port or type.
         """

@@ -66,7 +66,7 @@ def planes_in(record: Sequence[float]) -> list[Plane]:
 
 
 class State(NamedTuple):
-    """One tick of a stylus, base frame, SI units."""
+    """A tick of a stylus, base frame, SI units."""
 
     time: float
     """When the tick began, s of time.perf_counter, which all processes of a machine share."""

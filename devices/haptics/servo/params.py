@@ -17,7 +17,7 @@ _DEAD_MAN = "what must be held for force: the index of a button, or the safety s
 
 
 class ServoStylusParams(Params):
-    """One stylus."""
+    """A stylus."""
 
     device: Annotated[
         str | None,

@@ -22,7 +22,7 @@ class Finding(NamedTuple):
 
 
 class Probe:
-    """One attempt."""
+    """An attempt."""
 
     def __init__(self, process: ServoProcess, now: float) -> None:
         """`process` was started at `now` (s)."""

@@ -1,4 +1,4 @@
-"""One stylus inside the servo loop: condition, haptic loop and states.
+"""A stylus inside the servo loop: condition, haptic loop and states.
 
 The code runs a thousand times a second: plain floats, one clock.
 """

@@ -1,6 +1,6 @@
-"""Scripted policies, which do the exercises from the observation alone, in actions of an environment.
+"""Scripted policies for the exercises, from the observation alone, in actions of an environment.
 
-They show that an exercise can be done within its steps, and give demonstrations to learn from.
+The policies show that an exercise can be done within its steps, and give demonstrations to learn from.
 """
 
 from __future__ import annotations
@@ -29,5 +29,5 @@ ORACLES: Mapping[str, Callable[[Environment], Plan]] = MappingProxyType(
 
 
 def oracle(env: Environment) -> Oracle:
-    """Return the policy of an environment for one episode, called with each observation."""
+    """Return the policy of an environment for an episode, called with each observation."""
     return Oracle(env, ORACLES[type(env.exercise).__name__])

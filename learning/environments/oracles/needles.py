@@ -15,11 +15,11 @@ __all__ = ["hand_over", "needle_pick"]
 
 _NEEDLE = 11.44e-3
 _BITE, _HIGH = 9.2e-3, 0.04
-"""Height of a tip that takes a needle on the table, and of the one that hovers over it, m."""
+"""Height of a tip taking a needle on the table, and of a tip hovering above, m."""
 
 
 def _needle(seen: Seen, height: float) -> tuple[Vector, float]:
-    """Return a place over the middle of the needle, and the way across it."""
+    """Return a place over the middle of the needle, and the direction across the needle."""
     turn = seen.matrix("needle")
     place = seen["needle/position"] + turn[:, 0] * _NEEDLE
     return np.array([place[0], place[1], height]), yaw_of(turn)
@@ -39,7 +39,7 @@ def _carried(seen: Seen, arm: str) -> Waypoint:
 
 
 def needle_pick(_: Environment) -> Plan:
-    """Return how to take a needle by its middle and bring that to the goal."""
+    """Return a plan to take a needle by the middle and bring the middle to the goal."""
     return [
         (0, _to_needle(_HIGH, closed=False, near=4e-3)),
         (0, _to_needle(_BITE, closed=False)),
@@ -49,13 +49,13 @@ def needle_pick(_: Environment) -> Plan:
 
 
 def hand_over(_: Environment) -> Plan:
-    """Return how PSM1 takes a needle by its middle, and PSM2 its end from it."""
+    """Return a plan: PSM1 takes a needle by the middle, and PSM2 the needle's end from PSM1."""
 
     def meeting(_: Seen) -> Waypoint:
         return Waypoint(np.array([0.0, 0.0, 0.049]), 0.0, True)
 
     def end(seen: Seen, height: float, aside: float) -> tuple[Vector, float]:
-        """Return a place over the free end of the needle that is nearer to PSM2, and the way across it."""
+        """Return a place over the needle's free end nearer to PSM2, and the direction across the needle."""
         turn = seen.matrix("needle")
         angle = -1.35
         ends = [

@@ -16,8 +16,9 @@ __all__ = ["piece", "reach", "retraction"]
 _FORCEPS = 15.5e-3
 """The same of Cadiere forceps (robots.dvrk.instruments), m."""
 _BITE_PIECE = 5.0e-3
-"""How far inside the ends of the fingers the edges of a piece touch them, m: nearer to the ends sub-steps
-of 1 ms lose it."""
+"""Distance between the ends of the fingers and the edges of a held piece, m: nearer to the ends sub-steps
+of 1 ms lose the piece.
+"""
 
 
 def reach(_: Environment) -> Plan:
@@ -28,11 +29,11 @@ def reach(_: Environment) -> Plan:
 _EDGE = np.array([0.0474, 0.0, 0.0215])
 """Where a tip takes the edge of the liver's lobe, m."""
 _LIFT = np.array([-0.4, 0.0, 0.93])
-"""The way in which the edge gives way upwards."""
+"""Direction of yielding of the edge, upwards."""
 
 
 def retraction(_: Environment) -> Plan:
-    """Return how to take the edge of the lobe and lift it as high as the goal says."""
+    """Return a plan to take the edge of the lobe and lift the edge to the goal's height."""
     return [
         (0, lambda _: Waypoint(_EDGE, None, False, near=1.5e-3)),
         (0, lambda _: Waypoint(_EDGE, None, True, wait=2, near=5e-3)),

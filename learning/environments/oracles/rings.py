@@ -18,13 +18,13 @@ from schemas.vectors import Vector
 __all__ = ["bi_peg_transfer", "peg_transfer"]
 
 _ROOM = 0.016
-"""Between two hands at one ring, m."""
+"""Distance between two hands at a ring, m."""
 _DEPTH, _ASIDE = 5.0e-3, 3.5e-3
-"""How deep the fingers reach into a ring, and how far from the middle of its wall they take it, m."""
+"""Depth of the fingers in a ring, and distance of a grasp from the middle of the wall, m."""
 
 
 def _walls(ring: Ring, seen: Seen) -> list[tuple[Vector, float]]:
-    """Return where a jaw takes a ring's walls, as offsets from its middle, with the ways it opens."""
+    """Return the grasps of a ring's walls: offsets from the middle, and opening directions."""
     turn, over = seen.matrix("ring"), ring.height / 2.0 + REACH - _DEPTH
     middle = ring.inradius + ring.thickness / 2.0
     found: list[tuple[Vector, float]] = []
@@ -37,7 +37,7 @@ def _walls(ring: Ring, seen: Seen) -> list[tuple[Vector, float]]:
 
 
 def _ring_plan(env: Environment, hand: int, side: Vector) -> Plan:
-    """Return how a hand takes the ring: by the wall that its jaw turns least to, or that is on its `side`."""
+    """Return a hand's grasp of the ring: by the wall of least turn of the jaw, or on the hand's `side`."""
     arm = env.exercise.hands[hand]
     ring = cast("PegTransfer", env.exercise).task.params.board.measures.ring
     chosen: list[int] = []
@@ -73,7 +73,7 @@ def _ring_plan(env: Environment, hand: int, side: Vector) -> Plan:
 
 
 def peg_transfer(env: Environment) -> Plan:
-    """Return how one hand carries the ring to the goal's post."""
+    """Return a plan to carry the ring with a single hand to the goal's post."""
     board = cast("PegTransfer", env.exercise).task.params.board
     travel = board.position[2] + board.measures.post_height + board.measures.ring.height / 2.0 + 4e-3
     return [

@@ -1,4 +1,4 @@
-"""Policies that go through waypoints: to each until the tip is near enough, then to the next.
+"""Policies through waypoints: to each until the tip is near enough, then to the next.
 
 Metres and radians in the world.
 """
@@ -18,21 +18,21 @@ from schemas.vectors import Vector
 __all__ = ["REACH", "Oracle", "Plan", "Seen", "Waypoint", "high", "moved", "over", "remaining", "yaw_of"]
 
 _STEP, _TURN = 10e-3, pi / 6.0
-"""What an action of 1 does."""
+"""Displacement and turn of an action of 1."""
 NEAR, _ALIGNED = 1.0e-3, 0.05
 """m and rad: when a waypoint is reached."""
 _PATIENCE = 6
-"""Steps after which twice as far from a waypoint is near enough."""
+"""Steps after which twice the distance from a waypoint is near enough."""
 REACH = 10.2e-3
-"""From the wrist's yaw axis to the ends of a needle driver's fingers, m."""
+"""Reach from the wrist's yaw axis to the ends of a needle driver's fingers, m."""
 
 
 class Waypoint(NamedTuple):
-    """Where a tip is to go; a policy makes one anew at every step, of what it sees."""
+    """Goal of a tip; a policy makes the waypoint anew at every step, from the observation."""
 
     position: Vector
     yaw: float | None
-    """Of the way the jaw opens, rad, or opposite; None: as it is."""
+    """Yaw of the jaw's opening direction, rad, or opposite; None: as at present."""
     closed: bool
     wait: int = 0
     """Steps to stay there."""
@@ -56,11 +56,11 @@ class Seen:
 
 
 Plan = list[tuple[int, Callable[[Seen], Waypoint]]]
-"""Which hand goes where, one after the other."""
+"""Hands and their waypoints, in turn."""
 
 
 class Oracle:
-    """Follows the waypoints of one hand or, in turns, of two; the other hand then stays."""
+    """Follows the waypoints of a hand or, in turns, of two; the second hand then stays."""
 
     def __init__(self, env: Environment, plan: Callable[[Environment], Plan]) -> None:
         self._layout, self._hands = env.layout, env.exercise.hands
@@ -94,7 +94,7 @@ class Oracle:
 
 
 def remaining(tip: Vector, yaw: float) -> float:
-    """Return the angle (rad) by which the jaw has to turn to open along `yaw`, either finger first."""
+    """Return the angle (rad) for the jaw to turn to open along `yaw`, either finger first."""
     return remainder(yaw - atan2(tip[1, 1], tip[0, 1]), pi)
 
 
