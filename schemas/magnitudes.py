@@ -23,26 +23,26 @@ class Magnitude(NamedTuple):
 
 
 MAGNITUDES = {
-    "m": Magnitude(1e-9, 1e3, "from a molecule to a building"),
+    "m": Magnitude(0.0, 1e3, "to a building"),
     "kg": Magnitude(1e-6, 1e4, "from a piece of suture to a lorry"),
     "Pa": Magnitude(1e-3, 1e13, "from a foam to ten times diamond"),
     "kg/m^3": Magnitude(1e-3, 1e5, "from a gas to four times osmium"),
     "N": Magnitude(1e-9, 1e6, "from a cell to a hundred tonnes"),
     "N/m": Magnitude(1e-6, 1e9, "from a cell to a machine's frame"),
     "N*s/m": Magnitude(1e-9, 1e7, "from a cell to a vehicle's damper"),
-    "rad": Magnitude(1e-12, 1e5, "to 16 000 turns"),
-    "m/s": Magnitude(1e-9, 1e4, "to ten times a bullet"),
-    "m/s^2": Magnitude(1e-9, 1e3, "to a hundred times standard gravity"),
+    "rad": Magnitude(0.0, 1e5, "to 16 000 turns"),
+    "m/s": Magnitude(0.0, 1e4, "to ten times a bullet"),
+    "m/s^2": Magnitude(0.0, 1e3, "to a hundred times standard gravity"),
 }
-"""Limits by SI unit."""
+"""Limits by SI unit. Components of positions, angles and motions may be as small as rounding leaves them."""
 
 
 def require_magnitude(number: float, unit: str) -> float:
     """Return `number`; raises ValueError if a quantity in `unit` has no such size."""
     size, limits = abs(number), MAGNITUDES[unit]
     if size and not limits.least <= size <= limits.most:
+        expected = f"0, or {limits.least:g} to {limits.most:g}" if limits.least else f"0 to {limits.most:g}"
         raise ValueError(
-            f"{number:g} {unit} has no meaning here: expected 0, or {limits.least:g} to {limits.most:g}"
-            f" {unit} ({limits.reason})"
+            f"{number:g} {unit} has no meaning here: expected {expected} {unit} ({limits.reason})"
         )
     return number
