@@ -1,1 +1,1 @@
-"""Hosts: the processes that step participants."""
+"""Hosts: processes stepping participants."""

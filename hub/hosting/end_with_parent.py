@@ -1,4 +1,4 @@
-"""Ends a process together with the one that has started it, however that one ends.
+"""Ends a process together with the parent, in whatever way the parent ends.
 
 Why not by Zenoh alone, as orderly ends are: docs/decisions/0039-ends-of-processes.md.
 """
@@ -14,16 +14,16 @@ import threading
 __all__ = ["NEEDS_INPUT", "end_with_parent"]
 
 NEEDS_INPUT = sys.platform != "linux"
-"""Whether a process that calls `end_with_parent` needs a pipe from its parent as standard input."""
+"""Whether a caller of `end_with_parent` needs a pipe from the parent as standard input."""
 
 _PR_SET_PDEATHSIG = 1
-"""Of prctl(2), as in linux/prctl.h."""
+"""Option of prctl(2), as in linux/prctl.h."""
 
 
 def end_with_parent(parent: int) -> None:
-    """Let this process end when process `parent`, which has started it, ends.
+    """Let this process end with process `parent`.
 
-    On Linux the kernel kills it then, whatever it does: also while it is stopped, or in a call that keeps
+    On Linux the kernel then kills this process in any condition: also while stopped, or in a call holding
     Python's interpreter lock. Elsewhere a thread waits for the end of the input.
     """
     if NEEDS_INPUT:

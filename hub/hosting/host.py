@@ -1,7 +1,7 @@
-"""One process' share of a session: it steps its participants in order and publishes their outputs.
+"""A process' share of a session: steps the process' participants in order and publishes their outputs.
 
-The host does not know whether a value comes from a neighbour in this process or from another one: both are
-cells.
+The host does not know whether a value comes from a neighbour in this process or from another process: both
+are cells.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ __all__ = ["Done", "Host"]
 log = logging.getLogger(__name__)
 
 Done = Callable[[PlannedParticipant, Ack], None]
-"""Is called with the ack of a participant that has done its steps of a grant."""
+"""Is called with the ack of a participant after the participant's last step of a grant."""
 
 
 class Host:
-    """The stepped participants of one process.
+    """The stepped participants of a process.
 
     Args:
         name: The host's name in the plan.
         plan: The plan of the session.
         participants: The host's participants by name, not yet configured.
-        wire: Carries values to and from other processes; None if there are none.
-        listeners: Returns what is called with the values of outputs; None: nothing is.
-        place: Of one element, where `run` notes the place of the participant that it steps; IDLE after it.
-        successors: Who takes over the state of a participant, and before which step.
+        wire: Carries values to and from other processes; None without any.
+        listeners: Returns the listeners for the values of outputs; None without listeners.
+        place: A single element, the place of the participant being stepped by `run`; IDLE afterwards.
+        successors: Successors of participants, with the step before the handover of state.
     """
 
     def __init__(
@@ -73,9 +73,9 @@ class Host:
         self._seldom_read = layout.seldom_read
         self._inlets = layout.inlets
         self.device_inputs = layout.device_inputs
-        """The inputs of the devices here that live in simulated time."""
+        """The inputs of the devices in simulated time here."""
         self.step = INITIAL
-        """The step in which it is or was last."""
+        """The present or last step of the host."""
         self._noted = -1  # of the wire's changes
         self._place: memoryview[int] | list[int] = [IDLE] if place is None else place
         given = successors or {}
@@ -83,7 +83,7 @@ class Host:
             ((step, one, new) for one in self._hosted for step, new in given.get(one.name, ())),
             key=lambda renewal: renewal[0],
         )
-        """Who has not taken over yet: the step, the participant as it is hosted, and its successor."""
+        """Handovers still to come: the step, the hosted participant, and the successor."""
 
     @property
     def participants(self) -> Sequence[PlannedParticipant]:
@@ -92,21 +92,21 @@ class Host:
 
     @property
     def awaited(self) -> str | None:
-        """The participant for which `run` waits: in its step, or in another process with its value."""
+        """The participant awaited by `run`: during a step here, or for a value from another process."""
         waiting = (source for (source, _), cell in self._remote_cells.items() if cell.waiting)
         place = self._place[0]
         return next(waiting, None if place == IDLE else self._hosted[place].name)
 
     @property
     def ended(self) -> dict[str, str]:
-        """The participants that end the session, and why."""
+        """The participants ending the session, with the reasons."""
         return {one.name: reason for one in self._hosted if (reason := one.participant.ended)}
 
     def configure(self, directory: Path) -> dict[str, tuple[BondSide, ...]]:
-        """Configure every participant and publish its outputs at time 0.
+        """Configure every participant and publish the outputs at time 0.
 
-        Returns the bonds of each, with the numbers that are known now. Raises ParticipantError naming the
-        participant that failed.
+        Returns the bonds of each, with the numbers known now. Raises ParticipantError naming the failed
+        participant.
         """
         bonds: dict[str, tuple[BondSide, ...]] = {}
         for one in self._hosted:
@@ -130,33 +130,33 @@ class Host:
         return bonds
 
     def begin(self, outputs: Mapping[str, Outputs]) -> None:
-        """Publish the outputs at time 0, by participant, of those that are configured already."""
+        """Publish the outputs at time 0, by participant, of participants already configured."""
         for one in self._hosted:
             self._publish(one, INITIAL, 0, outputs[one.name])
 
     def newest(self, name: str) -> Outputs:
-        """Return what a participant has returned last; its arrays may be written to in the next step."""
+        """Return the last outputs of a participant; the next step may write to their arrays."""
         return next(one.newest for one in self._hosted if one.name == name)
 
     def publish_initial(self) -> None:
-        """Publish the outputs at time 0 once more, for hosts that did not yet listen."""
+        """Publish the outputs at time 0 once more, for hosts not listening before."""
         for one in self._hosted:
             for _, outputs in one.outputs:
                 outputs.put_initial_again()
             self._send_bundles(one, INITIAL, 0)
 
     def linked(self) -> bool:
-        """Return whether the values at time 0 of all other hosts that this one needs have arrived."""
+        """Return whether all values of remote hosts at time 0, as far as needed here, have arrived."""
         return self._wire is None or self._wire.linked()
 
     def due(self, step: int, count: int) -> list[str]:
-        """Return the participants that step at least once in `count` steps from `step`, in step order."""
+        """Return the participants with at least a step in `count` steps from `step`, in step order."""
         return [one.planned.name for one in self._hosted if -step % one.planned.period < count]
 
     def run(self, grant: Grant, done: Done) -> None:
-        """Enter the samples of `grant` and step to its horizon.
+        """Enter the samples of `grant` and step to the horizon of the grant.
 
-        `done` is called with the ack of each participant as soon as its last step is done. Raises
+        `done` is called with the ack of each participant directly after the participant's last step. Raises
         ParticipantError.
         """
         while self._successors and self._successors[0][0] <= grant.step:
@@ -187,7 +187,7 @@ class Host:
             )
 
     def _renew(self, step: int, one: HostedParticipant, new: Stepped) -> None:
-        """Let `new` go on in the place of a participant, with its state."""
+        """Let `new` go on in the place of a participant, with the participant's state."""
         try:
             new.restore(one.participant.save())
         except TrocarError as error:
@@ -202,7 +202,7 @@ class Host:
         one.participant = new
 
     def _note_users(self) -> None:
-        """Note for the participants which of their outputs are not used, if that may have changed."""
+        """Note the unused outputs of the participants, if the use may have changed."""
         changes = 0 if self._wire is None else self._wire.changes
         if changes == self._noted:
             return
@@ -255,7 +255,7 @@ class Host:
         one.values[reader.port] = value
 
     def _publish(self, one: HostedParticipant, step: int, time_ns: int, returned: Outputs) -> None:
-        """Check the outputs that are due, and pass them on to readers here and elsewhere."""
+        """Check the outputs due, and pass the values on to readers here and elsewhere."""
         one.newest = returned
         for stride, outputs in one.outputs:
             if step == INITIAL or not (step + one.period) % stride:
@@ -270,7 +270,7 @@ class Host:
                     bundle.send(Tag.pack(self._wire.run, 0, step, time_ns), first=step == INITIAL)
 
     def observe(self, name: str, time_ns: int, values: Mapping[str, Any]) -> None:
-        """Step an observer from the communication point `time_ns` with `values` as its inputs.
+        """Step an observer from the communication point `time_ns` with `values` as inputs.
 
         Raises ParticipantError.
         """
@@ -283,7 +283,7 @@ class Host:
         self._step(one, self.step, time_ns)
 
     def close(self) -> None:
-        """Close every participant, the last first; an error in one does not keep the others open."""
+        """Close every participant, the last first; an error in a participant does not keep the others open."""
         every = [(one.name, one.participant) for one in self._hosted]
         every += [(one.name, new) for _, one, new in self._successors]
         for name, participant in reversed(every):
@@ -296,13 +296,13 @@ class Host:
 
 
 def _take(one: HostedParticipant, queue: Queue) -> None:
-    """Move what has arrived in a queue to the inputs of a participant."""
+    """Move the messages in a queue to the inputs of a participant."""
     one.events[queue.port] = (*one.events.get(queue.port, ()), *queue.arrived)
     queue.arrived.clear()
 
 
 def _enter(one: HostedParticipant, port: str, codec: PortCodec, sample: InletSample | Entering) -> None:
-    """Write one inlet sample of a grant into the inputs of a participant."""
+    """Write an inlet sample of a grant into the inputs of a participant."""
     if sample.stale:
         one.stale.add(port)
     else:

@@ -1,4 +1,4 @@
-"""How the participants of one host are connected: by cells in this process, by a wire to others."""
+"""Connections of the participants of a host: by cells in this process, by a wire to others."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ __all__ = ["HostLayout", "Listeners"]
 
 
 class Listeners(Protocol):
-    """Returns what is called with every value of some outputs; None if nothing is."""
+    """Returns the listeners for every value of some outputs; None without a listener."""
 
     def listener(self, planned: PlannedParticipant, codec: PortCodec) -> Listener | None:
         """Return the listener of messages or events."""
         ...
 
     def vectors_listener(self, planned: PlannedParticipant, ports: Sequence[Port]) -> VectorsListener | None:
-        """Return the listener of vectors that are due together."""
+        """Return the listener of vectors due together."""
         ...
 
     def watches(self, participant: str, port: str) -> bool:
@@ -37,14 +37,14 @@ class Listeners(Protocol):
 
 
 _MANY = 32
-"""Values of one port that may wait for their reader; `PortReceiver` holds 4096, then it stops all others."""
+"""Most values of a port waiting for their reader; beyond 4096, a `PortReceiver` stops all others."""
 
 
 class HostLayout:
     """The participants of host `name`, connected as `plan` says.
 
-    The attributes are complete when it is made. `wire` carries values to and from other processes,
-    `listeners` returns what listens to outputs.
+    The attributes are complete from the start. `wire` carries values to and from remote processes,
+    `listeners` returns the listeners of outputs.
     """
 
     def __init__(
@@ -61,10 +61,10 @@ class HostLayout:
             for p in (*plan.order, *(one.name for one in plan.observers()))
             if plan.participants[p].host == name
         ]
-        """In step order, or observers alone."""
+        """Hosted participants in step order, or observers alone."""
         self._by_name = {one.name: one for one in self.participants}
         self.remote_cells: dict[tuple[str, str], RemoteCell] = {}
-        """The outputs of other hosts that are read here, by participant and port."""
+        """The outputs of remote hosts read here, by participant and port."""
         self._outputs: dict[tuple[str, str], Output] = {}
         by_stride = {one.name: self._add_outputs(one) for one in self.participants}
         for one in self.participants:
@@ -80,14 +80,14 @@ class HostLayout:
             if planned.simulated_time and planned.host == name
         }
         self.device_inputs = {device: DeviceInputs(its, plan.step_ns) for device, its in readers.items()}
-        """The inputs of the devices here that live in simulated time."""
+        """The inputs of the devices in simulated time here."""
         self.seldom_read = self._seldom_read({reader.cell for its in readers.values() for reader in its})
-        """Cells that fill between two readings, with period (steps) and freshness of all their readers."""
+        """Cells filling up between two readings, with period (steps) and freshness of all their readers."""
         self.inlets = self._inlets()
-        """Where a sample in a grant goes, by its source and port: participant, its port, and the codec."""
+        """Targets of samples in a grant, by source and port: participant, input port, and codec."""
 
     def _add_outputs(self, one: HostedParticipant) -> dict[int, list[Output]]:
-        """Make the outputs of `one`, and return them by stride."""
+        """Make the outputs of `one`; return the outputs by stride."""
         planned, plan = one.planned, self._plan
         by_stride: dict[int, list[Output]] = {}
         indices = self._bundle_indices(one, self._wire) if self._wire is not None else {}
@@ -139,7 +139,7 @@ class HostLayout:
     def _depth(self, source: str, port: str, *, here: bool | None = None) -> int:
         """Return how many values of an output readers look back.
 
-        None in this process: 0; the newest only: 1; the last ones: more.
+        No reader in this process: 0; the newest value only: 1; the last values: more.
         """
         depth = 0
         for connection in self._plan.connections:
@@ -154,7 +154,7 @@ class HostLayout:
         return depth
 
     def _bundle_indices(self, one: HostedParticipant, wire: Wire) -> dict[str, list[tuple[Bundle, int]]]:
-        """Make the bundles; return for each output port those that it goes into, and its index in them."""
+        """Make the bundles; return for each output port the bundles of the port, and the index in each."""
         indices: dict[str, list[tuple[Bundle, int]]] = {}
         outlets = [outlet for outlet in self._plan.to_devices if outlet.source == one.name]
         for name in dict.fromkeys(outlet.target for outlet in outlets):
@@ -173,9 +173,10 @@ class HostLayout:
         return source, participants[connection.target].port(connection.target_port)
 
     def _is_direct(self, connection: PlannedConnection) -> bool:
-        """Return whether the target is to see in every step what the source has returned last.
+        """Return whether the target is to see the source's last outputs in every step.
 
-        Both are here; the source of a fresh value steps first, and that of an older one after its reader.
+        Both are here; the source of a fresh value steps before the reader, the source of an older value
+        after.
         """
         source, target = (self._by_name.get(name) for name in (connection.source, connection.target))
         if source is None or target is None or source is target or connection.linear:
@@ -189,7 +190,7 @@ class HostLayout:
         return not is_first and target.period % source.period == 0
 
     def _readers(self, one: HostedParticipant) -> list[Queue | Reader]:
-        """Let neighbours write to the inputs of `one` where that is enough; return what is to be read."""
+        """Let neighbours write to the inputs of `one` where possible; return readers for the rest."""
         readers: list[Queue | Reader] = []
         for connection in self._feeding(one.name):
             port = connection.target_port
@@ -235,9 +236,9 @@ class HostLayout:
     def _seldom_read(
         self, of_devices: Collection[Cell]
     ) -> Sequence[tuple[RemoteCell, list[tuple[int, bool]]]]:
-        """Return the cells of which many values arrive between two readings.
+        """Return the cells with many values arriving between two readings.
 
-        The devices here take their values more often: the cells that they read are left to them.
+        The devices here take their values more often: cells read by devices are left out.
         """
         readers: dict[RemoteCell, list[tuple[int, bool]]] = {}
         for one in self.participants:

@@ -1,4 +1,4 @@
-"""A process that runs one host of a session, and ends with the hub that has started it.
+"""A process running a host of a session; the process ends with the hub, its parent.
 
 `python -P -m hub.hosting.host_process --hub PID --connect ENDPOINT --session NAME --host NAME [--link FD FD]`
 """
@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 
 def main() -> None:
-    """Run a host; exit code 1 if one of its participants failed."""
+    """Run a host; exit code 1 if a participant of the host failed."""
     parser = argparse.ArgumentParser(
         prog="python -P -m hub.hosting.host_process", description="Host process of Trocar."
     )

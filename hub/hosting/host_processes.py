@@ -20,17 +20,17 @@ __all__ = ["HostProcesses"]
 log = logging.getLogger(__name__)
 
 _END_NS = 3_000_000_000
-"""How long processes may take to close their participants before they are killed."""
+"""Longest time for processes to close their participants before being killed."""
 _POLL_S = 0.1
 
 
 class HostProcesses:
-    """The host processes that the hub has started.
+    """The host processes started by the hub.
 
-    A thread waits for the end of each, so that it is known at once, on every system.
+    A thread waits for the end of each: an end is known at once, on every system.
 
     Args:
-        links: By host, its link; a host that has none answers over Zenoh.
+        links: Links by host; a host without a link answers over Zenoh.
     """
 
     def __init__(self, links: Mapping[str, HubLink] | None = None) -> None:
@@ -40,9 +40,9 @@ class HostProcesses:
         self._changed = threading.Event()
 
     def start(self, host: str, endpoint: str, session: str) -> None:
-        """Start host `host`. It joins over `endpoint`; what it prints goes to stderr.
+        """Start host `host`. The host joins over `endpoint`; its output goes to stderr.
 
-        It ends when the calling thread does: on Linux that thread is its parent.
+        The host ends with the calling thread: on Linux this thread is the parent.
         """
         command = [
             sys.executable,
@@ -86,11 +86,11 @@ class HostProcesses:
 
     @property
     def numbers(self) -> list[int]:
-        """The numbers of the processes that have not ended."""
+        """The ids of the running processes."""
         return [process.pid for process in self._processes.values() if process.returncode is None]
 
     def dead(self) -> dict[str, str]:
-        """Return, for each host whose process has ended, how it ended."""
+        """Return the kind of end of each ended process, by host."""
         return {
             host: _how(process.returncode)
             for host, process in self._processes.items()
@@ -107,7 +107,7 @@ class HostProcesses:
         self._changed.set()
 
     def end(self) -> None:
-        """Wait for the hosts, which end once the hub's token is gone; kill those that do not."""
+        """Wait for the hosts, ending once the hub's token is gone; kill the rest after a time limit."""
         patience = Patience(_END_NS)
         for host, process in self._processes.items():
             while self._waiting[host].is_alive() and not patience.is_over(self.numbers):

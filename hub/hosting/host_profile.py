@@ -1,4 +1,4 @@
-"""The profile of a host process, for which the hub asks."""
+"""The profile of a host process, requested by the hub."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["HostProfile"]
 
 
 class HostProfile:
-    """Answers with what this process has taken since its first grant."""
+    """Answers with the time used by this process since the first grant."""
 
     def __init__(self, session: zenoh.Session, keys: Keys, host: str, plan: Plan, run: int) -> None:
         self.process = ProcessProfile(host, plan, Phase("waiting for hub", WAITING))
@@ -29,9 +29,9 @@ class HostProfile:
         self._queryable = session.declare_queryable(self._key, Callback(self._answer))
 
     def attach(self, host: Host, acknowledge: Callable[..., None]) -> None:
-        """Time `Host.run`, and `acknowledge`, which sends an ack.
+        """Time `Host.run`, and `acknowledge`, the sender of acks.
 
-        The first grant is left out: a host has waited for it since it was ready.
+        The first grant is left out: since being ready, a host has waited for the first grant.
         """
         watch = self.process.watch
         self.process.attach(host, self._ran)

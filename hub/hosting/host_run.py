@@ -1,4 +1,4 @@
-"""One run of a session in a host process: its participants, stepped as the hub grants."""
+"""A run of a session in a host process: the participants of the host, stepped as the hub grants."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ _IDLE_S = 0.2
 
 
 class HostRun:
-    """The participants of this process in the run that the hub has described in its `reply`.
+    """The participants of this process in the run described by the hub's `reply`.
 
     `connect` opens another Zenoh session with the hub; relative paths of the scenario start at `directory`.
-    A host that the hub has started has a `link` to it.
+    A host started by the hub has a `link` to the hub.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class HostRun:
         ]
 
     def _channel(self, ack_key: bytes, link: HostLink | None) -> HubChannel | None:
-        """Return what brings grants and takes acks; None for devices alone."""
+        """Return the channel of grants and acks; None for devices alone."""
         names = [planned.name for planned in self._host.participants if planned.in_step]
         if not names:
             return None
@@ -119,7 +119,7 @@ class HostRun:
     def _attach_devices(
         self, reply: JoinReply, devices: Mapping[str, Device], connect: Callable[[], zenoh.Session]
     ) -> list[DeviceThread]:
-        """Return a thread for each device, with an uplink that the stack closes; none is started."""
+        """Return a thread for each device, not started, with an uplink closed by the stack."""
         if not devices:
             return []
         threads: list[DeviceThread] = []
@@ -178,7 +178,7 @@ class HostRun:
             raise
 
     def _first_grant(self, hub: HubChannel) -> Grant:
-        """Repeat the values at time 0 until every connection has carried its own and a grant has arrived."""
+        """Repeat the values at time 0 until every connection has carried a value and a grant has arrived."""
         ready = False
         while True:
             self._host.publish_initial()
@@ -198,7 +198,7 @@ class HostRun:
                 return grant
 
     def _check(self, payload: bytes) -> Grant:
-        """Return the grant in `payload`; raises MessageError if it is not the next one of this run."""
+        """Return the grant in `payload`; raises MessageError unless this is the next grant of the run."""
         grant = unpack_grant(payload)
         if grant.run != self._run:
             raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
@@ -240,7 +240,7 @@ class HostRun:
 
 
 def _to_programs(reply: JoinReply) -> Callable[[], zenoh.Session] | None:
-    """Return what opens a Zenoh session with the router of programs; None if that is on another machine."""
+    """Return a function to open a Zenoh session with the router of programs; None on a remote machine."""
     if not reply.programs_endpoint:
         return None
     return partial(open_session, "client", connect=[reply.programs_endpoint])

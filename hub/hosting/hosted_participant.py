@@ -1,4 +1,4 @@
-"""A participant with all that its steps need, prepared once so that the step loop only looks things up."""
+"""A participant with all data for the steps, prepared once: the step loop only looks data up."""
 
 from __future__ import annotations
 
@@ -22,41 +22,41 @@ __all__ = ["HostedParticipant", "hosted"]
 
 @dataclass(slots=True)
 class HostedParticipant:
-    """A participant of this process, its inputs and outputs, and what it reports of a grant."""
+    """A participant of this process, with inputs, outputs, and the report of a grant."""
 
     participant: Stepped
     planned: PlannedParticipant
     name: str
     period: int
-    """In communication steps."""
+    """Period, communication steps."""
     h_ns: int
-    """Its step."""
+    """Step of the participant, ns."""
     inputs: Inputs
     values: dict[str, Any]
-    """What `inputs` reads, as are `rates`, `events` and `stale`."""
+    """Values read by `inputs`, as are `rates`, `events` and `stale`."""
     rates: dict[str, Vector]
     events: dict[str, tuple[Message, ...]]
     stale: set[str]
     work_ports: tuple[str, ...]
-    """The outputs that hold the work of its bonds."""
+    """The outputs with the work of the bonds."""
     readers: list[Queue | Reader] = field(default_factory=list[Queue | Reader])
-    """Those of its inputs that no neighbour sets, in the order of the connections."""
+    """Readers of the inputs not set by a neighbour, in the order of the connections."""
     outputs: list[tuple[int, DueOutputs]] = field(default_factory=list[tuple[int, DueOutputs]])
-    """With their stride, so that a step looks only at those that are due."""
+    """Outputs with their stride: a step looks only at the outputs due."""
     ports: list[Output] = field(default_factory=list[Output])
-    """All of its outputs."""
+    """All outputs."""
     bundles: dict[str, Bundle] = field(default_factory=dict[str, Bundle])
-    """By the device or observer that they are for."""
+    """Bundles by target, a device or observer."""
     newest: Outputs = field(default_factory=dict[str, Any])
-    """What it has returned last."""
+    """Outputs returned last."""
     hashes: list[int] = field(default_factory=list[int])
-    """Of its steps in the present grant, as are `compute_ns` and `work_j`."""
+    """State hashes of the steps in the present grant; `compute_ns` and `work_j` are of these steps too."""
     compute_ns: list[int] = field(default_factory=list[int])
     work_j: list[float] = field(default_factory=list[float])
 
 
 def hosted(planned: PlannedParticipant, participant: Stepped, step_ns: int) -> HostedParticipant:
-    """Return `participant` with its inputs at their start values; nothing is connected yet."""
+    """Return `participant` with inputs at their start values; nothing is connected yet."""
     values = {
         port.name: _start_value(port)
         for port in planned.ports

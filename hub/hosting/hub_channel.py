@@ -1,4 +1,4 @@
-"""How a host receives grants and sends acks: over Zenoh, or by a link if the hub has started it."""
+"""Channels for a host's grants and acks: over Zenoh, or by a link for a host started by the hub."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from schemas.lockstep import Ack, Grant, pack_ack
 __all__ = ["HubChannel", "LinkChannel", "ZenohChannel"]
 
 CheckGrant = Callable[[bytes], Grant]
-"""Returns the grant in a payload; raises MessageError if it is not the next one of the run."""
+"""Returns the grant in a payload; raises MessageError unless this is the next grant of the run."""
 
 
 class HubChannel(Protocol):
-    """Receives the grants of a run, and sends the acks of one host's participants."""
+    """Receives the grants of a run, and sends the acks of a host's participants."""
 
     def grant(self, *, wait: bool) -> Grant | None:
-        """Return the next grant; None if it has not arrived. With `wait`, wait for a message."""
+        """Return the next grant; None if no grant has arrived. With `wait`, wait for a message."""
         ...
 
     def acknowledge(self, name: str, ack: Ack) -> None:
@@ -33,14 +33,14 @@ class HubChannel(Protocol):
         ...
 
     def flush(self) -> None:
-        """Send what has not been sent: the host has done its part of a grant."""
+        """Send all unsent acks: the host has completed a grant."""
         ...
 
 
 class ZenohChannel:
     """A channel over Zenoh, with an ack at once after each participant's last step, signed with `ack_key`.
 
-    Grants that are not valid are refused and counted.
+    Invalid grants are refused and counted.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class ZenohChannel:
         self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
 
     def grant(self, *, wait: bool) -> Grant | None:
-        """Return the grant in the next message; None if there is no message, or no valid grant in it."""
+        """Return the grant in the next message; None without a message or a valid grant."""
         sample = self._grants.recv() if wait else self._grants.try_recv()
         if sample is None:
             return None
@@ -86,7 +86,7 @@ class ZenohChannel:
 
 
 class LinkChannel:
-    """A channel by the link to the hub that has started this host: all acks of a grant in one message."""
+    """A channel by the link to the hub, the parent of this host: all acks of a grant in a single message."""
 
     def __init__(self, link: HostLink, names: Sequence[str], check: CheckGrant) -> None:
         self._link, self._check = link, check
@@ -94,7 +94,7 @@ class LinkChannel:
         self._acks: list[tuple[int, bytes]] = []
 
     def grant(self, *, wait: bool) -> Grant | None:
-        """Return the next grant; raises MessageError if it is not."""
+        """Return the next grant; raises MessageError for any unexpected message."""
         payload = self._link.grant(wait=wait)
         return None if payload is None else self._check(payload)
 

@@ -1,4 +1,4 @@
-"""Interrupts the main thread in whatever it waits for or computes."""
+"""Interrupts the main thread in any wait or computation."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["Interrupt"]
 
 
 class Interrupt:
-    """While it is entered, SIGTERM raises KeyboardInterrupt in the main thread, and so does calling it.
+    """Within this context, SIGTERM raises KeyboardInterrupt in the main thread, and so does a call.
 
-    It may be called from any thread. SIGINT would not work: a shell lets the programs that it starts in the
-    background ignore it. Entered in another thread than the main one, it does nothing.
+    Calls from any thread are allowed. SIGINT would not work: programs started by a shell in the background
+    ignore SIGINT. Outside the main thread the context does nothing.
     """
 
     def __init__(self) -> None:
@@ -30,15 +30,15 @@ class Interrupt:
         return self
 
     def disarm(self) -> None:
-        """Raise nothing any more: the main thread closes what it has opened.
+        """Raise nothing any more: the main thread closes all open resources.
 
-        No signal of another thread is pending after that.
+        No signal of another thread is pending afterwards.
         """
         with self._sending:
             self._armed = self._raised = False
 
     def __call__(self) -> None:
-        """Interrupt the main thread, also out of a call that sleeps."""
+        """Interrupt the main thread, also out of a sleeping call."""
         with self._sending:
             if not self._armed:
                 return
@@ -48,13 +48,13 @@ class Interrupt:
                 interrupt_main(signal.SIGTERM)
 
     def _raise(self, _number: int, _frame: FrameType | None) -> None:
-        """Handle SIGTERM, between two instructions of the main thread; after `disarm` it does nothing."""
+        """Handle SIGTERM, between two instructions of the main thread; after `disarm` do nothing."""
         if self._armed:
             self._armed, self._raised = False, True
             raise KeyboardInterrupt
 
     def check(self) -> None:
-        """Raise again an interrupt that was lost: Zenoh swallows one in a callback in the main thread."""
+        """Raise a lost interrupt again: Zenoh swallows an interrupt in a callback in the main thread."""
         if self._raised:
             raise KeyboardInterrupt
 

@@ -1,6 +1,6 @@
-"""Joins a session with this process: as one of its hosts, or with a device that stays.
+"""Joins a session with this process: as a host, or with a device for session after session.
 
-It makes and configures the host's participants, and steps them as the hub grants, until the hub is gone.
+The process makes and configures the host's participants, and steps as the hub grants, until the hub is gone.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ __all__ = ["run_device", "run_host"]
 log = logging.getLogger(__name__)
 
 _PATIENCE_S = 2.0
-"""How long a participant may go on computing after the hub is gone, before its process is ended."""
+"""Longest time for a participant to go on computing after the hub is gone, before the process is ended."""
 
 
 def run_host(
@@ -42,15 +42,15 @@ def run_host(
     certificates: Path | None = None,
     link: HostLink | None = None,
 ) -> None:
-    """Join a session and run one of its hosts until the hub ends.
+    """Join a session and run a host of the session until the hub ends.
 
     Args:
-        endpoint: Where the hub listens.
+        endpoint: The endpoint of the hub.
         session_name: The session; `*` for whatever session the hub has.
-        host: The host; a participant with `host: remote` is a host of its own, `remote/<participant>`.
-        directory: Where relative paths of the scenario start, by default where the hub has them.
+        host: The host; a participant with `host: remote` is a separate host, `remote/<participant>`.
+        directory: Base of relative paths of the scenario, by default the hub's base.
         certificates: As for `hub.remote.hub_connection.reach`.
-        link: To the hub, if it has started this process with one.
+        link: The link to the hub, for a process started with a link.
 
     Raises ConnectError if there is no such hub, and ParticipantError if a participant of this host fails.
     """
@@ -74,10 +74,10 @@ def run_device(
     directory: Path | None = None,
     certificates: Path | None = None,
 ) -> None:
-    """Join a session with the device `name`, and the sessions after it, until Ctrl-C or SIGTERM.
+    """Join a session with the device `name`, and all later sessions, until Ctrl-C or SIGTERM.
 
-    The arguments are those of `run_host`. Raises ConnectError if there is no such hub at first, MessageError
-    if its session does not have the device, and ParticipantError if the device fails.
+    The arguments are as in `run_host`. Raises ConnectError if there is no such hub at first, MessageError if
+    the hub's session does not have the device, and ParticipantError if the device fails.
     """
     request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
     connect = partial(reach, endpoint, name, certificates)
@@ -88,7 +88,9 @@ def run_device(
 
 @contextlib.contextmanager
 def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
-    """Interrupt the main thread when the hub's liveliness token is gone; end the process if that fails."""
+    """Interrupt the main thread when the hub's liveliness token is gone; end the process if the interrupt
+    fails.
+    """
     over, interrupt = threading.Event(), Interrupt()
 
     def gone(sample: zenoh.Sample) -> None:

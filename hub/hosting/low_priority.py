@@ -1,7 +1,7 @@
-"""Lets a process that only looks on run where the others leave a core free.
+"""Lets a process of observers run where the rest leave a core free.
 
-A renderer without a GPU keeps all cores busy for some milliseconds per picture. The step loop then shares its
-core with it, and simulated time slips for a picture that may as well be drawn a little later.
+A renderer without a GPU keeps all cores busy for some milliseconds per picture. The step loop then shares a
+core with the renderer, and simulated time slips for a picture without any hurry.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from pathlib import Path
 __all__ = ["NICE", "lower_priority"]
 
 NICE = 10
-"""Of 19: where both want a core, the scheduler of Linux gives one part in ten to a process with this value
+"""Nice value, at most 19. Where both want a core, Linux gives a tenth of a core to a process with this value
 (weights 110 and 1024 of sched_prio_to_weight, kernel/sched/core.c).
 """
 _AUTOGROUP = Path("/proc/self/autogroup")
 
 
 def lower_priority() -> None:
-    """Lower the priority of the calling thread, of all threads that it starts, and of its autogroup.
+    """Lower the priority of the calling thread, of all threads started later, and of the autogroup.
 
-    Real-time priority that was inherited (`chrt trocar run`) is given up. Linux puts each session of
-    processes into an autogroup, and a host is a session of its own: between autogroups only their own nice
-    values count (sched(7)). Does nothing on systems without nice values.
+    Inherited real-time priority (`chrt trocar run`) is given up. Linux puts each session of processes into an
+    autogroup, and each host is a separate session: between autogroups only their own nice values count
+    (sched(7)). Does nothing on systems without nice values.
     """
     if hasattr(os, "nice"):
         os.nice(NICE)

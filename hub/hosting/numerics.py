@@ -11,17 +11,17 @@ from collections.abc import MutableMapping
 __all__ = ["pin_numerics"]
 
 _NEWER_THAN_AVX2 = "X86_V4 AVX512_ICL AVX512_SPR"
-"""The groups of instructions beyond AVX2 that numpy has loops for (its documentation, CPU dispatch).
+"""Groups of instructions beyond AVX2 with loops in numpy (numpy's documentation, CPU dispatch).
 
-With them `arctan2` and others are Intel's, which differ in the last bit from those of the C library.
+With these groups `arctan2` and others are Intel's, different in the last bit from the C library.
 """
 
 
 def pin_numerics(environment: MutableMapping[str, str]) -> None:
     """Set loops, kernel and threads in `environment`, for processes that have not imported numpy yet.
 
-    Haswell is the oldest x86-64 with AVX2, and its kernels run on all later ones. One thread: idle ones spin
-    and take the cores of other hosts, and results must not depend on how many there are.
+    Haswell is the oldest x86-64 with AVX2, and Haswell kernels run on all later processors. A single thread:
+    idle threads spin and take the cores of other hosts, and results must not depend on the number of threads.
     """
     environment["OPENBLAS_NUM_THREADS"] = environment["OMP_NUM_THREADS"] = "1"
     if platform.machine() in ("x86_64", "AMD64"):

@@ -1,4 +1,4 @@
-"""The observers of one process: they look at the newest state, one after the other, at their own rate."""
+"""The observers of a process look at the newest state in turn, each at the observer's own rate."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _STATUS_S = 1.0
 
 
 class Observing:
-    """Steps the observers of a host as states arrive; a state that comes while they look is dropped.
+    """Steps the observers of a host as states arrive; a state arriving during a look is dropped.
 
     Args:
-        host: The host, which has observers alone.
+        host: The host, with observers alone.
         session: The Zenoh session with the hub.
         keys: The keys of the session.
         run: The number of the run.
-        refusals: Counts the messages that are refused.
+        refusals: Counts the refused messages.
     """
 
     def __init__(self, host: Host, session: zenoh.Session, keys: Keys, run: int, refusals: Refusals) -> None:
@@ -77,7 +77,7 @@ class Observing:
 
 
 class _Observer:
-    """One observer, and what is counted of it."""
+    """An observer and the observer's counts."""
 
     def __init__(self, name: str, host: Host, inputs: ObserverInputs, status: zenoh.Publisher) -> None:
         self._name, self._host, self._inputs, self._publisher = name, host, inputs, status
@@ -93,13 +93,13 @@ class _Observer:
         self._busy_s = 0.0
 
     def begin(self) -> None:
-        """Count from now: what came before was its start."""
+        """Count from now: everything before was the start."""
         self._inputs.miss_none()
         self._began_s = self._seen_s = monotonic()
         self._states, self._busy_s = 0, 0.0
 
     def look(self) -> bool:
-        """Step it with the newest state, if there is a new one; return whether there was."""
+        """Step the observer with the newest state, if new; return whether a new state has arrived."""
         state = self._inputs.take()
         if state is None:
             return False
@@ -118,7 +118,7 @@ class _Observer:
             self._latencies.add("state to picture", self._name, monotonic_ns() - state.sent_ns)
 
     def report(self, *, now: bool = False) -> None:
-        """Publish its status when it is due, or `now`."""
+        """Publish the observer's status when due, or `now`."""
         if not now and monotonic() - self._reported_s < _STATUS_S:
             return
         self._reported_s = monotonic()
@@ -135,7 +135,7 @@ class _Observer:
         self._publisher.put(encode(status))
 
     def close(self) -> None:
-        """Report its status a last time, and receive no more."""
+        """Report the status a last time, and receive no more."""
         self.report(now=True)
         self._inputs.close()
         self._publisher.undeclare()

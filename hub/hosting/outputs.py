@@ -1,7 +1,7 @@
-"""The outputs of a participant that are due together: checked, and passed on where anybody reads them.
+"""The outputs of a participant due together: checked, and passed on to readers, if any.
 
-What did not change costs nothing here: arrays that stay the same objects are given to their readers once,
-equal bits are checked once, and event ports without a message are passed over all at once.
+Unchanged values cost nothing here: arrays remaining the same objects are given to their readers once, equal
+bits are checked once, and event ports without a message are passed over all at once.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from schemas.vectors import Vector, VectorCodec, joined
 __all__ = ["DueOutputs", "Listener", "Output", "VectorsListener"]
 
 Listener = Callable[[int, int, Any], None]
-"""Is called with every value of one output: step, time (ns) at which it is valid, value."""
+"""Is called with every value of an output: step, time of validity (ns), value."""
 
 _PHYSICAL = frozenset(
     model.ros_type
@@ -41,44 +41,44 @@ _PHYSICAL = frozenset(
         ros.WrenchStamped,
     )
 )
-"""Types whose numbers are forces, states and their rates; other types may hold any number."""
+"""Types with forces, states and their rates as numbers; all further types may hold any number."""
 _ABSURD_SQUARE = ABSURD**2
 
 VectorsListener = Callable[[int, int, bytes], None]
-"""Is called with the vectors of outputs: step, time (ns) at which they are valid, and their bytes, joined."""
+"""Is called with the vectors of outputs: step, time of validity (ns), and their bytes, joined."""
 
 
 @dataclass(slots=True)
 class Output:
-    """An output port and everywhere its value goes."""
+    """An output port and all destinations of the value."""
 
     port: Port
     codec: VectorCodec | None
-    """Of a vector; None for messages and events."""
+    """Codec of a vector; None for messages and events."""
     copied: bool
-    """Its readers get a copy, as its owner may write to its array before the next value is due."""
+    """Whether readers get a copy: the owner may write to the array before the next value is due."""
     cell: Cell | None
-    """For readers in this process that look back."""
+    """Cell for readers in this process looking back."""
     publisher: PortPublisher | None
-    """For readers in other processes."""
+    """Publisher for readers in remote processes."""
     listener: Listener | None
-    """Of messages and events."""
+    """Listener for messages and events."""
     inputs: list[tuple[dict[str, Any], str]] = field(default_factory=list[tuple[dict[str, Any], str]])
-    """The inputs in this process that hold its newest value: the values of a participant, and the port."""
+    """The inputs in this process holding the newest value: the values of a participant, and the port."""
     queues: list[Queue] = field(default_factory=list[Queue])
-    """The event inputs in this process that get all of its messages."""
+    """The event inputs in this process receiving all messages."""
 
     watched: bool = False
-    """A measure or the recorder uses its values."""
+    """Whether a measure or the recorder uses the values."""
 
     @property
     def is_used(self) -> bool:
-        """Whether anybody uses its values now."""
+        """Whether anybody uses the values now."""
         here = self.watched or self.inputs or self.queues or self.cell is not None
         return bool(here) or (self.publisher is not None and self.publisher.needed)
 
     def set_inputs(self, value: Any) -> None:
-        """Write `value` into the inputs that hold the newest one."""
+        """Write `value` into the inputs holding the newest value."""
         for values, port in self.inputs:
             values[port] = value
 
@@ -87,7 +87,7 @@ _layout = attrgetter("shape", "dtype")
 
 
 class _Passage:
-    """Where the values of some outputs go at every step in which they are due; `wire` None: nowhere else."""
+    """Passage of the values of some outputs at every step with values due; `wire` None: to no other process."""
 
     def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
         self._wire = wire
@@ -112,7 +112,7 @@ class _Passage:
 
 
 class _Vectors:
-    """Vectors that are due together."""
+    """Vectors due together."""
 
     def __init__(
         self, outputs: Sequence[Output], wire: Wire | None, listener: VectorsListener | None
@@ -165,7 +165,7 @@ class _Vectors:
 
 
 class _Messages:
-    """Signals without a vector form that are due together."""
+    """Signals without a vector form, due together."""
 
     def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
         self._read = [(i, output) for i, output in enumerate(outputs) if output.inputs]
@@ -178,7 +178,7 @@ class _Messages:
 
 
 class _Events:
-    """Event ports that are due together; the value of each is a tuple of messages."""
+    """Event ports due together; the value of each is a tuple of messages."""
 
     def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
         self._read = [(i, output.queues) for i, output in enumerate(outputs) if output.queues]
@@ -199,9 +199,9 @@ class DueOutputs:
     """The outputs of a participant with the same stride.
 
     Args:
-        outputs: They, in the order in which they are published.
-        wire: Carries values to other processes; None if there are none.
-        listener: Returns what is called with the vectors among some outputs.
+        outputs: The outputs, in the order of publication.
+        wire: Carries values to other processes; None without any.
+        listener: Returns the listener for the vectors among some outputs.
     """
 
     def __init__(
@@ -226,9 +226,9 @@ class DueOutputs:
         self._initial: list[tuple[PortPublisher, Any]] = []
 
     def put(self, step: int, time_ns: int, returned: Outputs) -> None:
-        """Check the values computed in `step`, valid at `time_ns`, and pass them on.
+        """Check and pass on the values computed in `step`, valid at `time_ns`.
 
-        Raises MessageError if one is missing or invalid.
+        Raises MessageError if a value is missing or invalid.
         """
         for values_of, put in self._parts:
             try:
@@ -241,7 +241,7 @@ class DueOutputs:
             self._keep(returned)
 
     def _keep(self, returned: Outputs) -> None:
-        """Keep the values at time 0, which are published until all hosts have them."""
+        """Keep the values at time 0, published until all hosts have received these values."""
         for output in self._outputs:
             if output.publisher is not None:
                 value: Any = returned[output.port.name]
@@ -255,7 +255,7 @@ class DueOutputs:
 
 
 def _values_of(outputs: Sequence[Output]) -> Callable[[Outputs], Sequence[Any]]:
-    """Return what gets the values of `outputs` from what a participant returned, or raises KeyError."""
+    """Return a getter of the values of `outputs` from a participant's returned values; may raise KeyError."""
     names = [output.port.name for output in outputs]
     if len(names) > 1:
         return itemgetter(*names)

@@ -1,4 +1,4 @@
-"""A limit on the wait for processes of this machine, which other work on the machine does not use up."""
+"""A limit on the wait for processes of this machine, not used up by other work on the machine."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ _FIRST_LOOK_NS = 500_000_000
 
 _RUN_DELAY = 1
 """Place of the time spent waiting on a run queue, ns, in /proc/PID/task/TID/schedstat (Linux,
-Documentation/scheduler/sched-stats.rst); before it stands the time spent on a processor.
+Documentation/scheduler/sched-stats.rst); the field before is the time spent on a processor.
 """
 
 
 class Patience:
-    """A limit on the time that processes have for an answer.
+    """A limit on the time of processes for an answer.
 
-    A second counts only if no thread of the processes was ready to run and waited for a processor: a process
-    that sleeps or computes uses its time up, a process without a processor does not. Linux tells how long
-    threads have waited; elsewhere every second counts.
+    A second counts only if no thread of the processes was ready to run and waited for a processor: a sleeping
+    or computing process uses time up, a process without a processor does not. Linux tells how long threads
+    have waited; elsewhere every second counts.
 
-    One thread may begin a wait while another checks it.
+    A thread may begin a wait while another thread checks the wait.
 
     Args:
         limit_ns: Limit of each wait.
@@ -35,7 +35,7 @@ class Patience:
         self.limit_ns = limit_ns
         self.begin()
         self._checked_ns = self._begun_ns
-        """Beginning of the wait that was checked last, to which the next two belong."""
+        """Beginning of the wait checked last; the next two attributes belong to this wait."""
         self._left_out_ns = 0
         self._run_delays: dict[Path, int] | None = None
         """Run delay by thread, ns; None before the first look."""

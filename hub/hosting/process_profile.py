@@ -1,4 +1,4 @@
-"""Where the time of one process of a session goes: its stepping thread by phases, its others by purpose."""
+"""Time use of a process of a session: the stepping thread by phases, all further threads by purpose."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from schemas.trocar_msgs import ProfileRow
 __all__ = ["WAITING", "ProcessProfile"]
 
 WAITING = "waiting"
-"""The taker of what a core is kept busy with while a thread waits."""
+"""Name of the time a core is kept busy while a thread waits."""
 
 _CONNECTIONS = "connections"
 
@@ -43,7 +43,7 @@ class ProcessProfile:
         self._clocks = ThreadClocks(lambda name: _taker(name, host, of_devices), native)
 
     def prepare(self, stepped: Mapping[str, Stepped], wire: Wire) -> None:
-        """Time participants and what `wire` will receive; before a Host is made of them."""
+        """Time participants and the receivers of `wire`; call this before making a Host."""
         inputs = self.watch.phase("inputs", _CONNECTIONS)
         outputs = self.watch.phase("outputs", _CONNECTIONS)
         hashes = self.watch.phase("state hashes", "state hashes")
@@ -61,7 +61,7 @@ class ProcessProfile:
         setattr(wire, "cell", cell)  # noqa: B010 - a method is replaced on its object
 
     def waiting_for(self, hosts: Iterable[str]) -> Phase:
-        """Return the phase of waiting for what other hosts send."""
+        """Return the phase of waiting for messages of remote hosts."""
         return self.watch.phase(f"waiting for {', '.join(sorted(set(hosts)))}", WAITING)
 
     def attach(self, host: Host, ran: Callable[[], None] = lambda: None) -> None:
@@ -76,15 +76,15 @@ class ProcessProfile:
             self.watch.time_by_result(method, inputs, named)
 
     def restart(self) -> None:
-        """Count from now; the calling thread is the one that steps, and the main thread."""
+        """Count from now; the calling thread is the stepping thread and the main thread."""
         self._clocks.restart()
         self.watch.restart()
 
     def rows(self) -> list[ProfileRow]:
-        """Return what each phase and all other threads have taken so far; from any thread.
+        """Return the time of each phase and of all further threads so far; from any thread.
 
-        The phases share the processor time of the main thread as they do in the sampled rounds, or as they
-        share the wall time if there were none.
+        The phases share the processor time of the main thread in the proportions of the sampled rounds, or
+        in the proportions of the wall time without sampled rounds.
         """
         phases = [phase for phase in list(self.watch.phases.values()) if phase.wall_ns]
         weights = {phase: phase.sampled_ns for phase in phases}
@@ -110,7 +110,7 @@ class ProcessProfile:
 
 
 def _taker(thread: str, host: str, of_devices: str) -> str:
-    """Return what a thread of Python is for."""
+    """Return the purpose of a thread of Python."""
     if thread == "recorder" or thread.startswith("device "):
         return thread
     return "hub" if host == "hub" else of_devices

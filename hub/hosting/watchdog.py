@@ -16,25 +16,25 @@ __all__ = ["Watchdog"]
 log = logging.getLogger(__name__)
 
 _PERIOD_S = 0.1
-"""Between two looks at the answers; the end of a process is noticed at once. Each look takes the interpreter
-from the step loop: fifty a second were a third of all switches of its thread.
+"""Time between two looks at the answers; the end of a process is noticed at once. Each look takes the
+interpreter from the step loop: fifty a second were a third of all thread switches of the loop.
 """
 
 _STOPPED_NS = 1_000_000_000
-"""Between two looks, if this process was stopped: by Ctrl-Z, by a debugger, or with its virtual machine."""
+"""Time between two looks if this process was stopped: by Ctrl-Z, a debugger, or with the virtual machine."""
 
 
 class Watchdog:
     """Checks processes and answers in a thread of its own, until the first failure.
 
-    The end of a process of observers is reported once, and others are watched on.
+    The end of a process of observers is reported once, and the watch of the others goes on.
 
     Args:
         plan: The plan of the session.
         processes: The processes to watch.
-        answer_limit_ns: How long a participant may take to answer, as `Patience` counts it.
-        awaited: Returns the participant for which this process waits, if it is known.
-        failed: Is called with a participant's name and the cause: once, and for each observer that ends.
+        answer_limit_ns: Longest time for the answer of a participant, counted by `Patience`.
+        awaited: Returns the participant awaited by this process, if known.
+        failed: Is called with a participant's name and the cause: once, and at the end of each observer.
     """
 
     def __init__(
@@ -51,14 +51,14 @@ class Watchdog:
         self._waiting: Sequence[str] = ()
         self._ending = False
         self._lost: set[str] = set()
-        """The hosts of observers that have ended."""
+        """The ended hosts of observers."""
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         self._thread.start()
 
     def wait_for(self, participants: Sequence[str]) -> None:
         """Watch for the answers of `participants`, in step order, from now on.
 
-        The caller may remove a participant from the list when it has answered.
+        The caller may remove a participant from the list after the answer.
         """
         self._patience.begin()
         self._waiting = participants
@@ -85,7 +85,7 @@ class Watchdog:
                 return
 
     def _ended_process(self) -> tuple[str, str] | None:
-        """Return a participant whose process has ended, and how; report observers here."""
+        """Return a participant of an ended process, and the kind of end; report observers here."""
         for host, how in self._processes.dead().items():
             if host in self._lost:
                 continue
@@ -101,7 +101,7 @@ class Watchdog:
         return None
 
     def _late_answer(self, left_out_ns: int) -> tuple[str, str] | None:
-        """Return a participant that has not answered in time, and the cause."""
+        """Return a participant without an answer in time, and the cause."""
         waiting = self._unanswered()  # first: the wait may be over, and the next one begin, at any moment
         if not waiting or not self._patience.is_over(self._processes.numbers, left_out_ns):
             return None
@@ -113,7 +113,7 @@ class Watchdog:
         return awaited or first, cause
 
     def _unanswered(self) -> list[str]:
-        """Return the participants that are awaited, without those that a host with a link has stepped."""
+        """Return the awaited participants, without participants already stepped by a host with a link."""
         passed = {name for link in self._processes.links.values() for name in link.passed}
         return [name for name in tuple(self._waiting) if name not in passed]
 
