@@ -283,7 +283,7 @@ class Host:
         self._step(one, self.step, time_ns)
 
     def close(self) -> None:
-        """Close every participant, the last first; an error in a participant does not keep the others open."""
+        """Close every participant, the last first; an error in one does not keep the others open."""
         every = [(one.name, one.participant) for one in self._hosted]
         every += [(one.name, new) for _, one, new in self._successors]
         for name, participant in reversed(every):

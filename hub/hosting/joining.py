@@ -88,9 +88,7 @@ def run_device(
 
 @contextlib.contextmanager
 def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
-    """Interrupt the main thread when the hub's liveliness token is gone; end the process if the interrupt
-    fails.
-    """
+    """Interrupt the main thread when the hub's liveliness token is gone; end the process if that fails."""
     over, interrupt = threading.Event(), Interrupt()
 
     def gone(sample: zenoh.Sample) -> None:

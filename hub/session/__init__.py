@@ -1,1 +1,1 @@
-"""One session: clock, step loop, control requests, start and end."""
+"""A session: clock, step loop, control requests, start and end."""

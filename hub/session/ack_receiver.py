@@ -1,4 +1,4 @@
-"""Receives what stepped participants of other processes report: acks of grants, and failures."""
+"""Receives the reports of stepped participants of remote processes: acks of grants, and failures."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from schemas.lockstep import Ack, Grant, unpack_ack
 __all__ = ["Accepted", "AckReceiver"]
 
 Accepted = tuple[PlannedParticipant, Ack, bytes]
-"""The participant, its ack, and the bytes of it."""
+"""The participant, the ack, and the bytes of the ack."""
 
 _READY = -1
-"""The step of the ack with which a participant reports to be ready."""
+"""The step in the ack of a participant ready to step."""
 _NO_STEPS: Mapping[str, int] = {}
 
 
 class AckReceiver:
-    """Receives the acks of one run, one of each participant for each grant.
+    """Receives the acks of a run, one of each participant for each grant.
 
-    A host with a link answers there alone; another one over Zenoh, signed. A second ack, and one that the
-    participant's host has not sent, end the run: of two acks, only one can have the hashes of what was
-    computed. All other messages are refused and counted.
+    A host with a link answers by the link alone; all further hosts answer over Zenoh, signed. A second ack,
+    or an ack not sent by the participant's host, ends the run: of two acks, only one can have the hashes of
+    the computed states. All further messages are refused and counted.
 
     Args:
         session: The hub's Zenoh session.
@@ -40,8 +40,8 @@ class AckReceiver:
         plan: The plan of the session.
         run: The number of the run.
         refusals: Counts the messages that are refused.
-        ack_keys: By host, the key with which it signs.
-        links: By host, its link.
+        ack_keys: Keys of the signatures, by host.
+        links: Links, by host.
     """
 
     def __init__(
@@ -64,14 +64,14 @@ class AckReceiver:
         self._last: dict[str, bytes] = {}
         """The last ack of each participant."""
         self._step, self._steps = _READY, _NO_STEPS
-        """Of the grant whose acks are awaited."""
+        """Step of the grant awaiting acks, and the numbers of steps by participant."""
         self._subscriber = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
 
     def receive(self, waiting: Sequence[str], grant: Grant, steps: Mapping[str, int]) -> Iterator[Accepted]:
         """Wait a moment for messages, and yield the valid acks of `grant` from `waiting`, which may shrink.
 
-        `steps` are the numbers of steps that participants take in the grant. Without an ack it returns after
-        20 ms or, if all of `waiting` answer over Zenoh, after a message or `wake`. Raises ParticipantError if
+        `steps` are the participants' numbers of steps in the grant. Without an ack the wait ends after 20 ms
+        or, if all of `waiting` answer over Zenoh, after a message or `wake`. Raises ParticipantError if
         a message reports a failure.
         """
         self._step, self._steps = grant.step, steps
@@ -85,7 +85,7 @@ class AckReceiver:
             yield from self._from_link(host, waiting, wait=host == hosts[-1])
 
     def ready(self, waiting: Sequence[str]) -> Iterator[str]:
-        """Yield those of `waiting` that report to be ready; raises ParticipantError if one has failed."""
+        """Yield those of `waiting` that report readiness; raises ParticipantError if one has failed."""
         for host in self._links:
             for planned, *_ in self._from_link(host, waiting, wait=False):
                 yield planned.name
@@ -93,7 +93,7 @@ class AckReceiver:
             yield planned.name
 
     def look(self, waiting: Sequence[str] = ()) -> Iterator[Accepted]:
-        """Yield the acks of `waiting` that have arrived over Zenoh; raises ParticipantError for any other."""
+        """Yield the arrived acks of `waiting` over Zenoh; raises ParticipantError for any unexpected ack."""
         while (sample := self._subscriber.try_recv()) is not None:
             yield from self._from_zenoh(sample, waiting)
 
@@ -121,7 +121,7 @@ class AckReceiver:
     def _accept(
         self, planned: PlannedParticipant, payload: bytes, waiting: Sequence[str], *, signed: bool
     ) -> Accepted:
-        """Return an ack that is awaited; raises ParticipantError, or MessageError if none of the run."""
+        """Return an awaited ack; raises ParticipantError, or MessageError if none of the run."""
         count = self._steps.get(planned.name, 0)
         try:
             ack = unpack_ack(payload, count, count * len(planned.bonds))
@@ -143,9 +143,9 @@ class AckReceiver:
         return planned, ack, payload
 
     def _opened(self, sample: zenoh.Sample) -> tuple[PlannedParticipant, bytes, bool]:
-        """Return the participant that a message is of, its payload, and whether its host has signed it.
+        """Return the participant of a message, the payload, and whether the message is signed by the host.
 
-        A host with a link does not.
+        A host with a link does not sign.
         """
         planned = self._planned.get(str(sample.key_expr))
         if planned is None:
@@ -158,7 +158,7 @@ class AckReceiver:
         return planned, payload, signed
 
     def _check(self, planned: PlannedParticipant, ack: Ack, payload: bytes, *, signed: bool) -> None:
-        """Raise ParticipantError if an ack of this run is not its host's, or reports a failure."""
+        """Raise ParticipantError if an ack of this run is not from its host, or reports a failure."""
         if not signed:
             raise ParticipantError(
                 planned.name,
@@ -172,7 +172,7 @@ class AckReceiver:
             raise MessageError(f"repeats the ack of step {ack.step}")
 
     def raise_failure(self) -> None:
-        """Raise the failure that a participant itself has reported, if such a message has arrived."""
+        """Raise a failure reported by a participant itself, if such a message has arrived."""
         for name, payload in self._arrived():
             with suppress(MessageError):
                 ack = unpack_ack(payload, 0, 0)
@@ -180,7 +180,7 @@ class AckReceiver:
                     raise ParticipantError(name, ack.step, ack.error)
 
     def _arrived(self) -> Iterator[tuple[str, bytes]]:
-        """Yield the participant and the payload of every message of a host that has arrived."""
+        """Yield participant and payload of every arrived message of a host."""
         for link in self._links.values():
             while acks := link.acks(wait=False):
                 yield from acks
@@ -191,9 +191,9 @@ class AckReceiver:
                     yield planned.name, payload
 
     def end(self, step: int) -> None:
-        """Raise ParticipantError if an ack has arrived after the last grant's, which ended at `step`.
+        """Raise ParticipantError if an ack has arrived after the acks of the last grant, ended at `step`.
 
-        It must be called when all have arrived.
+        Call this after the arrival of all acks.
         """
         self._step, self._steps = step, _NO_STEPS
         for _ in self.ready(()):

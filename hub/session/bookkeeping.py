@@ -1,4 +1,4 @@
-"""What the hub knows of its run: reported as a status, a progress line, and a summary at the end."""
+"""The hub's knowledge of the run: reported as a status, a progress line, and a summary at the end."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["Bookkeeping"]
 
 
 class Bookkeeping:
-    """Keeps the phase, the times, and the state hashes of one run."""
+    """Keeps the phase, the times, and the state hashes of a run."""
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class Bookkeeping:
         self.phase = "starting"
         """`starting`, `running`, `paused`, `done` or `failed`."""
         self.detail = ""
-        """Why the run has failed, or who has ended it before its duration."""
+        """Cause of a failure, or the participant ending the run early."""
         self._scenario = scenario
         self._plan = plan
         self._run = run
@@ -118,7 +118,7 @@ class Bookkeeping:
         )
 
     def _last_step(self, planned: PlannedParticipant) -> int:
-        """Return the last step of a participant that is known; of a device, that of the session."""
+        """Return the last known step of a participant; for a device, the last step of the session."""
         if planned.observer:
             return self._observer_reports.step(planned.name)
         return self._last_steps.get(planned.name, self._clock.step)

@@ -1,4 +1,4 @@
-"""The clock: how far each grant goes, and when it may be given."""
+"""The clock: horizon and earliest time of each grant."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["Clock", "most_steps"]
 log = logging.getLogger(__name__)
 
 _WINDOW_NS = 10_000_000
-"""Simulated time that a grant covers where nothing enters and the scenario sets no window.
+"""Simulated time of a grant where nothing enters and the scenario sets no window.
 
-Requests to the hub then take effect at 100 Hz of simulated time, and a step of 1 ms bears a tenth of what a
-grant costs.
+Requests to the hub then take effect at 100 Hz of simulated time, and a step of 1 ms bears a tenth of the cost
+of a grant.
 """
 
 _CAUGHT_UP_NS = 50_000_000
@@ -24,12 +24,12 @@ _CAUGHT_UP_NS = 50_000_000
 Two pictures of the endoscope drawn without a GPU take 22 ms.
 """
 _OBSERVED_NS = 5_000_000_000
-"""Wall time over which the speed of simulated time is judged."""
+"""Wall time for a judgement of the speed of simulated time."""
 _REPORT_NS = 60_000_000_000
-"""Wall time between two reports that it is slow."""
+"""Wall time between two reports of slow simulated time."""
 _SLOW = 0.8
-"""Of real time. An arm has its limits in simulated time: at 0.18, a PSM that a ROS program leads at 0.1 m/s
-was up to 50 mm behind.
+"""Share of real time. The limits of an arm hold in simulated time: at 0.18, a PSM led by a ROS program at
+0.1 m/s was up to 50 mm behind.
 """
 
 
@@ -37,14 +37,14 @@ class Clock:
     """The simulated time of a run, and the horizon of each grant, in steps.
 
     Pace `fast` never waits; `realtime` follows the wall clock and counts late steps. By default a grant is
-    one step in real time, where every step waits for the wall clock, and with several hosts, where the end of
-    a process inside a grant would stay unnoticed until its horizon.
+    a single step in real time, where every step waits for the wall clock, and with several hosts, where the
+    end of a process inside a grant would stay unnoticed until the horizon of the grant.
 
     Args:
         plan: The plan of the session.
         window: The most steps of a grant; None: as many as are of use.
         realtime: Follow the wall clock.
-        steps: The number of steps of the whole run; None: until it is stopped.
+        steps: The number of steps of the whole run; None: until stopped.
         live_from: The steps before this one do not follow the wall clock.
     """
 
@@ -97,7 +97,7 @@ class Clock:
     def advance(self, count: int) -> None:
         """Advance by `count` steps; in real time wait for the wall clock.
 
-        Later steps catch up a delay, up to a limit; beyond it simulated time slips.
+        Later steps catch up a delay, up to a limit; beyond the limit simulated time slips.
         """
         self.step += count
         if not self.realtime:
@@ -111,7 +111,7 @@ class Clock:
             self._slip(max(-ahead_ns - _CAUGHT_UP_NS, 0), now_ns)
 
     def _slip(self, slip_ns: int, now_ns: int) -> None:
-        """Let simulated time slip; report it where devices lead."""
+        """Let simulated time slip; report the slip where devices lead."""
         self._wall_zero_ns += slip_ns
         self._slipped_ns += slip_ns
         observed_ns = now_ns - self._observed_from_ns
@@ -132,5 +132,5 @@ class Clock:
 
 
 def most_steps(plan: Plan, window: int | None) -> int:
-    """Return the most steps that one grant of a session covers; `window` is the scenario's."""
+    """Return the most steps of a grant of a session; `window` is the scenario's."""
     return window or max(1, _WINDOW_NS // plan.step_ns)

@@ -43,16 +43,17 @@ _MOST_WAITING = 64
 _RATE = 100.0
 """Requests per second on a key: a device asks for the time 20 times a second at first, then twice.
 
-Zenoh does not say who sends a query, so those who send on one key share the rate; each host joins on its own.
+Zenoh does not tell the sender of a query: all senders on a key share the rate; each host joins on a separate
+key.
 """
 _LONGEST_REASON = 1000
-"""Letters of a refusal, which quotes parts of the request."""
+"""Most letters of a refusal; a refusal quotes parts of the request."""
 
 Q = TypeVar("Q", bound=BaseModel)
 
 
 class Joins(Protocol):
-    """Answers hosts that join."""
+    """Answers joining hosts."""
 
     def join(self, request: JoinRequest) -> BaseModel:
         """Return the reply; raises MessageError to refuse."""
@@ -62,17 +63,17 @@ class Joins(Protocol):
 class ControlServer:
     """Answers control requests in a thread of its own; a refused request gets the reason.
 
-    What is too long, too frequent or too much to wait is refused at once, unread.
+    Requests too long, too frequent or too many to wait are refused at once, unread.
 
     Args:
         session: The hub's Zenoh session.
         keys: The keys of the session.
-        state: What `pause`, `resume`, `step` and `shutdown` change.
-        inlets: What `set` writes into.
-        network_links: What `link` changes.
-        joins: What answers `join`.
+        state: State changed by `pause`, `resume`, `step` and `shutdown`.
+        inlets: Inputs written by `set`.
+        network_links: Links changed by `link`.
+        joins: Answers `join`.
         description: The answer to `describe`.
-        refusals: Counts the requests that are refused.
+        refusals: Counts the refused requests.
     """
 
     def __init__(
@@ -118,7 +119,7 @@ class ControlServer:
         handler: Callable[[Q], BaseModel],
         key_of: Callable[[Q], str] | None = None,
     ) -> zenoh.Queryable[None]:
-        """Answer on `key`; if that is a pattern, a request is allowed on the key that `key_of` returns."""
+        """Answer on `key`; for a pattern, a request is allowed on the key returned by `key_of`."""
         limit = TokenBucket(_RATE)
 
         def take(query: zenoh.Query) -> None:
@@ -198,7 +199,7 @@ def _reply(query: zenoh.Query, key: str, reply: BaseModel) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """Return why a request is refused, for the person who sent it."""
+    """Return the reason of a refusal, for the sender of the request."""
     if not isinstance(error, ValidationError):
         return str(error)
     found = error.errors(include_url=False)

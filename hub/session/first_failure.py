@@ -1,4 +1,4 @@
-"""The first failure of a run, which ends it: later ones are its consequences."""
+"""The first failure of a run ends the run: later failures are consequences."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["FirstFailure"]
 
 
 class FirstFailure:
-    """Keeps the first failure that any thread reports, and makes the step loop raise it."""
+    """Keeps the first failure reported by any thread; the step loop raises this failure."""
 
     def __init__(self, plan: Plan, clock: Clock, host: Host, acks: AckReceiver, interrupt: Interrupt) -> None:
         self._plan, self._clock, self._host, self._acks, self._interrupt = plan, clock, host, acks, interrupt
@@ -23,7 +23,7 @@ class FirstFailure:
         self._first: ParticipantError | None = None
 
     def report(self, participant: str, cause: str) -> None:
-        """Report that `participant` has failed; from any thread."""
+        """Report the failure of `participant`; from any thread."""
         step = self._clock.step
         if self._plan.participants[participant].host == "hub":  # of another host only the grant is known
             step = max(step, self._host.step)
@@ -36,9 +36,9 @@ class FirstFailure:
         self._interrupt()
 
     def check(self) -> None:
-        """Raise the first failure, if there is one; else an interrupt that a callback has swallowed.
+        """Raise the first failure, if any; else an interrupt swallowed by a callback.
 
-        Where the participant itself has reported the cause, that report is raised instead.
+        Where the participant itself has reported the cause, the participant's report is raised instead.
         """
         if self._first is None:
             self._interrupt.check()

@@ -1,4 +1,4 @@
-"""The hosts that have joined a session: they report to be ready or failed, and may be lost."""
+"""The hosts joined to a session: hosts report readiness or failure, and may be lost."""
 
 from __future__ import annotations
 
@@ -18,20 +18,21 @@ __all__ = ["JoinedHosts"]
 
 
 class JoinedHosts:
-    """The hosts of a session other than the hub's own.
+    """The hosts of a session, without the hub's own.
 
     Args:
         scenario: The scenario.
-        plan: Its wiring.
+        plan: The wiring of the scenario.
         parameters: The kinds and parameters of all participants.
         run: The number of the run.
-        watched: Outputs of which the hub needs every value.
+        watched: Outputs with every value needed by the hub.
         failed: Is called with participant and cause when a host reports a failure.
-        ended: Is called with participant and reason when a host reports that one ends the session.
-        ack_keys: By host, the key with which it signs its acks.
-        programs_endpoint: Where programs outside Trocar connect, on this machine.
+        ended: Is called with participant and reason when a host reports the end of the session by a
+            participant.
+        ack_keys: Keys of the signatures of acks, by host.
+        programs_endpoint: Endpoint of this machine for programs outside Trocar.
         profile: The hosts of this machine keep a profile.
-        live_from_ns: Simulated time before which the run repeats a recorded one.
+        live_from_ns: Simulated time until which the run repeats a recorded run.
     """
 
     def __init__(
@@ -65,9 +66,9 @@ class JoinedHosts:
         self._changed = threading.Condition()
 
     def join(self, request: JoinRequest) -> JoinReply | Empty:
-        """Answer a host that joins, is ready, has failed or ends the session.
+        """Answer a host's request: to join, ready, failed, or session ended.
 
-        Raises MessageError to refuse it.
+        Raises MessageError to refuse the request.
         """
         names = [name for name, planned in self._plan.participants.items() if planned.host == request.host]
         if not names or request.host == "hub":
@@ -116,12 +117,12 @@ class JoinedHosts:
         )
 
     def lose(self, host: str) -> None:
-        """Forget a host, so that it may join again."""
+        """Forget a host: the host may join again."""
         with self._changed:
             self._hosts.pop(host, None)
 
     def missing(self, hosts: list[str]) -> list[str]:
-        """Return those of `hosts` that are not ready, after waiting a moment for a change."""
+        """Return the hosts among `hosts` not yet ready, after waiting a moment for a change."""
         with self._changed:
             waiting = [host for host in hosts if host not in self._hosts or not self._hosts[host].ready]
             if waiting:
@@ -133,11 +134,11 @@ class JoinedHosts:
         return host in self._hosts and self._hosts[host].watching
 
     def bonds(self) -> Mapping[str, tuple[BondSide, ...]]:
-        """Return the bonds of all hosts' participants, with the numbers that `configure` has found."""
+        """Return the bonds of all hosts' participants, with the numbers found by `configure`."""
         return {name: sides for request in self._hosts.values() for name, sides in request.bonds.items()}
 
     def pid(self, host: str) -> int:
-        """Return the process id of a host; 0 while it has not joined."""
+        """Return the process id of a host; 0 before joining."""
         if host == "hub":
             return os.getpid()
         return self._hosts[host].pid if host in self._hosts else 0

@@ -1,4 +1,4 @@
-"""From a scenario to a session that is ready to run."""
+"""From a scenario to a session ready to run."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ __all__ = ["Continuation", "attachments_of", "in_one_host", "launch", "plan_of"]
 
 @dataclass(frozen=True)
 class Continuation:
-    """A fork: how a session goes on from a recorded one."""
+    """A fork: the continuation of a recorded session."""
 
     plan: Plan
-    """That of the scenario, with the start values of the parent."""
+    """Plan of the scenario, with the start values of the parent."""
     past: Past
     origin: ForkOrigin
-    """It is kept in the recording."""
+    """Origin of the fork, kept in the recording."""
     on_ack: OnAck
     """Is called with every ack."""
 
 
 def plan_of(scenario: Scenario, params: Mapping[str, Params]) -> tuple[Plan, dict[str, Stepped | Device]]:
-    """Return the plan of `scenario`, and its participants, not configured; raises ScenarioError."""
+    """Return plan and participants of `scenario`, not configured; raises ScenarioError."""
     kinds = {name: spec.kind for name, spec in scenario.participants.items()}
     participants = {name: registry.load(kind)(name, params[name]) for name, kind in kinds.items()}
     return (
@@ -76,8 +76,8 @@ def launch(
 ) -> Session:
     """Return a session of a scenario file, ready to run; `one_host` puts every participant into this process.
 
-    `outside` are the endpoints where other machines may join by TLS, with the hub's certificate from
-    `certificates`, by default this user's directory. `profile` measures where the time goes. A fork is the
+    `outside` are the endpoints for remote machines to join by TLS, with the hub's certificate from
+    `certificates`, by default this user's directory. `profile` measures the use of time. A fork is the
     `continuation` of a recorded session.
     """
     scenario = in_one_host(loaded.scenario) if one_host else loaded.scenario
@@ -119,7 +119,7 @@ def _gate(endpoints: Sequence[str], certificates: Path | None, access: dict[str,
 
 
 def attachments_of(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[str, bytes]:
-    """Return what a recording needs to be understood and re-simulated elsewhere."""
+    """Return the attachments of a recording, enough to read and re-simulate the run elsewhere."""
     source = loaded.source
     versions = {"python": platform.python_version(), "platform": platform.platform()}
     versions |= {d.name: d.version for d in sorted(distributions(), key=lambda d: d.name.lower())}

@@ -1,4 +1,4 @@
-"""What the observers of a session report, and which of them are lost: the session goes on without them."""
+"""Reports of a session's observers, and the lost observers: the session goes on without a lost observer."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ __all__ = ["ObserverReports"]
 log = logging.getLogger(__name__)
 
 _RATE = 10.0
-"""Statuses per second that are accepted for each observer; a host sends one."""
+"""Most statuses per second accepted for each observer; a host sends one a second."""
 
 
 class ObserverReports:
-    """Receives the statuses of all observers, and keeps why one is lost; from any thread."""
+    """Receives the statuses of all observers, and keeps the causes of losses; from any thread."""
 
     def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, refusals: Refusals) -> None:
         self._keys, self._refusals = keys, refusals
@@ -39,18 +39,18 @@ class ObserverReports:
         )
 
     def lose(self, observer: str, cause: str) -> None:
-        """Report that an observer is lost, the first time; `cause` is a clause."""
+        """Report the first loss of an observer; `cause` is a clause."""
         if observer not in self._lost:
             self._lost = {**self._lost, observer: cause}
             log.error("observer '%s' is lost, the session goes on without it: %s", observer, cause)
 
     def find(self, observer: str) -> None:
-        """Report that an observer is here again."""
+        """Report the return of an observer."""
         self._lost = {name: cause for name, cause in self._lost.items() if name != observer}
 
     @property
     def lost(self) -> str:
-        """Which observers are lost, and why; empty if none is."""
+        """Lost observers and the causes; empty if no observer is lost."""
         return "; ".join(f"observer '{name}' is lost: {cause}" for name, cause in self._lost.items())
 
     @property
@@ -59,12 +59,12 @@ class ObserverReports:
         return [latency for _, status in sorted(self._statuses.items()) for latency in status.latencies]
 
     def step(self, observer: str) -> int:
-        """Return the step whose state an observer saw last; -1 if it has not reported any."""
+        """Return the step of the last state seen by an observer; -1 before the first report."""
         status = self._statuses.get(observer)
         return -1 if status is None else status.step
 
     def observed(self) -> dict[str, Observed]:
-        """Return what each observer has seen."""
+        """Return the reports of states seen, by observer."""
         rows: dict[str, Observed] = {}
         for name in self._names:
             status, lost = self._statuses.get(name), self._lost.get(name)

@@ -1,4 +1,4 @@
-"""The part of a run that a recording has: it is simulated again, and a fork goes on from its end."""
+"""The recorded part of a run: simulated again; a fork goes on from the end of this part."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ class Past:
     """The recorded part of a run."""
 
     grants: Iterator[GrantMessage]
-    """They are given again, instead of what devices say."""
+    """Recorded grants, given again in place of samples of devices."""
     parameters: SessionParameters
-    """Those of the run, which the trust check of the recording has made."""
+    """Parameters of the run, made by the trust check of the recording."""
     live_from: int | None = None
-    """The step from which on the run is live; None: it ends with the grants."""
+    """First live step of the run; None: the run ends with the grants."""
     new_devices: frozenset[str] = frozenset()
-    """Those that are not in the recording as they are: what they lead is stale until they speak."""
+    """Devices new or changed since the recording: led inputs are stale until the first sample of the device.
+    """

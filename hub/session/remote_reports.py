@@ -1,4 +1,4 @@
-"""What other processes report beside acks: that they have come or gone, and that they refused a message."""
+"""Reports of remote processes beside acks: arrival, departure, and refused messages."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ log = logging.getLogger(__name__)
 class RemoteReports:
     """Subscribes to liveliness tokens and refusals of all hosts of a session.
 
-    A lost engine of another machine ends the run; with a lost device, what it leads holds; a lost observer
-    leads nothing.
+    A lost engine of another machine ends the run; with a lost device, the participants led by the device
+    hold; a lost observer leads nothing.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class RemoteReports:
         ]
 
     def _token(self, sample: zenoh.Sample) -> None:
-        """Handle a liveliness token that has appeared or disappeared."""
+        """Handle the appearance or disappearance of a liveliness token."""
         name = str(sample.key_expr).rsplit("/", 1)[1]
         planned = self._plan.participants.get(name)
         if planned is None or not planned.host.startswith("remote/"):
@@ -81,7 +81,7 @@ class RemoteReports:
         )
 
     def _refused(self, sample: zenoh.Sample) -> None:
-        """Count a message that another host has refused; that host has logged the reason."""
+        """Count a message refused by another host; the host has logged the reason."""
         try:
             decode(StringMessage, sample.payload.to_bytes())
             self._refusals.add(str(sample.key_expr))

@@ -1,4 +1,4 @@
-"""All that exists while a session runs."""
+"""All objects of a running session."""
 
 from __future__ import annotations
 
@@ -56,24 +56,24 @@ _KEY_BYTES = 16
 
 @dataclass(frozen=True)
 class SessionSpec:
-    """What is to be run, and where the hub listens."""
+    """Specification of a run, and the endpoint of the hub."""
 
     scenario: Scenario
     plan: Plan
     participants: Mapping[str, Stepped | Device]
-    """Those that live in this process, by name."""
+    """Participants and devices in this process, by name."""
     directory: Path
     """Where relative paths of the scenario start."""
     endpoint: str
     """Where the hub listens on loopback."""
     programs_endpoint: str
-    """Where programs outside Trocar connect; empty if no device has keys for them."""
+    """Endpoint for programs outside Trocar; empty if no device has keys for such programs."""
     gate: Gate | None
-    """Lets other machines in."""
+    """Gate for remote machines; None without remote machines."""
     past: Past | None = None
-    """What a recording has of this run."""
+    """The recorded part of this run."""
     successors: Successors = field(default_factory=dict[str, Sequence[tuple[int, Stepped]]])
-    """Those of this process that take over from `participants`, and before which step."""
+    """Successors in this process of `participants`, each with the step before the handover."""
     profiled: bool = False
     """Where the time goes is measured."""
     recording: str = ""
@@ -81,12 +81,12 @@ class SessionSpec:
 
     @property
     def live_from(self) -> int | None:
-        """The step from which on devices lead; None: they never do."""
+        """The first step with devices in the lead; None: devices never lead."""
         return 0 if self.past is None else self.past.live_from
 
     @property
     def parameters(self) -> SessionParameters:
-        """The kinds and parameters of all participants; those of a recording have passed its trust check."""
+        """Kinds and parameters of all participants; those of a recording have passed its trust check."""
         if self.past is not None:
             return self.past.parameters
         return SessionParameters.of_scenario(self.scenario, Files(self.directory))
@@ -98,17 +98,18 @@ class SessionSpec:
 
     @property
     def devices(self) -> dict[str, Device]:
-        """The devices of this process that the run needs."""
+        """The devices of this process needed by the run."""
         if self.live_from is None:
             return {}
         return {name: p for name, p in self.participants.items() if isinstance(p, Device)}
 
 
 class Run:
-    """One run of a session, complete when it is made.
+    """A run of a session, complete from the start.
 
-    `stack` closes it, also what was built before an error: first the watchdog, then the hub's token, with
-    which the hosts of other processes end, then what lives in this process. Queries are answered to the last.
+    `stack` closes the run, also the parts built before an error: first the watchdog, then the hub's token
+    (the hosts of remote processes end with the token), then all parts in this process. Queries are answered
+    to the last.
     """
 
     def __init__(
@@ -123,7 +124,7 @@ class Run:
         scenario, plan, keys = spec.scenario, spec.plan, Keys(spec.scenario.name)
         self.spec, self.session, self.keys, self.state = spec, session, keys, state
         self.number = secrets.randbits(63) | 1
-        """Tells the messages of this run from those of any other."""
+        """Number of the run, marking the messages of this run."""
         self.recorded = recorder is not None
         answering = stack.enter_context(ExitStack())
         self.processes = HostProcesses(_links(plan))
@@ -182,9 +183,9 @@ class Run:
         stack.callback(self.watchdog.end)
 
     def fail(self, participant: str, cause: str) -> None:
-        """Report that `participant` has failed, which ends the run; from any thread.
+        """Report the failure of `participant` and end the run; from any thread.
 
-        An observer that fails after the start is only reported: the run never waits for it.
+        An observer's failure after the start is only reported: the run never waits for an observer.
         """
         if self.spec.plan.participants[participant].observer and self.bookkeeping.phase != "starting":
             self.observer_reports.lose(participant, cause)
@@ -194,7 +195,7 @@ class Run:
     def end(self, participant: str, reason: str) -> None:
         """End the session in good order when the present grant is done; from any thread.
 
-        The first participant that asks for it is the one that status and summary name.
+        Status and summary name the first participant asking for the end.
         """
         if not self.bookkeeping.detail:
             self.bookkeeping.detail = f"participant '{participant}' has ended the session: {reason}"
@@ -203,7 +204,7 @@ class Run:
 
     @property
     def live_from_ns(self) -> int:
-        """Simulated time before which the run repeats a recorded one."""
+        """Simulated time until which the run repeats a recorded run."""
         return (self.spec.live_from or 0) * self.spec.plan.step_ns
 
     def _profile(self) -> RunProfile:
@@ -222,7 +223,7 @@ class Run:
         )
 
     def _devices(self) -> SessionDevices:
-        """Return the devices of the session, those of this process not yet open."""
+        """Return the devices of the session; devices of this process are not yet open."""
         endpoint, devices = self.spec.programs_endpoint, self.spec.devices
         for device in devices.values():
             if isinstance(device, RouterClient):
@@ -238,7 +239,7 @@ class Run:
         )
 
     def _answer(self, answering: ExitStack) -> None:
-        """Receive what other processes report and publish, and answer control requests."""
+        """Receive reports and values of remote processes, and answer control requests."""
         session, keys = self.session, self.keys
         reports = RemoteReports(
             session,
@@ -281,7 +282,7 @@ def _clock(scenario: Scenario, plan: Plan, live_from: int) -> Clock:
 
 
 def _links(plan: Plan) -> dict[str, HubLink]:
-    """Return a link to each host with stepped participants that can have one."""
+    """Return a link to each host with stepped participants, where a link is possible."""
     names = dict[str, list[str]]()
     for name in plan.order:
         host = plan.participants[name].host

@@ -1,4 +1,4 @@
-"""The profile of a run: where its time goes in every process, and why steps were late."""
+"""The profile of a run: use of time in every process, and causes of late steps."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from schemas.trocar_msgs import Profile, ProfileRow
 __all__ = ["RunProfile"]
 
 _ANSWER_S = 1.0
-"""How long a host may take to answer; one that computes in a library without releasing the interpreter does
-not answer before.
+"""Longest time for the answer of a host; a host computing in a library without releasing the interpreter
+answers only afterwards.
 """
 
 
 class RunProfile:
     """Times the step loop of the hub, asks the hosts for their parts, and answers queries with the whole.
 
-    What it times does not know of it: methods are replaced on their objects before the first step.
+    The timed objects do not know of the profile: methods are replaced on their objects before the first step.
 
     Args:
         session: The hub's Zenoh session.
@@ -47,8 +47,8 @@ class RunProfile:
         plan: The plan of the session.
         run: The number of the run.
         clock: The clock of the run.
-        monitor: What records and measures it.
-        refusals: Counts the answers of hosts that are refused.
+        monitor: Records and measures the run.
+        refusals: Counts the refused answers of hosts.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class RunProfile:
         self._wall_clock = self.process.watch.phase("waiting for the wall clock", "hub")
         self._late = LateSteps()
         self._computed_ns: dict[str, int] = {}
-        """By participant of another host, in the last grant."""
+        """Computing time (ns) by participant of another host, in the last grant."""
         self._began_ns = monotonic_ns()
         self._waited_ns = 0
         self._queue: CoreQueue | None = None
@@ -75,7 +75,7 @@ class RunProfile:
         self._queryable = session.declare_queryable(keys.profile, Callback(self._answer))
 
     def prepare(self, stepped: Mapping[str, Stepped], wire: Wire) -> None:
-        """Time participants, values that arrive, and the recording; before a Host is made of them."""
+        """Time participants, arriving values, and the recording; call this before making a Host."""
         self.process.prepare(stepped, wire)
         recording = self.process.watch.phase("recording", "recorder")
         for method in (self._monitor.grant, self._monitor.record, self._monitor.status):
@@ -84,7 +84,7 @@ class RunProfile:
             self.process.watch.time_returned(method, recording)
 
     def watch(self, host: Host, devices: SessionDevices, state: RunState) -> None:
-        """Time the parts of a run that the step loop uses."""
+        """Time the parts of a run used by the step loop."""
         watch = self.process.watch
         self.process.attach(host)
         watch.time(devices.enter, watch.phase("devices", "devices"))
@@ -97,9 +97,9 @@ class RunProfile:
         receive: Callable[..., None],
         unbooked: Sequence[tuple[PlannedParticipant, Ack, bytes | None]],
     ) -> None:
-        """Time the booking of acks, and the wait for those of other hosts, which are then `unbooked`.
+        """Time the booking of acks, and the wait for acks of remote hosts, then `unbooked`.
 
-        Of several hosts, the wait was for the one whose participants have computed longest.
+        Among several hosts, the wait was for the host with the longest computing participants.
         """
         watch = self.process.watch
         waiting = watch.phase("hub", "hub")
@@ -116,14 +116,14 @@ class RunProfile:
         watch.time_by_result(receive, waiting, received)
 
     def start(self) -> None:
-        """Count from now: the first step begins, and the calling thread takes it."""
+        """Count from now: the first step begins, and the calling thread is the stepping thread."""
         self._began_ns = monotonic_ns()
         self._queue = CoreQueue()
         self._waited_ns = self._queue.waited_ns()
         self.process.restart()
 
     def _advanced(self, _: None) -> Phase:
-        """Judge the steps of a grant, if they were late, and begin the next round."""
+        """Judge the steps of a grant, if late, and begin the next round."""
         watch, clock = self.process.watch, self._clock
         late, self._late_steps = clock.late_steps - self._late_steps, clock.late_steps
         simulated_ns, self._time_ns = clock.time_ns - self._time_ns, clock.time_ns
@@ -137,10 +137,10 @@ class RunProfile:
         return self._wall_clock
 
     def _causes(self, phases: dict[Phase, int], no_core_ns: int) -> dict[str, int]:
-        """Return what the wall time (ns) of a grant was used for.
+        """Return the wall time (ns) of a grant by cause.
 
-        What a host was waited for is due to the participants there, as far as they computed. What the hub's
-        thread had no core for is taken from the longest phase, in which most of it must have been.
+        The wait for a host is due to the participants there, as far as the participants computed. The time of
+        the hub's thread without a core is subtracted from the longest phase, the most probable place.
         """
         causes = {phase.name: ns for phase, ns in phases.items() if ns and phase is not self._wall_clock}
         for name, computed_ns in self._computed_ns.items():
@@ -158,7 +158,7 @@ class RunProfile:
         return causes
 
     def message(self) -> Profile:
-        """Return the profile so far; from any thread but one that Zenoh calls."""
+        """Return the profile so far; from any thread except Zenoh's callbacks."""
         return Profile(
             session=self._keys.session,
             run=self._run,
@@ -189,7 +189,7 @@ class RunProfile:
             query.reply(self._keys.profile, encode(self.message()), encoding=zenoh.Encoding.APPLICATION_CDR)
 
     def finish(self) -> Profile:
-        """Return the profile of the whole run, and record it; the hosts are still there."""
+        """Return and record the profile of the whole run; the hosts are still there."""
         profile = self.message()
         self._monitor.profile(profile)
         return profile

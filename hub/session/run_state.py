@@ -47,7 +47,7 @@ class RunState:
 
     @property
     def budget(self) -> int | None:
-        """Steps that may be taken before the next pause; None: no limit."""
+        """Steps allowed before the next pause; None: no limit."""
         return self._budget
 
     def wait(self, timeout_s: float) -> bool:
@@ -57,7 +57,7 @@ class RunState:
             return self._budget != 0 or self._ending
 
     def spend(self, steps: int) -> None:
-        """Subtract steps that were taken from the budget."""
+        """Subtract completed steps from the budget."""
         with self._changed:
             if self._budget is not None:
                 self._budget = max(self._budget - steps, 0)

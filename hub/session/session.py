@@ -1,4 +1,4 @@
-"""A session: the hub's side of one run, from joining to summary."""
+"""A session: the hub's side of a run, from joining to summary."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ log = logging.getLogger(__name__)
 
 
 class Session:
-    """One run of a scenario, with this process as hub and router.
+    """A run of a scenario, with this process as hub and router.
 
     Args:
         scenario: The scenario.
-        plan: Its wiring.
-        participants: Those that live in this process, by name.
-        directory: Where relative paths of the scenario start.
-        endpoint: Where the hub listens on loopback; by default at a free port.
-        gate: Lets other machines in.
-        foreign_keys: Keys that devices share with programs, which meet them at a router of their own.
+        plan: The wiring of the scenario.
+        participants: Participants in this process, by name.
+        directory: Base of relative paths of the scenario.
+        endpoint: The hub's endpoint on loopback; by default at a free port.
+        gate: The gate for remote machines.
+        foreign_keys: Keys shared by devices and programs; these programs connect to a separate router.
         record: The directory of the recording.
-        attachments: What is kept in the recording beside the messages, by name.
-        past: What a recording has of this run, to be simulated again before it goes on, or instead.
-        successors: Those of this process that take over from `participants`, and before which step.
+        attachments: Contents of the recording beside the messages, by name.
+        past: The recorded part of this run, to be simulated again before the run goes on, or instead.
+        successors: Successors in this process of `participants`, each with the step before the handover.
         on_ack: Is called with every participant's ack of every grant.
-        profile: Measure where the time goes, for summary, recording and `trocar ls`.
+        profile: Measure the use of time, for summary, recording and `trocar ls`.
     """
 
     def __init__(
@@ -92,19 +92,19 @@ class Session:
 
     @property
     def endpoint(self) -> str:
-        """Where the hub listens on loopback; one that was not given may become another one in `run`."""
+        """The hub's endpoint on loopback; unless given, the port may change in `run`."""
         return self._port.endpoint
 
     @property
     def programs_endpoint(self) -> str:
-        """Where ROS programs and the like connect; empty if no device has keys for them."""
+        """Endpoint for ROS programs and the like; empty if no device has keys for such programs."""
         return self._outer.programs
 
     def run(self, progress: Callable[[Progress], None] | None = None) -> Summary:
-        """Run to the end and return the summary. SIGTERM ends it as Ctrl-C does.
+        """Run to the end and return the summary. SIGTERM ends the run in the same way as Ctrl-C.
 
-        Call it in the main thread: nowhere else can a participant of this process be interrupted that hangs
-        or waits for a dead one.
+        Call this in the main thread: only there can a participant of this process be interrupted while
+        hanging or waiting for a dead participant.
 
         Raises ParticipantError or SessionError when the session fails (the recording is then closed and
         readable), ScenarioError if a bond's step is unstable, ConnectError if the endpoint is taken.
@@ -139,7 +139,7 @@ class Session:
         return run.bookkeeping.summary(recorded, self._profile)
 
     def _step(self, run: Run, interrupt: Interrupt, progress: Callable[[Progress], None] | None) -> None:
-        """Start a run and step it to its end, which its last status reports."""
+        """Start a run and step to the end; the last status reports the end."""
         steps = StepLoop(run, self._on_ack)
         if run.profile is not None:
             steps.show_to(run.profile)
@@ -164,9 +164,9 @@ class Session:
 def _start_and_step(
     run: Run, steps: StepLoop, interrupt: Interrupt, progress: Callable[[Progress], None] | None
 ) -> None:
-    """Start and step; nothing interrupts what comes after.
+    """Start and step; nothing interrupts the code after this call.
 
-    One failure brings others, which may be reported at any moment: only the first one is raised.
+    A failure brings further failures, reported at any moment: only the first failure is raised.
     """
     try:
         try:

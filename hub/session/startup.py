@@ -58,9 +58,9 @@ def _with_participants(host: str, plan: Plan) -> str:
 
 
 def _wait_for_connections(run: Run) -> None:
-    """Repeat the values at time 0 until every host has received those that it reads.
+    """Repeat the values at time 0 until every host has received the values to be read there.
 
-    A camera has then drawn its first picture; from here on the session never waits for it.
+    A camera has then drawn the first picture; from here on the session never waits for a camera.
     """
     plan = run.spec.plan
     waiting = [name for name in plan.order if plan.participants[name].host != "hub"]

@@ -1,4 +1,4 @@
-"""The state hashes of one run as one hash: equal for equal runs, whatever the hosts and windows."""
+"""The state hashes of a run as a single hash: equal for equal runs, whatever the hosts and windows."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["StateDigests"]
 
 
 class StateDigests:
-    """Takes the state hashes of each participant, in the order of its steps."""
+    """Takes the state hashes of each participant, in the order of the steps."""
 
     def __init__(self, participants: Iterable[str]) -> None:
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in participants}

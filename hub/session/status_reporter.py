@@ -15,7 +15,7 @@ __all__ = ["StatusReporter"]
 
 
 class StatusReporter:
-    """Publishes and records the status on demand, and answers queries for it at any time."""
+    """Publishes and records the status on demand, and answers queries for the status at any time."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""The step loop of the hub: grants steps, takes part in them, and waits for the acks of all others."""
+"""The step loop of the hub: grants steps, does the hub's share, and waits for the acks of all others."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ _PROGRESS_S = 0.1
 _STATUS_S = 0.5
 """Everything so far goes to the recorder with a status."""
 _RECORDED_TOGETHER = 64
-"""Or as soon as it is so much: a call of the recorder costs as much as some ten messages."""
+"""Messages that are recorded before a status is due: a call of the recorder costs as much as some ten."""
 _VALUES_NS = 5_000_000_000
-"""How long values of the last steps may take that come over Zenoh, when the acks have arrived."""
+"""Longest time for values of the last steps over Zenoh after the arrival of the acks."""
 
 OnAck = Callable[[PlannedParticipant, Ack], None]
 
 
 class StepLoop:
-    """Steps a run to its end; `on_ack` is called with every ack."""
+    """Steps a run to the end; `on_ack` is called with every ack."""
 
     def __init__(self, run: Run, on_ack: OnAck | None) -> None:
         plan, session, keys = run.spec.plan, run.session, run.keys
@@ -62,7 +62,7 @@ class StepLoop:
         }
 
     def show_to(self, profile: RunProfile) -> None:
-        """Let a profile time what this loop does beside calling others."""
+        """Let a profile time this loop's own work."""
         profile.watch(self._run.host, self._run.devices, self._run.state)
         profile.watch_acks(self.book_acks, self._receive_acks, self._unbooked)
 
@@ -122,7 +122,7 @@ class StepLoop:
         run.clock.start()
 
     def _next_grant(self, budget: int | None) -> Grant | None:
-        """Return the next grant, of at most `budget` steps, with the samples that enter there."""
+        """Return the next grant, of at most `budget` steps, with the samples entering there."""
         run = self._run
         if self._past is not None:
             then = next(self._past.grants, None)
@@ -138,7 +138,7 @@ class StepLoop:
         return Grant(run.number, 0, step, time_ns, horizon_ns, run.devices.enter(time_ns, step))
 
     def _first_live(self, new_devices: Collection[str]) -> Grant:
-        """Return the grant of one step with which the run goes on from its past."""
+        """Return the grant of a single step for the run to go on from the past."""
         run, self._past = self._run, None
         step, time_ns = run.clock.step, run.clock.time_ns
         run.clock.go_live()
@@ -149,9 +149,9 @@ class StepLoop:
         return Grant(run.number, 0, step, time_ns, time_ns + self._step_ns, entering)
 
     def _step(self, grant: Grant) -> None:
-        """Give a grant, take part in it, and wait until all others have.
+        """Give a grant, do the hub's share, and wait until all others have done theirs.
 
-        The acks of the grant before are booked while other processes work on this one.
+        The acks of the grant before are booked while remote processes work on this grant.
         """
         run = self._run
         granted_ns = monotonic_ns()
@@ -192,9 +192,9 @@ class StepLoop:
         run.watchdog.wait_for(())
 
     def _schedule(self, grant: Grant) -> tuple[list[str], dict[str, int]]:
-        """Return the participants that step in a grant, in step order, and their numbers of steps.
+        """Return the participants stepping in a grant, in step order, and their numbers of steps.
 
-        Grants follow few patterns, so each is worked out once.
+        Grants follow few patterns: each is worked out once.
         """
         begin, end = grant.step, grant.horizon_ns // self._step_ns
         key = begin % self._common_period, end - begin
@@ -205,7 +205,7 @@ class StepLoop:
         return self._schedules[key]
 
     def book_acks(self) -> None:
-        """Book the acks that have arrived, and publish the energy books when they are due and of use."""
+        """Book all arrived acks, and publish the energy books when due and of use."""
         monitor, bookkeeping = self._run.monitor, self._run.bookkeeping
         for planned, ack, payload in self._unbooked:
             monitor.ack(planned, ack, bookkeeping.book(planned, ack), payload)

@@ -1,8 +1,8 @@
-"""A session that its caller steps: all participants in this process, no hub beside them, no wire, no clock.
+"""A session stepped by the caller: all participants in this process, without a hub, a wire or a clock.
 
-It is what learning environments and optimisers need: the same plan, host, grants and state hashes as in any
-other session, so that a recording of it verifies; but the caller says how far to go, and begins again at time
-0 as often as it likes, from the participants' saved states.
+For learning environments and optimisers: plan, host, grants and state hashes are the same as in any session,
+and recordings verify; but the caller says how far to go, and begins again at time 0 any number of times, from
+the participants' saved states.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from schemas.trocar_msgs import SessionStatus
 __all__ = ["SteppedSession"]
 
 _RUN = 1
-"""Its number: nothing arrives here that could be of another run."""
+"""Number of the run: no message of another run can arrive here."""
 
 
 class SteppedSession:
@@ -43,8 +43,8 @@ class SteppedSession:
             session.advance(100)                            # steps
             session["robot.needle/pose"]                    # (7,), m
 
-    It stands at time 0 when it is made. Participants that only look, in pace `realtime`, are not stepped with
-    the others; `look` steps one.
+    A new session stands at time 0. Observers in pace `realtime` are not stepped with the others; `look` steps
+    an observer.
 
     Raises:
         ScenarioError: The scenario has devices, or is invalid.
@@ -75,7 +75,7 @@ class SteppedSession:
         return plan, stepped
 
     def _inlets(self) -> dict[str, PortCodec]:
-        """Return the inputs that nothing is connected to, as `participant.port`."""
+        """Return the unconnected inputs, as `participant.port`."""
         return {
             f"{name}.{port.name}": PortCodec(port)
             for name in self.plan.order
@@ -84,7 +84,7 @@ class SteppedSession:
         }
 
     def _configure(self) -> None:
-        """Configure all participants, and keep what `restart` goes back to."""
+        """Configure all participants, and keep the initial states for `restart`."""
         self._host.configure(self._loaded.source.directory)
         self._first = {name: _copied(self._host.newest(name)) for name in self.plan.order}
         try:
@@ -94,10 +94,10 @@ class SteppedSession:
         self._begin(None)
 
     def restart(self, record: Path | None = None) -> None:
-        """Go back to time 0, from saved states or, if a participant cannot save its own, all made anew.
+        """Go back to time 0, from saved states or, if any participant cannot save states, all made anew.
 
-        `record`: a new directory for the recording of what follows; it ends with the next `restart` or
-        `close`. Raises RecordingError if it is not empty, or cannot be written.
+        `record`: a new directory for a recording from here to the next `restart` or `close`. Raises
+        RecordingError if the directory is not empty, or cannot be written.
         """
         self._end_recording()
         if self._saved:
@@ -130,11 +130,11 @@ class SteppedSession:
     def advance(self, steps: int, inputs: Mapping[str, Value] | None = None) -> None:
         """Take `steps` communication steps.
 
-        `inputs` enter before the first of them, by `participant.port`: of a signal its value, of an event
-        port a tuple of messages. Only inputs without a connection can be given; they keep their values.
+        `inputs` enter before the first step, by `participant.port`: for a signal a value, for an event port a
+        tuple of messages. Only inputs without a connection can be given; given inputs keep their values.
 
-        Raises ParticipantError if a participant fails, SessionError for an input that cannot be given, and
-        MessageError for a value that does not fit its port. After an error only `restart` goes on.
+        Raises ParticipantError if a participant fails, SessionError for an input not open to the caller, and
+        MessageError for a value not fitting the port. After an error only `restart` goes on.
         """
         entering = tuple(
             sample for port, value in (inputs or {}).items() for sample in self._samples(port, value)
@@ -177,11 +177,11 @@ class SteppedSession:
 
     @property
     def restores(self) -> bool:
-        """Whether `restart` restores saved states; otherwise it makes all participants anew."""
+        """Whether `restart` restores saved states; otherwise all participants are made anew."""
         return bool(self._saved)
 
     def participant(self, name: str) -> Stepped:
-        """Return a participant: a task, say, that knows its goals. It is not to be stepped."""
+        """Return a participant, such as a task with goals. Do not step the participant."""
         return self._stepped[name]
 
     @property
@@ -195,7 +195,7 @@ class SteppedSession:
         return self._digests.whole
 
     def __getitem__(self, port: str) -> Any:
-        """Return the newest value of the output `participant.port`, an array that may be kept."""
+        """Return the newest value of the output `participant.port`, an array safe to keep."""
         name, _, output = port.partition(".")
         if name not in self._stepped or output not in (newest := self._host.newest(name)):
             known = [f"{one}.{it}" for one in self.plan.order for it in self._host.newest(one)]
@@ -204,9 +204,10 @@ class SteppedSession:
         return value.copy() if isinstance(value, np.ndarray) else value
 
     def look(self, observer: str) -> Outputs:
-        """Step a participant that only looks, such as a camera, at the present state; return its outputs.
+        """Step an observer, such as a camera, at the present state; return the outputs.
 
-        Nothing of it is in the state hash or in a recording. Raises SessionError if there is none.
+        The outputs are neither in the state hash nor in a recording. Raises SessionError if there is no such
+        observer.
         """
         planned = self.plan.participants.get(observer)
         if planned is None or not planned.observer:
