@@ -1,1 +1,1 @@
-"""The web console: a page in the browser on which a session is seen and driven, and its server."""
+"""The web console: a page in the browser to see and drive a session, and the page's server."""

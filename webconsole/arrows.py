@@ -15,7 +15,7 @@ __all__ = ["BondArrows", "bond_arrows"]
 
 
 class BondArrows(NamedTuple):
-    """The outlets of one bond: where it acts, and the force on its motion side."""
+    """The outlets of a bond: the points of action, and the force on the motion side."""
 
     place: str
     """A pose, or the positions of points, in the world."""
@@ -24,12 +24,12 @@ class BondArrows(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name of the bond: its motion side."""
+        """Name of the bond: the motion side."""
         return self.place.rpartition("/")[0]
 
     @property
     def at_one_point(self) -> bool:
-        """Whether there is one point and one force."""
+        """Whether there is a single point and a single force."""
         return self.place.endswith("/pose")
 
     def rows(self, place: Vector, force: Vector) -> NDArray[np.float32]:
@@ -40,7 +40,7 @@ class BondArrows(NamedTuple):
 
 
 def bond_arrows(scenario: Scenario, numbers: Mapping[str, VectorCodec]) -> Sequence[BondArrows]:
-    """Return the bonds of which place and force are published, in the frame of the world."""
+    """Return the bonds with published place and force, in the frame of the world."""
     found: list[BondArrows] = []
     for bond in scenario.bonds:
         for place, force in (("pose", "wrench"), ("position", "force")):

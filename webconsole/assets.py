@@ -28,7 +28,7 @@ async def asset(request: Request) -> Response:
 
 
 def compressed(content: bytes, kind: str, *, cache: bool = False) -> Response:
-    """Return a response of content that was compressed by gzip; `cache`: for a day, as it never changes."""
+    """Return a response of gzip-compressed content; `cache`: for a day, as the content never changes."""
     headers = {"Content-Encoding": "gzip"}
     if cache:
         headers["Cache-Control"] = "private, max-age=86400"

@@ -1,4 +1,4 @@
-"""Changes of a scenario from a page: a value for each path that a form offers, and nothing else.
+"""Changes of a scenario from a page: a value for each path of a form, and nothing else.
 
 Kinds, hosts, endpoints, files and words of any sort are the command line's alone.
 """
@@ -41,7 +41,7 @@ def overrides(scenario: Scenario, changes: Mapping[str, Scalar]) -> list[str]:
 
 
 def wrong_fields(error: ScenarioError, changes: Mapping[str, Scalar]) -> dict[str, str]:
-    """Return the messages of an error by the path of the field that each is about."""
+    """Return the messages of an error by the path of the field."""
     found: dict[str, list[str]] = {}
     for line in str(error).splitlines():
         override, _, message = line.removeprefix("--set ").partition(": ")

@@ -1,4 +1,4 @@
-"""`trocar view`: the page on which a session or a recording is seen."""
+"""`trocar view`: the page of a session or a recording."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def view(
 ) -> None:
     """Show a running session or a recording on a page in the browser.
 
-    The link that is printed works once; from then on that browser may open the page.
+    The printed link works once; from then on the same browser may open the page.
     """
     for package in ("starlette", "uvicorn", "websockets"):
         if find_spec(package) is None:

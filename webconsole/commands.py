@@ -1,4 +1,4 @@
-"""What a page may ask for: JSON, checked before anything is done."""
+"""Commands of a page: JSON, checked before anything is done."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 MOST_BYTES = 16_384
-"""Of one message of a page."""
+"""Size limit of a page's message, bytes."""
 _MOST_NUMBERS = 24
 
 Finite = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
@@ -51,13 +51,13 @@ class _Command(BaseModel):
 
 
 class Show(_Command):
-    """What this page shows beside the scene."""
+    """Contents of this page beside the scene."""
 
     do: Literal["show"]
     numbers: Annotated[list[Name], Field(max_length=_MOST_NUMBERS)] = []
     pictures: bool = True
     again: bool = False
-    """Send everything again: this page has only now loaded its scene."""
+    """Send everything again: this page has only now loaded the scene."""
 
 
 class At(_Command):
@@ -65,7 +65,7 @@ class At(_Command):
 
     do: Literal["at"]
     time: Finite | None
-    """Simulated time, s; None: what runs now."""
+    """Simulated time, s; None: the present."""
 
 
 class Control(_Command):
@@ -81,9 +81,9 @@ class Network(_Command):
     do: Literal["network"]
     device: Name
     delay: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=10.0)] | None = None
-    """In each direction, s; None, as of the others: as it is."""
+    """Delay in each direction, s; None leaves the link's value, here and below."""
     jitter: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=10.0)] | None = None
-    """The most that a message takes longer, s."""
+    """Largest additional delay of a message, s."""
     loss: Annotated[float, Field(allow_inf_nan=False, ge=0.0, lt=1.0)] | None = None
     """Share of the messages."""
 
@@ -103,12 +103,12 @@ class Invite(_Command):
 
 
 class _Begun(_Command):
-    """A session in a process of its own."""
+    """A session in a new process."""
 
     changes: Annotated[dict[Name, Scalar], Field(max_length=50)] = {}
     """New values by their path: `duration`, or participant and parameter, `teleop.scale`."""
     lead: Annotated[list[Name], Field(max_length=8)] = []
-    """Devices that pages lead from then on."""
+    """Devices led from pages from then on."""
     pace: Literal["fast", "realtime"] | None = None
     record: bool = True
 
@@ -133,11 +133,11 @@ class Fork(_Begun):
     time: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=1e6)]
     """Simulated time, s."""
     duration: Annotated[float, Field(allow_inf_nan=False, gt=0.0, le=1e6)] | None = None
-    """Simulated time at which it ends, s; None: as in the recording."""
+    """Simulated time of the session's end, s; None: as in the recording."""
 
 
 class End(_Command):
-    """End a session that a page has started."""
+    """End a session started from a page."""
 
     do: Literal["end"]
     number: Annotated[int, Field(ge=1, le=1_000_000)]
@@ -149,7 +149,7 @@ class Lead(_Command):
     do: Literal["lead"]
     device: Name
     beside: bool = False
-    """Go on leading what this page leads already: a head, and two hands."""
+    """Go on leading this page's other devices: a head, and two hands."""
 
 
 class Leave(_Command):
@@ -159,15 +159,15 @@ class Leave(_Command):
 
 
 class Hand(_Command):
-    """What keys, sticks and pointer ask of the device that this page leads."""
+    """Wish of keys, sticks and pointer for the device led by this page."""
 
     do: Literal["hand"]
     number: Annotated[int, Field(ge=0, lt=2**53)]
-    """Counts them: an older one is refused."""
+    """Number of the input, counted up: an older input is refused."""
     linear: tuple[Share, Share, Share] = (0.0, 0.0, 0.0)
     """Ahead, left, up, each a share of the greatest speed."""
     angular: tuple[Share, Share, Share] = (0.0, 0.0, 0.0)
-    """About the stylus' own x (its point moves up), y (right) and z (as a screw going in)."""
+    """Shares about the stylus' own x (the point moves up), y (right) and z (as a screw going in)."""
     drag: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
     """Way of the pointer since this page leads, m: ahead, left, up."""
     gripper: Share = 0.0
@@ -175,18 +175,18 @@ class Hand(_Command):
     dead_man: bool = False
     jaw: bool = False
     device: Name | None = None
-    """Which one, where this page leads several."""
+    """The device, where this page leads several."""
     tracked: tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite] | None = None
     """Where a headset has the head or a hand, in place of shares: position (m) and quaternion (x, y, z, w),
     along the axes of WebXR (x right, y up, z towards the user)."""
 
 
 class Pick(_Command):
-    """A point that a person clicks in a picture: where a needle goes in, say."""
+    """A point clicked by a person in a picture: where a needle goes in, say."""
 
     do: Literal["pick"]
     picture: Name
-    """As the session's description names it."""
+    """Name of the picture in the session's description."""
     x: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=1e5)]
     """To the right, in pixels of the picture."""
     y: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=1e5)]
@@ -226,7 +226,7 @@ class _Asked(BaseModel):
 
 
 def asked_for(text: str) -> str:
-    """Return the `do` of a message that may be no command; empty if it has none."""
+    """Return the `do` of a message of any content; empty without `do`."""
     try:
         return _Asked.model_validate_json(text).do
     except ValidationError:
@@ -234,7 +234,7 @@ def asked_for(text: str) -> str:
 
 
 def command(text: str) -> Command:
-    """Return the command in a message of a page; raises MessageError if it is not valid."""
+    """Return the command in a message of a page; raises MessageError if the command is not valid."""
     if len(text) > MOST_BYTES:
         raise MessageError(f"a command of {len(text)} characters, at most {MOST_BYTES} are allowed")
     try:

@@ -1,4 +1,4 @@
-"""What all pages of a server share: the source, what of it can be drawn, and who leads what."""
+"""Shared state of all pages of a server: the source, the drawable stage, and the pilots of devices."""
 
 from __future__ import annotations
 
@@ -37,8 +37,9 @@ class Console:
         self.source, self.pilots = source, pilots
         self.started = Started()
         self.drawable: Callable[[], None] = lambda: None
-        """Is called in a thread when it is known what can be drawn of a session, and nothing of it is left to
-        compute: to compile a model stops all threads for up to 0.1 s."""
+        """Called in a thread when the stage of a session is complete, with nothing left to compute: to
+        compile a model stops all threads for up to 0.1 s.
+        """
         if isinstance(source, Live):
             source.left_out = self.started.pids
         self.reading = asyncio.Lock()
@@ -50,7 +51,7 @@ class Console:
         self._made: dict[str, tuple[Value, Section]] = {}
 
     async def stage(self) -> Stage | None:
-        """Return what can be drawn of the present session; None while there is none."""
+        """Return the stage of the present session; None without a session."""
         async with self._making:
             scenario, generation = self.source.scenario, self.source.generation
             if scenario is None:
@@ -65,7 +66,7 @@ class Console:
             return self._stage
 
     def want(self, page: object, names: frozenset[str] | None) -> None:
-        """Receive what a page shows; None: it has gone."""
+        """Receive the outlets shown by a page; None: the page has gone."""
         if names is None:
             self._wants.pop(page, None)
         else:
@@ -104,27 +105,27 @@ class Console:
         await asyncio.to_thread(live.change_link, request)
 
     async def guide(self, order: Pick | Say) -> None:
-        """Pass on what a person picks or says; raises MessageError or ConnectError."""
+        """Pass on a person's pick or word; raises MessageError or ConnectError."""
         live = self.live()
         await asyncio.to_thread(live.ask, "set", guiding(live.guided, order), Empty)
 
     async def prepare(self) -> None:
-        """Have processes ready for a session that is about to be started from here."""
+        """Have processes ready for a session about to be started from here."""
         scenario = self.source.scenario if isinstance(self.source, Recorded) else None
         modules = ["hub.fork"] if scenario is None else fork_modules(scenario)
         await asyncio.to_thread(self.started.prepare, modules)
 
     async def fork(self, order: Fork) -> int:
-        """Start a fork of the recording and return its number; raises MessageError or ScenarioError."""
+        """Start a fork of the recording; return the session's number. Raises MessageError, ScenarioError."""
         recording = self.recorded().recording
         arguments = await asyncio.to_thread(fork_arguments, recording, order)
         title = f"fork of {recording.file.parent.name} at {order.time:g} s"
         return (await asyncio.to_thread(self.started.start, title, arguments, order.time)).number
 
     async def start(self, order: Start) -> dict[str, Any]:
-        """Start an installed scenario and return its number, or what is wrong by field.
+        """Start an installed scenario and return the session's number, or the errors by field.
 
-        Raises MessageError or ScenarioError if it is not a field that is wrong.
+        Raises MessageError or ScenarioError for an error outside the fields.
         """
         try:
             arguments = await asyncio.to_thread(start_arguments, order, Path.cwd())

@@ -1,4 +1,4 @@
-"""What the hand that leads from a page may feel: the force on the instrument that follows it."""
+"""Felt force of a hand that leads from a page: the force on the instrument under the hand's lead."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _KIND = "browser"
 
 
 def felt_wrenches(scenario: Scenario, numbers: Collection[str]) -> dict[str, tuple[str, ...]]:
-    """Return, of each device that pages lead, the wrenches (N, N m) on the instruments that it moves.
+    """Return the outlets of the wrenches (N, N m) on the moved instruments, by device led from pages.
 
-    `numbers`: the numeric outlets. Connections are followed from the device to the robot; where their ports
-    name an arm, only that arm's instrument is meant.
+    `numbers`: the numeric outlets. Connections are followed from the device to the robot; where the ports
+    name an arm, only the instrument of this arm is meant.
     """
     wrenches = {name for name in numbers if name.endswith(_WRENCH)}
     arms = {name.partition(".")[2].removesuffix(_WRENCH) for name in wrenches}

@@ -1,4 +1,4 @@
-"""The values of a scenario that a page may change: numbers, switches and choices of kinds that allow it."""
+"""The values of a scenario for pages to change: numbers, switches and choices of permitting kinds."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _OF_SESSION = ("duration", "step", "window")
 
 
 class Field(NamedTuple):
-    """A value that a page may change, and its control in a form."""
+    """A value for pages to change, and its control in a form."""
 
     path: str
     """Place of the value, as on the command line."""
@@ -36,12 +36,12 @@ class Field(NamedTuple):
     choices: list[Any]
     about: str
     default: Any
-    """None if there is none, or if it depends on other values."""
+    """Default value; None without a default, or if the default depends on further values."""
     limits: dict[str, Any]
-    """`least` and `most` of a number, in its unit."""
+    """`least` and `most` of a number, in the field's unit."""
 
     def override(self, value: Scalar) -> str:
-        """Return `path=value` as on the command line; raises ScenarioError if it has another type."""
+        """Return `path=value` as on the command line; raises ScenarioError for a value of another type."""
         text = f"{self.path}={json.dumps(value)}"
         if value is None or self._allows(value):
             return text
@@ -76,7 +76,7 @@ def session_fields() -> Iterator[Field]:
 
 
 def participant_fields(name: str, kind: str) -> Iterator[Field]:
-    """Yield the fields of a participant; none if its kind is not installed or does not allow it."""
+    """Yield the fields of a participant; none if the kind is not installed or does not permit changes."""
     if kind in registry.kinds():
         model = registry.load(kind).params_model
         if vars(model).get("open_to_pages"):  # a derived model does not inherit it
@@ -118,12 +118,12 @@ def _control(schema: dict[str, Any]) -> Control | None:
 
 
 def _find(schema: dict[str, Any], key: str) -> Any:
-    """Return the value of a key in a schema or in one of its alternatives; None if there is none."""
+    """Return the value of a key in a schema or in an alternative of the schema; None if absent."""
     return next((one[key] for one in (schema, *schema.get("anyOf", ())) if key in one), None)
 
 
 def _limits(info: FieldInfo) -> Iterator[tuple[str, Any]]:
-    """Yield `least` and `most` of a field; a limit that is itself not allowed is the model's to reject."""
+    """Yield `least` and `most` of a field; an excluded limit is the model's to reject."""
     for one in info.metadata:
         match one:
             case annotated_types.Ge(bound) | annotated_types.Gt(bound):

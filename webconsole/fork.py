@@ -1,4 +1,4 @@
-"""Forks from a page: what may be changed, and the command that does it.
+"""Forks from a page: the changeable values, and the command of the fork.
 
 The past is simulated again by `trocar fork`, as if the command had been typed.
 """
@@ -27,7 +27,7 @@ _MOST_MEMBERS = 200
 
 
 def fork_form(recording: Recording) -> dict[str, Any]:
-    """Return what the form of a fork offers: devices with their kinds, numbers that may be changed."""
+    """Return the form of a fork: devices with their kinds, and the changeable values."""
     scenario, plan = recording.scenario(), recording.plan()
     devices = [
         {"name": name, "kind": one.kind}
@@ -42,7 +42,7 @@ def fork_form(recording: Recording) -> dict[str, Any]:
 
 
 def fork_modules(scenario: Scenario) -> list[str]:
-    """Return the modules that a fork of a session of this scenario imports."""
+    """Return the modules imported by a fork of a session of this scenario."""
     kinds = {one.kind for one in scenario.participants.values()} & set(registry.kinds())
     # an engine imports its libraries when it is configured; most have the name of their distribution
     packages = {package for kind in kinds for package in registry.extra_packages(kind)}
@@ -50,7 +50,7 @@ def fork_modules(scenario: Scenario) -> list[str]:
 
 
 def _parameters(scenario: Scenario, plan: Plan) -> Iterator[str]:
-    """Yield `participant.parameter=value` for the numbers, switches and choices of what is stepped."""
+    """Yield `participant.parameter=value` for the numbers, switches and choices of stepped participants."""
     for name in plan.order:
         spec = scenario.participants[name]
         for field in participant_fields(name, spec.kind):
@@ -60,7 +60,7 @@ def _parameters(scenario: Scenario, plan: Plan) -> Iterator[str]:
 
 
 def _value(field: Field, params: Mapping[str, Any]) -> Any:
-    """Return a recorded parameter in the unit of its field; raises ValueError if it is no such quantity."""
+    """Return a recorded parameter in the field's unit; raises ValueError for another quantity."""
     if field.label not in params:
         return field.in_unit(field.default)
     value = params[field.label]
@@ -68,10 +68,10 @@ def _value(field: Field, params: Mapping[str, Any]) -> Any:
 
 
 def fork_arguments(recording: Recording, order: Fork) -> list[str]:
-    """Return the arguments of `trocar` that fork a recording as a page asks.
+    """Return the arguments of `trocar` to fork a recording on a page's order.
 
     Raises MessageError if a page may not change a value or a device is not there, ScenarioError if a value
-    is not of its type.
+    is not of the field's type.
     """
     scenario = recording.scenario()
     changes = [*page_devices(scenario, order.lead), *overrides(scenario, order.changes)]
@@ -88,7 +88,7 @@ def fork_arguments(recording: Recording, order: Fork) -> list[str]:
 
 
 def tree_of(recording: Recording) -> list[dict[str, Any]]:
-    """Return the recordings beside this one, each followed by its forks; ready for JSON."""
+    """Return this recording's neighbours, each followed by its forks; ready for JSON."""
     file = recording.file.resolve()
     files = sorted(file.parent.parent.glob("*/*.mcap"))[:_MOST_MEMBERS]
     return [

@@ -4,7 +4,7 @@
               frame, u32 zero
     section   u16 kind, u16 index, u32 bytes of content, content, zeros up to a multiple of 8
 
-A page acknowledges a frame by its number (u32). Numbers are in the frame of the world, metres.
+A page acknowledges a frame by the frame's number (u32). Numbers are in the frame of the world, metres.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ _ALIGN = 8
 
 
 class SectionKind(IntEnum):
-    """What a section holds; its index counts what the page knows of that kind."""
+    """Content of a section; the index counts the page's objects of the same kind."""
 
     POSES = 1
-    """Of the bodies of a scene: `pose_content`."""
+    """Poses of the bodies of a scene: `pose_content`."""
     SURFACE = 2
-    """u32 (f, 3): triangles of a soft surface, before its first nodes."""
+    """u32 (f, 3): triangles of a soft surface, before the first nodes."""
     NODES = 3
     """The nodes of a soft surface: `node_content`."""
     PICTURE = 4
-    """A compressed picture as it was published."""
+    """A compressed picture as published."""
     SAMPLE = 5
     """f64 (1 + size): time (s) and value of a numeric port."""
     ARROWS = 6
     """f32 (n, 6): point and force (N) of each arrow of a bond."""
     MARKERS = 7
-    """All markers of one participant: `webconsole/markers.py`."""
+    """All markers of a participant: `webconsole/markers.py`."""
     FELT = 8
-    """f32: norm of the force (N) that the hand at a device may feel."""
+    """f32: norm of the force (N) for the hand at a device."""
 
 
 class Section(NamedTuple):
@@ -64,24 +64,24 @@ class Section(NamedTuple):
 
     kind: SectionKind
     place: int
-    """Its index."""
+    """Index of the section."""
     content: bytes
 
 
 def pose_content(poses: NDArray[np.float32]) -> bytes:
     """Return positions, f32 (bodies, 3), and quaternions (x, y, z, w), i16 (bodies, 4), 32767 being 1.
 
-    A part 1 m from the origin of its body is drawn 30 um aside at most. `poses`: shape (bodies, 7).
+    A part 1 m from the origin of the body is drawn 30 um aside at most. `poses`: shape (bodies, 7).
     """
     turns: NDArray[np.int16] = np.rint(32767.0 * poses[:, 3:]).astype("<i2")
     return poses[:, :3].astype("<f4").tobytes() + turns.tobytes()
 
 
 def node_content(nodes: NDArray[np.float32]) -> bytes:
-    """Return least node and step, f32 (3,) each, and the steps from there to each node, u16 (3, n).
+    """Return least node and step, f32 (3,) each, and the steps from the least node to each node, u16 (3, n).
 
-    In an organ of 200 mm a node is 1.5 um aside at most. `nodes`: x, y, z of one after the other. Raises
-    MessageError if they are not whole or not finite.
+    In an organ of 200 mm a node is 1.5 um aside at most. `nodes`: x, y, z of node after node. Raises
+    MessageError if the nodes are not whole or not finite.
     """
     if nodes.size % 3:
         raise MessageError(f"{nodes.size} numbers are no nodes of three")
@@ -103,7 +103,7 @@ def frame(number: int, time_ns: int, parts: Sequence[Section]) -> bytes:
 
 
 def sections(data: bytes) -> tuple[int, int, list[Section]]:
-    """Return number, simulated time (ns) and sections of a frame; raises MessageError if it is not one."""
+    """Return number, simulated time (ns) and sections of a frame; raises MessageError if it is no frame."""
     try:
         magic, version, count, time_ns, number, _ = _HEAD.unpack_from(data)
         if (magic, version) != (MAGIC, VERSION):
@@ -126,7 +126,7 @@ def sections(data: bytes) -> tuple[int, int, list[Section]]:
 
 
 def acknowledged(data: bytes) -> int:
-    """Return the number of the frame that a page acknowledges; raises MessageError if it is none."""
+    """Return the number of the frame acknowledged by a page; raises MessageError for other data."""
     if len(data) != _ACK.size:
         raise MessageError(f"an acknowledgement of {len(data)} bytes, expected {_ACK.size}")
     return _ACK.unpack(data)[0]

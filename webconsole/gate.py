@@ -1,8 +1,8 @@
-"""Who may open the page: the holder of a one-time link, by a cookie from then on.
+"""Access to the page: for the holder of a one-time link, by a cookie from then on.
 
-Any website that is open in the same browser can send requests to this machine, and any name can be made to
-point to it. So the Host must be this server's own name, the Origin its own page, and the cookie its own. The
-same holds for other machines, which reach it by TLS alone.
+Any website open in the same browser can send requests to this machine, and any name can be made to point to
+this machine. So the Host must be this server's own name, the Origin this server's page, and the cookie from
+this server. The same holds for further machines, connected by TLS alone.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MOST_HEAD_BYTES = 4096
 _TOKEN_BYTES = 32
 _LOGGED_PER_S = 5.0
 _MOST_BROWSERS = 64
-"""Browsers that may be let in for each role, so that no viewer takes an operator's place."""
+"""Most browsers admitted for each role, so that no viewer takes an operator's place."""
 _HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:;"
@@ -46,13 +46,13 @@ _HEADERS = {
 
 
 class Gate:
-    """Lets requests through to `app` that come from this server's own page in a browser that was let in.
+    """Passes requests to `app` from this server's own page in an admitted browser.
 
-    What passes has `role` in its scope's state.
+    A passed request has `role` in the scope's state.
 
     Args:
         app: The page.
-        origins: By which browsers may name it, such as `http://127.0.0.1:8470`; all with the same scheme.
+        origins: Origins of the page, such as `http://127.0.0.1:8470`; all with the same scheme.
     """
 
     def __init__(self, app: ASGIApp, origins: Sequence[str]) -> None:
@@ -64,17 +64,17 @@ class Gate:
         self._invited: dict[str, Role] = {}
         self._in: dict[str, Role] = {}
         self._links: dict[str, str] = {}
-        """By the path of a WebSocket: the token that opens it without a cookie."""
+        """Token for access without a cookie, by the path of a WebSocket."""
         self._log = TokenBucket(_LOGGED_PER_S)
 
     def invite(self, role: Role) -> str:
-        """Return the path, with its token, of a page that one browser may open once."""
+        """Return the path, with a token, of a page for a single browser to open once."""
         token = secrets.token_urlsafe(_TOKEN_BYTES)
         self._invited[token] = role
         return f"/?token={token}"
 
     def link(self, path: str) -> str:
-        """Return a path, with its token, of a WebSocket that programs without cookies may open to look.
+        """Return a path, with a token, of a read-only WebSocket for programs without cookies.
 
         The token is the whole of the secret, so such a link works again and again, and whatever the origin.
         """
@@ -82,7 +82,7 @@ class Gate:
         return f"{path}?token={token}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Check a request, and pass it on or refuse it."""
+        """Check a request, then pass or refuse."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -135,7 +135,7 @@ class Gate:
         return "" if host in self._hosts else f"host {host[:80]!r} is not this server's"
 
     def _foreign(self, scope: Scope, headers: Mapping[str, str]) -> str:
-        """Return why a request does not come from this server's page; empty if it does."""
+        """Return why a request does not come from this server's page; else empty."""
         if elsewhere := self._not_this_host(headers):
             return elsewhere
         origin = headers.get("origin")
@@ -148,7 +148,7 @@ class Gate:
         return ""
 
     def _role(self, headers: Mapping[str, str]) -> Role | None:
-        """Return the role of a browser by its cookie; None if it has no valid cookie of this server."""
+        """Return the role of a browser by cookie; None without a valid cookie of this server."""
         # not by http.cookies: it takes a time that grows with the square of a quoted value's length
         for pair in headers.get("cookie", "").split(";"):
             name, _, value = pair.strip().partition("=")
@@ -159,7 +159,7 @@ class Gate:
     async def _admit(
         self, token: str, known: Role | None, scope: Scope, receive: Receive, send: Send
     ) -> None:
-        """Let a browser in by its token; one that is in already only gets its page."""
+        """Admit a browser by its token; an admitted browser only gets the page."""
         role = _looked_up(self._invited, token)
         if role is None and known is not None:
             await RedirectResponse("/", status_code=303, headers=_HEADERS)(scope, receive, send)
@@ -195,7 +195,7 @@ def _head_bytes(scope: Scope) -> int:
 
 
 def _looked_up(known: Mapping[str, Role], token: str) -> Role | None:
-    """Return the role of a token, in a time that says nothing about it."""
+    """Return the role of a token, in a time independent of the token."""
     found: Role | None = None
     for one, role in known.items():
         if secrets.compare_digest(one.encode(), token.encode()):

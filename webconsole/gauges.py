@@ -1,6 +1,6 @@
-"""Numbers of a session that no participant publishes: the bonds' energy books, pace and latencies of the hub.
+"""Numbers of a session from the hub itself: the bonds' energy books, pace and latencies.
 
-To a page they are outputs of `hub`: `hub.energy/BOND` and `hub.status`.
+For a page these are outputs of `hub`: `hub.energy/BOND` and `hub.status`.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ _WAYS = {
 
 
 class Gauge(NamedTuple):
-    """How the numbers of one message type are read."""
+    """Reader of the numbers of a message type."""
 
     columns: tuple[str, ...]
     """`field.name`, or a name alone."""
     units: dict[str, str]
-    """By field."""
+    """Units by field."""
     text: str
     read: Callable[[bytes], Vector]
     """Raises MessageError if the message is not valid; NaN: there is none."""
 
 
 def hub_outlets(scenario: Scenario) -> Iterator[Outlet]:
-    """Yield what the hub itself publishes of a session."""
+    """Yield the outlets of the hub itself in a session."""
     for bond in scenario.bonds:
         port = signal_out(f"energy/{bond.name}", CouplingEnergy)
         yield Outlet(HUB, port)
@@ -83,4 +83,4 @@ GAUGES = {
         _status,
     ),
 }
-"""By ROS type."""
+"""Gauges by ROS type."""

@@ -1,8 +1,8 @@
-"""Work that a person guides from a page: points that are picked in a picture, and words of consent.
+"""Work guided by a person from a page: points picked in a picture, and words of consent.
 
-A participant can be guided if nothing but a person's hand writes its inputs `operator/pick` and
-`operator/command`, as `guided-stitching` has them. A pixel is a point in the frame `<camera>_<eye>_image`,
-x to the right and y down, which the participant turns into the point of the scene under it.
+A participant can be guided if nothing but a person's hand writes the inputs `operator/pick` and
+`operator/command`, as with `guided-stitching`. A pixel is a point in the frame `<camera>_<eye>_image`, x to
+the right and y down; the participant finds the point of the scene under the pixel.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _EYES = ("left", "right")
 
 
 def guided(plan: Plan) -> str | None:
-    """Return the first participant that a person guides; None if there is none."""
+    """Return the first participant guided by a person; None without such a participant."""
     for name, planned in plan.participants.items():
         inputs = {port.name: port.type for port in planned.ports if port.causality == "input"}
         if _TYPES.items() <= inputs.items():
@@ -30,7 +30,7 @@ def guided(plan: Plan) -> str | None:
 
 
 def guiding(participant: str | None, order: Pick | Say) -> SetRequest:
-    """Return what the hub is asked for; raises MessageError if nothing is guided, or no such picture."""
+    """Return the request to the hub; raises MessageError if nothing is guided, or no such picture."""
     if participant is None:
         raise MessageError("nothing in this session is guided by a person")
     if isinstance(order, Say):

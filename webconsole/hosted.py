@@ -1,4 +1,4 @@
-"""The devices that pages lead: each is hosted by the pages' server, in a thread that joins its session."""
+"""The devices led from pages: each hosted by the pages' server, in a thread joined to the session."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ class _StopError(Exception):
 
 
 class HostedDevices:
-    """Hosts the devices of kind `browser` of each session that is shown, and offers them to pilots."""
+    """Hosts the devices of kind `browser` of each session shown, and offers the devices to pilots."""
 
     def __init__(self, pilots: Pilots) -> None:
         self._pilots = pilots
         self._endpoints: dict[str, str] = {}
-        """By device: where the hub of its newest session listens."""
+        """Endpoint of the hub of a device's newest session, by device."""
         self._threads: dict[str, threading.Thread] = {}
         self._ending = threading.Event()
 
     def join(self, endpoint: str, plan: Plan) -> None:
-        """Host what pages may lead in a session; what another process hosts already is left alone.
+        """Host the devices for pages to lead in a session; devices hosted by another process are left alone.
 
-        Each is offered once it takes part: what a page did earlier would wait until then.
+        Each device is offered once it takes part: a page's earlier input would wait until then.
         """
         led = [
             name
@@ -83,7 +83,7 @@ class HostedDevices:
 
 
 def _give(device: str, hand: Hand | None) -> None:
-    """Hand what a page asks to the device; None: no page leads. Raises MessageError if it is no pose."""
+    """Hand a page's wish to the device; None: no page leads. Raises MessageError for an invalid pose."""
     if hand is None:
         hand_of(device).release()
         return

@@ -1,4 +1,4 @@
-"""Where the page's server listens: on loopback, and to other machines with the hub's certificate alone."""
+"""Where the page's server listens: on loopback, and to further machines with the hub's certificate alone."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _HTTPS = 443
 
 
 class Listening(NamedTuple):
-    """A socket that listens, and how browsers reach it."""
+    """A listening socket, and the addresses for browsers."""
 
     socket: socket.socket
     names: tuple[str, ...]
-    """Names and addresses by which this server may be called, the best for a link first."""
+    """Names and addresses of this server, the best for a link first."""
     certificate: Path | None = None
     """With key and authority, of a server of TLS; None: without TLS, on loopback."""
 
@@ -39,16 +39,16 @@ class Listening(NamedTuple):
 
     @property
     def origins(self) -> tuple[str, ...]:
-        """The origins of the page, by which browsers name it, in the order of `names`."""
+        """The origins of the page, as browsers state, in the order of `names`."""
         scheme = "http" if self.certificate is None else "https"
         port = "" if self.certificate and self.port == _HTTPS else f":{self.port}"
         return tuple(f"{scheme}://{_in_url(name)}{port}" for name in self.names)
 
 
 def on_loopback(port: int | None = None) -> Listening:
-    """Listen to this machine at `port`, by default at 8470 or the next free one.
+    """Listen to this machine at `port`, by default at 8470 or the next free port.
 
-    Raises ConnectError if there is none.
+    Raises ConnectError if no port is free.
     """
     tried = range(FIRST_PORT, FIRST_PORT + _PORTS) if port is None else (port,)
     listening = _first_free("127.0.0.1", tried)
@@ -61,11 +61,11 @@ def with_tls(endpoint: str, certificates: Path | None = None) -> Listening:
     """Listen at an endpoint such as tls/0.0.0.0:8470, with the hub's certificate.
 
     Args:
-        endpoint: Where; browsers call it by the names in the certificate.
+        endpoint: Where; browsers call the server by the names in the certificate.
         certificates: The hub's certificate or its directory; None: the directory of this user.
 
-    Raises ScenarioError if it is no endpoint of TLS, ConnectError if the port is taken or the certificate is
-    missing or not valid.
+    Raises ScenarioError if the endpoint is not of TLS, ConnectError if the port is taken or the certificate
+    is missing or not valid.
     """
     if not endpoint.startswith("tls/"):
         remedy = "leave --listen out, and give --port" if is_loopback(endpoint) else "write tls/HOST:PORT"

@@ -1,7 +1,7 @@
-"""A running session as what a page shows: its newest values, received without a wait of the session.
+"""A running session as the source of pages: the newest values, received without a wait of the session.
 
-A thread reaches the hub, and reaches it again, or another one, when it is gone. Only the outlets that a page
-shows are subscribed to; values stay as bytes until a frame needs them.
+A thread connects to the hub, and after the hub's end again, or to another hub. Only the outlets shown on a
+page are subscribed to; values stay as bytes until needed for a frame.
 """
 
 from __future__ import annotations
@@ -53,16 +53,16 @@ log = logging.getLogger(__name__)
 _RETRY_S = 0.5
 _ENTRIES_KEPT = 500
 _LATE_S = 5.0
-"""Late steps are summed up for this long: on a busy machine each is one."""
+"""Time over which late steps are summed up, s: on a busy machine every step is late."""
 R = TypeVar("R", bound=BaseModel)
 
 
 class Live:
-    """The source of pages that show a running session.
+    """The source of the pages of a running session.
 
     Args:
-        endpoint: Where its hub listens; None: that of any hub of this user on this machine.
-        session: The name of the session; None: the first one that is found.
+        endpoint: Endpoint of the hub; None: any hub of this user on this machine.
+        session: Name of the session; None: the first session found.
         pid: The process of the hub; None: any.
     """
 
@@ -87,7 +87,7 @@ class Live:
         self.endpoint = ""
         """Where the hub of the session listens."""
         self.left_out: Callable[[], set[int]] = set
-        """Returns the processes of hubs that have pages of their own."""
+        """Returns the processes of hubs with separate pages."""
         self._status: SessionStatus | None = None
         self._trouble = "looking for a session"
         self._values: dict[str, Value] = {}
@@ -98,7 +98,7 @@ class Live:
         self._late_s = 0.0
         self._device_keys: set[str] = set()
         self._untagged: set[str] = set()
-        """Participants whose messages do not say of which simulated time they are."""
+        """Participants with messages without a simulated time."""
         self._session: zenoh.Session | None = None
         self._keys = Keys("none")
         self._subscribers: dict[str, zenoh.Subscriber[None]] = {}
@@ -145,7 +145,7 @@ class Live:
         }
 
     def _span(self) -> dict[str, float]:
-        """Return between which simulated times (s) the past can be shown."""
+        """Return the first and last simulated time (s) of the past."""
         span_ns = None if self.past is None else self.past.span_ns
         return {} if span_ns is None else {"start": span_ns[0] / 1e9, "end": span_ns[1] / 1e9}
 
@@ -156,7 +156,7 @@ class Live:
             self._subscribe()
 
     def newest(self, name: str, time_ns: int | None) -> Value | None:
-        """Return the newest value that has arrived; at a simulated time, the one that is recorded."""
+        """Return the newest value received; at a simulated time, the recorded value."""
         if time_ns is None:
             return self._values.get(name)
         outlet = self._by_name.get(name)
@@ -165,7 +165,7 @@ class Live:
         return self.past.newest(topic(self._output_key(outlet)), time_ns)
 
     def first(self, name: str) -> Value | None:
-        """Return the value at time 0 of a surface, which is sent to each subscriber that is new."""
+        """Return the value at time 0 of a surface, sent to each new subscriber."""
         return self._firsts.get(name)
 
     def ask(self, verb: str, request: BaseModel, model: type[R]) -> R:
@@ -184,7 +184,7 @@ class Live:
         self._note(Entry(at, "info", reply.device, f"network link: {reply.description or 'none'}"))
 
     def entries_after(self, number: int) -> tuple[int, list[Entry]]:
-        """Return the lines of the log after the one with this number, and the number of the last."""
+        """Return the lines of the log after the line with this number, and the number of the last."""
         with self._lock:
             return self._numbered, [entry for of_it, entry in self._entries if of_it > number]
 
@@ -222,7 +222,7 @@ class Live:
             self.past.look()
 
     def _look(self) -> None:
-        """Show one session until it is gone; raises ConnectError if there is none."""
+        """Show a session until its end; raises ConnectError without a session."""
         endpoint, name = self._found()
         with reach(endpoint, OBSERVER) as session:
             keys = Keys(name)
@@ -247,7 +247,7 @@ class Live:
                 status.undeclare()
 
     def params(self, participant: str) -> Params:
-        """Return the validated parameters of a participant. Raises ScenarioError if they are invalid here."""
+        """Return the validated parameters of a participant. Raises ScenarioError if invalid here."""
         if self.scenario is None:
             raise ScenarioError("there is no session")
         return SessionParameters.of_scenario(self.scenario, Files(Path.cwd())).validated(participant)
@@ -331,7 +331,7 @@ class Live:
         self._subscribers = {}
 
     def _take(self, outlet: Outlet, sample: zenoh.Sample) -> None:
-        """Keep a value; it is decoded when a frame needs it."""
+        """Keep a value, to be decoded when needed for a frame."""
         payload = sample.payload.to_bytes()
         if outlet.participant in self._untagged:
             status = self._status

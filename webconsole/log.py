@@ -1,4 +1,4 @@
-"""Lines of the page's log, made of messages that say that something happened."""
+"""Lines of the page's log, made of messages about events."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Level = Literal["info", "warn", "error"]
 LOGGED = frozenset(
     (TaskEvent.ros_type, TissueGrasp.ros_type, DiagnosticStatus.ros_type, OperatingState.ros_type)
 )
-"""Types of the messages that become lines."""
+"""Types of the logged messages."""
 _LEVELS: tuple[Level, ...] = ("info", "warn", "error", "error")
-"""Of a DiagnosticStatus: OK, WARN, ERROR, STALE (diagnostic_msgs/msg/DiagnosticStatus)."""
+"""Levels of a DiagnosticStatus: OK, WARN, ERROR, STALE (diagnostic_msgs/msg/DiagnosticStatus)."""
 
 
 class Entry(NamedTuple):
-    """One line."""
+    """A line of the log."""
 
     time_s: float
     """Simulated time."""
@@ -33,19 +33,19 @@ class Entry(NamedTuple):
     text: str
 
     def as_json(self) -> dict[str, Any]:
-        """Return it ready for JSON."""
+        """Return the line, ready for JSON."""
         return {"time": self.time_s, "level": self.level, "source": self.source, "text": self.text}
 
 
 class Entries:
-    """Makes lines of messages, in the order in which they were published."""
+    """Makes lines of messages, in order of publication."""
 
     def __init__(self) -> None:
         self._states: dict[str, str] = {}
-        """Of each state that is published again and again: its last line."""
+        """Last line of each periodically published state."""
 
     def of(self, outlet: Outlet, value: Value) -> Iterator[Entry]:
-        """Yield the lines of one message that say something new; raises MessageError if it is not valid."""
+        """Yield the new lines of a message; raises MessageError if the message is not valid."""
         for entry in _entries(outlet, value):
             if outlet.port.type == OperatingState.ros_type:
                 if self._states.get(outlet.name) == entry.text:
@@ -76,7 +76,7 @@ def _entries(outlet: Outlet, value: Value) -> Iterator[Entry]:
 
 
 def card_of(value: Value) -> dict[str, Any]:
-    """Return a score card, ready for JSON; raises MessageError if it is not valid."""
+    """Return a score card, ready for JSON; raises MessageError if the card is not valid."""
     card = decode(ScoreCard, value.payload)
     return {
         "task": card.task,

@@ -1,10 +1,10 @@
-"""Markers of augmented reality as a frame carries them: what is shown, as arrays, without its names.
+"""Markers of augmented reality in a frame: the visible part, as arrays, without names.
 
     u32 bytes of the text, text (JSON), spaces to a multiple of 4, then f32 numbers of all n markers: poses in
     their frames (n, 7), sizes (n, 3), colours (n, 4), points (m, 3), colours of points (k, 4)
 
-The text has for each marker `type`, `frame`, `text`, and how many `points` and `colours` of points are its
-own. Metres, quaternions (x, y, z, w), red, green, blue and opacity from 0 to 1.
+The text has for each marker `type`, `frame`, `text`, and the numbers of `points` and `colours` of points.
+Metres, quaternions (x, y, z, w), red, green, blue and opacity from 0 to 1.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _LENGTH = struct.Struct("<I")
 
 
 def marker_content(shown: ShownMarkers) -> bytes:
-    """Return what a frame has of a message; raises MessageError if its parts do not fit together."""
+    """Return a message as content of a frame; raises MessageError if the parts do not fit together."""
     count, points, colours = len(shown.types), int(shown.point_counts.sum()), int(shown.color_counts.sum())
     lists = shown.frames, shown.texts, shown.point_counts, shown.color_counts
     numbers = (shown.poses, shown.scales_m, shown.colors, shown.points_m, shown.point_colors)

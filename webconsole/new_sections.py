@@ -1,4 +1,4 @@
-"""The sections of the next frame of a page: what has changed since its last one."""
+"""The sections of the next frame of a page: the changes since the last frame."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _PICTURES_PER_S = 25.0
 """Rate of each eye, at most: with 14 kB each, scene and organ, a page gets less than 1 MB/s."""
 
 _Made = tuple[str, Callable[[], Iterable[Section]]]
-"""The outlet, bond or participant that a section shows, and the function that makes the section."""
+"""The outlet, bond or participant of a section, and the function to make the section."""
 
 
 class NewSections:
-    """Makes sections of values that a page has not got yet; a damaged value costs its own section alone.
+    """Makes sections of values new to a page; a damaged value costs its own section alone.
 
     Args:
         console: The source of the values.
@@ -42,16 +42,16 @@ class NewSections:
         """The first error of each outlet, bond or participant."""
 
     def send_all(self) -> None:
-        """Count nothing as sent: the page has only now loaded its scene."""
+        """Count nothing as sent: the page has only now loaded the scene."""
         self._sent, self._surfaces = {}, set()
 
     @property
     def time_ns(self) -> int:
-        """Simulated time of the newest value that was sent."""
+        """Simulated time of the newest value sent."""
         return max((value.time_ns for value in self._sent.values()), default=0)
 
     def make(self, stage: Stage, show: Show, at_ns: int | None) -> list[Section]:
-        """Return the sections that are new at a simulated time; None: now."""
+        """Return the new sections at a simulated time; None: now."""
         self._at_ns = at_ns
         found: list[Section] = []
         for name, make in self._all(stage, show):
@@ -105,7 +105,7 @@ class NewSections:
             yield stage.force(device, values)
 
     def _markers(self, stage: Stage, name: str) -> Iterator[Section]:
-        """Yield markers that differ from the last ones: most are published again without a change."""
+        """Yield changed markers: most are published again without a change."""
         value, before = self._newest(name), self._sent.get(name)
         if value is not None:
             self._sent[name] = value
@@ -113,7 +113,7 @@ class NewSections:
                 yield self._console.section(stage, name, value)
 
     def _may_send(self, pictures: Iterable[str]) -> bool:
-        """Return whether there are new pictures and the page may have them; both eyes go together."""
+        """Return whether there are new pictures allowed for the page; both eyes go together."""
         for name in pictures:
             with suppress(TrocarError):  # it is a problem of its own section
                 if self._newest(name) is not self._sent.get(name):
@@ -134,7 +134,7 @@ class NewSections:
         return self._console.source.newest(name, self._at_ns)
 
     def _are_new(self, values: dict[str, Value], role: str = "") -> bool:
-        """Return whether one of the values was not sent before in this role, and count all as sent."""
+        """Return whether any value was not sent before in this role, and count all as sent."""
         new = any(self._sent.get(role + name) != value for name, value in values.items())
         if new:
             self._sent.update({role + name: value for name, value in values.items()})

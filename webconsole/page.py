@@ -1,4 +1,4 @@
-"""One page: it gets the newest frame that it can take, and what it asks for is done or refused."""
+"""A page's connection: the newest frames out, the page's commands in, done or refused."""
 
 from __future__ import annotations
 
@@ -47,23 +47,23 @@ log = logging.getLogger(__name__)
 _FRAME_S = 1.0 / 60.0
 _STATE_S = 0.25
 _MOST_WAITING = 2
-"""Frames that a page has not acknowledged; until it does, newer values replace what it would have got."""
+"""Unacknowledged frames of a page; with so many, newer values replace the values not yet sent."""
 _MOST_PROBLEMS = 50
-"""Damaged values that are reported to a page."""
+"""Damaged values reported to a page."""
 _MESSAGES_PER_S = 400.0
-"""Of a page: 60 acknowledgements, 120 inputs of a hand, and a burst of them after a pause."""
+"""Messages of a page, 1/s: 60 acknowledgements, 120 inputs of a hand, and a burst after a pause."""
 _MOST_REFUSED = 200
-"""Invalid messages, after which a page is closed."""
+"""Invalid messages until a page is closed."""
 
 
 class Page:
-    """The server's side of one page.
+    """The server's side of a page.
 
     Args:
-        socket: Its WebSocket.
-        role: What it may do.
-        console: What all pages share.
-        gate: Makes links for others.
+        socket: WebSocket of the page.
+        role: Rights of the page.
+        console: Shared by all pages.
+        gate: Makes links for more browsers.
     """
 
     def __init__(self, socket: WebSocket, role: Role, console: Console, gate: Gate) -> None:
@@ -75,14 +75,14 @@ class Page:
         self._number = self._acknowledged = 0
         self._new = NewSections(console)
         self._told: set[str] = set()
-        """Problems that the page knows."""
+        """Problems already told to the page."""
         self._lines = 0
         self._rate = TokenBucket(_MESSAGES_PER_S)
         self._refused = 0
         self._changed = asyncio.Event()
 
     async def run(self) -> None:
-        """Serve the page until it is closed."""
+        """Serve the page until the socket closes."""
         await self._socket.accept()
         tasks = [asyncio.create_task(work) for work in (self._read(), self._frames(), self._states())]
         try:
@@ -137,7 +137,7 @@ class Page:
             await self._tell({"is": "answer", "to": asked, **answer})
 
     async def _do(self, order: Command) -> dict[str, Any] | None:
-        """Do what the page asks; raises TrocarError."""
+        """Carry out a command of the page; raises TrocarError."""
         match order:
             case Show():
                 self._show = order
@@ -181,12 +181,12 @@ class Page:
         return None
 
     def _return(self) -> None:
-        """Show what runs now."""
+        """Show the present again."""
         self._at_ns = None
         self._changed.set()
 
     def _past_ns(self, time_s: float) -> int:
-        """Return an instant that can be shown, ns; raises MessageError if there is no past."""
+        """Return an instant of the past, ns, of a time in s; raises MessageError if there is no past to show."""
         source = self._console.source
         if isinstance(source, Live):
             if source.past is None:
@@ -208,7 +208,7 @@ class Page:
         )
 
     async def _states(self) -> None:
-        """Say what the page's head and log show, a few times a second."""
+        """Send the state of the page's head and the log, a few times a second."""
         source = self._console.source
         while True:
             if source.generation != self._generation:
@@ -227,21 +227,21 @@ class Page:
             await asyncio.sleep(_STATE_S)
 
     def _card(self) -> tuple[dict[str, Any] | None, list[str]]:
-        """Return the score card, or why it cannot be read."""
+        """Return the score card, or why the card cannot be read."""
         try:
             return self._console.card(self._at_ns), []
         except TrocarError as error:
             return None, [f"the score card: {error}"]
 
     async def _tell_problems(self, problems: Sequence[str]) -> None:
-        """Tell the page of values that cannot be shown, each once."""
+        """Tell the page of damaged values, each once."""
         for text in problems:
             if text not in self._told and len(self._told) < _MOST_PROBLEMS:
                 self._told.add(text)
                 await self._tell({"is": "trouble", "text": f"not shown: {text[:500]}"})
 
     async def _begin(self) -> None:
-        """Describe a session that this page has not shown yet."""
+        """Describe a session new to this page."""
         generation = self._console.source.generation
         stage = await self._console.stage()
         self._generation = generation

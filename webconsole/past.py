@@ -1,4 +1,4 @@
-"""The past of a running session: any instant of its own recording, as far as that is written."""
+"""The past of a running session: any instant of the session's recording, as far as written."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 
 class Past:
-    """Reads a recording on while it is written; `look` in one thread, `newest` from any.
+    """Follows a recording under way; `look` runs in a single thread, `newest` in any.
 
     Args:
         path: The rosbag2 directory.
@@ -28,10 +28,10 @@ class Past:
         self._bag: Bag | None = None
         self._failed = False
         self.span_ns: tuple[int, int] | None = None
-        """Simulated time of the first and the last message that can be shown; None if there is none yet."""
+        """Simulated time of the first and the last readable message; None before the first message."""
 
     def look(self) -> None:
-        """Take over what was written since the last look; what is damaged is logged once and not shown."""
+        """Read the messages written since the last call; damage is logged once and not shown."""
         if self._failed:
             return
         try:

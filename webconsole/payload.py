@@ -1,4 +1,4 @@
-"""The one array that a page needs of a message, without the rest of it being decoded and checked."""
+"""The first array of a message for a page, without decoding and checking the rest."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def first_sequence(payload: bytes, width: int) -> bytes:
     """Return the first array of a message of a header, a word and arrays, as little-endian CDR.
 
     Such are pictures and the states of soft bodies: both go to pages many times a second. `width`: bytes of
-    each element. Raises MessageError if it is no such message.
+    each element. Raises MessageError for any other message.
     """
     try:
         if payload[:2] != _LITTLE_ENDIAN:

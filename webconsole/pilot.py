@@ -1,4 +1,4 @@
-"""Who leads what: at most one page a device, by a lease that ends with its page or by its silence."""
+"""Pilots of devices: at most a single page a device, by a lease until the page's end or silence."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from webconsole.commands import Hand
 __all__ = ["Pilots"]
 
 LEASE_S = 3.0
-"""A page that leads and sends nothing for this long leads no more."""
+"""Silence of a leading page until the lead ends, s."""
 
 
 class Pilots:
-    """The devices that pages may lead, and the page that leads each."""
+    """The devices for pages to lead, and the leading page of each."""
 
     def __init__(self) -> None:
         self._devices: dict[str, Callable[[Hand | None], None]] = {}
@@ -26,7 +26,7 @@ class Pilots:
         self._people: dict[object, int] = {}
 
     def offer(self, device: str, take: Callable[[Hand | None], None]) -> None:
-        """Let pages lead a device; `take` gets what they ask of it, and None when no page leads."""
+        """Let pages lead a device; `take` gets the wishes of the pages, and None when no page leads."""
         self._devices[device] = take
 
     def keep(self, devices: Collection[str]) -> None:
@@ -37,9 +37,9 @@ class Pilots:
             del self._devices[device]
 
     def lead(self, page: object, device: str, *, beside: bool = False) -> None:
-        """Make `page` the pilot of `device`, and of no other unless `beside` is true.
+        """Make `page` the pilot of `device`, and of no further device unless `beside` is true.
 
-        Raises MessageError if there is no such device, or it has a pilot.
+        Raises MessageError if there is no such device, or the device has a pilot.
         """
         if device not in self._devices:
             raise MessageError(
@@ -59,7 +59,7 @@ class Pilots:
             self._release(device)
 
     def take(self, page: object, hand: Hand) -> None:
-        """Hand what a page asks to the device that it leads; raises MessageError if it does not lead it."""
+        """Pass a page's wish to the page's device; raises MessageError if the page leads no such device."""
         led = [name for name, holder in self._pages.items() if holder is page]
         if not led:
             raise MessageError("this page leads no device")
@@ -76,7 +76,7 @@ class Pilots:
         return page in self._pages.values()
 
     def state(self, page: object) -> list[dict[str, Any]]:
-        """Return each device and who leads it, as `page` sees it, ready for JSON."""
+        """Return each device and its pilot, as `page` is told, ready for JSON."""
         self._expire()
         rows: list[dict[str, Any]] = []
         for device in self._devices:

@@ -9,16 +9,16 @@ from schemas.vectors import Vector
 __all__ = ["Pyramid"]
 
 _GROUP = 8
-"""Rows of a level that are one of the next."""
+"""Rows of a level per row of the next level."""
 _SHORTEST = 1024
-"""Rows of a level that needs no next one."""
+"""Rows of a level without a next level."""
 
 
 class Pyramid:
     """Levels of a series, each with least and greatest value of groups of the level before.
 
-    A stretch is read from the coarsest level that is fine enough: its cost depends on the rows that are asked
-    for, not on the length of the series.
+    A stretch is read from the coarsest level of enough resolution: the cost depends on the number of rows
+    asked for, not on the length of the series.
 
     Args:
         times: Shape (n,), s, not decreasing.
@@ -38,7 +38,7 @@ class Pyramid:
         """Return rows of time and values between two times, shape (n, 1 + columns).
 
         Of more values than two for each bucket, the least and the greatest of each column in each bucket are
-        kept, so that no peak is lost. One row before and behind goes with them: lines go on beyond a plot.
+        kept, so that no peak is lost. A row before and a row behind are added: lines go on beyond a plot.
         """
         spans = [
             (

@@ -1,9 +1,9 @@
-"""A process of `trocar` that has imported what it needs, and waits for its arguments.
+"""A process of `trocar` with all imports done, waiting for arguments.
 
-`python -P -m webconsole.ready MODULE ...`: a line of its standard input has the arguments, a list in JSON. At
-the end of the input, however the process at the other end of the pipe has ended, it ends as by SIGTERM. To
-import, and to read the definitions of messages and kinds, takes two seconds, which is done while a person
-still reads the form of a fork.
+`python -P -m webconsole.ready MODULE ...`: a line of the standard input has the arguments, a list in JSON. At
+the end of the input, however the writer of the pipe has ended, the process ends as by SIGTERM. To import, and
+to read the definitions of messages and kinds, takes two seconds, spent while a person still reads the form of
+a fork.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from time import sleep
 __all__ = ["ReadyProcess", "main"]
 
 _PATIENCE_S = 10.0
-"""Time in which a session closes its recording and ends its hosts."""
+"""Time for a session to close the recording and end the hosts, s."""
 
 
 class ReadyProcess:
-    """A process that waits for its arguments, and ends with the process that has made it.
+    """A process waiting for arguments, which ends with its parent process.
 
     Args:
-        modules: What it imports; one that cannot be imported is left to the command, which says why.
+        modules: Imported meanwhile; a failed import is left to the command to report.
     """
 
     def __init__(self, modules: Sequence[str]) -> None:
@@ -54,7 +54,7 @@ class ReadyProcess:
         return self._said.read().decode(errors="replace")
 
     def run(self, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
-        """Let it run `trocar` with these arguments, and return it."""
+        """Let the process run `trocar` with these arguments, and return the process."""
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):  # it has ended: its exit code tells how
             self.process.stdin.write(json.dumps([*arguments]).encode() + b"\n")
@@ -62,7 +62,7 @@ class ReadyProcess:
         return self.process
 
     def close(self) -> None:
-        """Let it end."""
+        """Let the process end."""
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):
             self.process.stdin.close()
@@ -91,7 +91,7 @@ def main() -> None:
 
 
 def _end_with_pipe(pipe: int) -> None:
-    """End this process when the other end of a pipe is closed: in order, so that a recording is whole."""
+    """End this process when the writer closes a pipe: in order, so that a recording is whole."""
     while os.read(pipe, 1024):
         pass
     # a shell lets a program in the background, and so what that starts, ignore SIGINT
@@ -101,7 +101,7 @@ def _end_with_pipe(pipe: int) -> None:
 
 
 def _read_definitions() -> None:
-    """Read what is read once in a process: messages, kinds and what they require."""
+    """Read the definitions needed once in a process: messages, kinds and requirements."""
     from hub.planning import registry
     from schemas.codec import typestore
 

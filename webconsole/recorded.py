@@ -1,4 +1,4 @@
-"""A recording as what a page shows: any instant of it, by its indexes."""
+"""A recording as the source of pages: any instant, by the recording's indexes."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ __all__ = ["Recorded"]
 
 _SERIES_KEPT = 16
 _CONTACT_N = 0.02
-"""A force above it is a contact: twice what a step of the recorded hand makes in free motion."""
+"""Least force of a contact, N: twice the force of a step of the recorded hand in free motion."""
 
 
 class Recorded:
-    """The source of a page that shows a recording."""
+    """The source of the pages of a recording."""
 
     kind = "recording"
     generation = 1
     guided = None
 
     def __init__(self, path: Path) -> None:
-        """Open the recording; raises RecordingError if it is not one of a session."""
+        """Open the recording; raises RecordingError if it is not of a session."""
         self.recording = Recording(path)
         self.scenario: Scenario | None = self.recording.scenario()
         self._moments = Moments(self.recording)
@@ -54,7 +54,7 @@ class Recorded:
         self._pyramid = lru_cache(maxsize=_SERIES_KEPT)(self._read_pyramid)
 
     def _find_outlets(self) -> Iterator[Outlet]:
-        """Yield the recorded outputs: as they were declared, else as their first messages show them."""
+        """Yield the recorded outputs: as declared, else by the first messages."""
         recorded = self.recording
         declared: dict[str, Port] = {}
         if "plan.json" in recorded.attachments:
@@ -95,12 +95,12 @@ class Recorded:
         }
 
     def params(self, participant: str) -> Params:
-        """Return the validated parameters of a participant; raises what `trusted_parameters` raises."""
+        """Return the validated parameters of a participant; raises as `trusted_parameters` does."""
         return trusted_parameters(self.recording, [participant]).validated(participant)
 
     @cached_property
     def _read_statuses(self) -> tuple[list[tuple[int, SessionStatus]], list[str]]:
-        """The statuses with their times (ns), and a sentence about those that are damaged."""
+        """Return the statuses with times (ns), and a sentence about damaged statuses."""
         found, damaged = list[tuple[int, SessionStatus]](), list[str]()
         try:
             messages = self.recording.messages(STATUS_TOPIC) if STATUS_TOPIC in self.recording.topics else ()
@@ -141,9 +141,9 @@ class Recorded:
         return columns, pyramid.rows(start_s, end_s, buckets)
 
     def pressed(self, bond: BondArrows, most: int) -> Vector:
-        """Return rows of time (s), point (m) and force (N) of a bond that acts at one point, shape (n, 7).
+        """Return rows of time (s), point (m) and force (N) of a bond with a single point, shape (n, 7).
 
-        Of more than `most`, each second, third, ... one. Raises RecordingError.
+        Of more than `most` rows, each second, third, ... is kept. Raises RecordingError.
         """
         with self._lock:
             place, force = self._series(bond.place), self._series(bond.force)
@@ -173,7 +173,7 @@ class Recorded:
 
     @cached_property
     def events(self) -> list[Entry]:
-        """What happened: in tasks, with tissue, to devices, and when inputs were lost; by time."""
+        """Return the events of tasks, tissue, devices and lost inputs; by time."""
         parts = (self._messages(), self._contacts(), _readable(self._stale(), "session"), self._statuses())
         return sorted((entry for part in parts for entry in part), key=lambda one: one.time_s)
 
@@ -184,7 +184,7 @@ class Recorded:
                 yield from _readable(self._lines_of(outlet, lines), outlet.name)
 
     def _lines_of(self, outlet: Outlet, lines: Entries) -> Iterator[Entry]:
-        """Yield the lines of an outlet, and one about all of its messages that are damaged."""
+        """Yield the lines of an outlet, and a line about all damaged messages."""
         damaged = list[Entry]()
         for message in self.recording.messages(self._topics[outlet.name]):
             try:
@@ -211,7 +211,7 @@ class Recorded:
             yield Entry(float(series.time[at]), "info", name, text)
 
     def _stale(self) -> Iterator[Entry]:
-        """Yield when a device's samples ceased and when they came back."""
+        """Yield the ends and returns of a device's samples."""
         stale: dict[str, bool] = {}
         for grant in self.recording.grants():
             for sample in grant.inlets:
@@ -222,7 +222,7 @@ class Recorded:
                     yield Entry(grant.start_ns / 1e9, "warn" if sample.stale else "info", name, text)
 
     def _statuses(self) -> Iterator[Entry]:
-        """Yield late steps and refused messages, at the status before which they were."""
+        """Yield late steps and refused messages, at the time of the next status."""
         late = refused = 0
         for time_ns, status in self._read_statuses[0]:
             more_late, more_refused = status.late_steps - late, status.dropped_messages - refused
@@ -237,7 +237,7 @@ class Recorded:
 
 
 def _readable(entries: Iterator[Entry], source: str) -> Iterator[Entry]:
-    """Yield entries as far as they can be read, and then why no further."""
+    """Yield entries as far as readable, and then why no further."""
     time_s = 0.0
     try:
         for entry in entries:

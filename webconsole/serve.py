@@ -1,4 +1,4 @@
-"""A server from start to end: its source, its link, and the browser that opens it."""
+"""A server from start to end: source, link, and the opened browser."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _FOXGLOVE = "/foxglove"
-"""Path of its WebSocket."""
+"""Path of Foxglove's WebSocket."""
 
 
 def serve(
@@ -54,15 +54,15 @@ def serve(
 
     Args:
         recording: The recording; None: a running session.
-        endpoint: Where its hub listens; None: any hub of this user on this machine.
-        session: The name of the session; None: the first that is found.
-        port: On loopback; None: a free one.
-        listen: Where to listen to other machines, such as tls/0.0.0.0:8470; None: on loopback alone.
-        certificates: For that, the hub's certificate or its directory; None: the directory of this user.
+        endpoint: Endpoint of the hub; None: any hub of this user on this machine.
+        session: Name of the session; None: the first session found.
+        port: Port on loopback; None: any free port.
+        listen: Where to listen to further machines, such as tls/0.0.0.0:8470; None: on loopback alone.
+        certificates: The hub's certificate for `listen`, or the directory; None: the directory of this user.
         browse: Open the page in a browser.
-        foxglove: Let Foxglove look too, by a link of its own.
-        role: What the holder of the printed link may do.
-        parent: The process of the hub, with which this one ends.
+        foxglove: Let Foxglove look too, by a separate link.
+        role: Role of the holder of the printed link.
+        parent: The process of the hub; this process ends with the hub.
 
     Raises RecordingError if there is no such recording, ConnectError if no port is free or a certificate is
     missing, ScenarioError if `listen` is no endpoint of TLS.
@@ -84,7 +84,7 @@ def _terminate(_number: int, _frame: FrameType | None) -> None:
 
 
 def opened_recording(recording: Path, stack: ExitStack) -> Recorded:
-    """Return a recording; of one that was cut short, what is whole, for as long as `stack` is open."""
+    """Return a recording, open as long as `stack`; of a truncated recording, the whole part."""
     try:
         return Recorded(recording)
     except CutShortError:
@@ -136,7 +136,7 @@ def _serve(
 
 
 def _foxglove(console: Console) -> Face:
-    """Return the door to Foxglove, of which the packages may be missing where it is not asked for."""
+    """Return the door to Foxglove; imports packages needed here alone."""
     from webconsole.foxglove.face import Face
 
     return Face(console)

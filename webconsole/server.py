@@ -32,14 +32,14 @@ __all__ = ["Server"]
 
 _MOST_PAGES = 16
 _MOST_VIEWERS = 12
-"""Pages of viewers among them: the rest are kept for operators."""
+"""Most pages of viewers: the rest are kept for operators."""
 _AHEAD_S = 0.2
 _MOST_BUCKETS = 4000
 _BINARY = "application/octet-stream"
 
 
 class _WebSocket(WebSocketsSansIOProtocol):
-    """uvicorn's; its `shutdown` (0.54) fails, and the server's with it, while a page is closing itself."""
+    """WebSocket of uvicorn; `shutdown` (0.54) fails, and so the server's, while a page is closing itself."""
 
     def shutdown(self) -> None:
         if not self.transport.is_closing():
@@ -47,12 +47,12 @@ class _WebSocket(WebSocketsSansIOProtocol):
 
 
 class Server:
-    """Serves the pages of one console.
+    """Serves the pages of a console.
 
     Args:
-        console: What the pages show.
+        console: Contents of the pages.
         listening: Where.
-        others: What serves other programs, by the path of its WebSocket.
+        others: Servers of programs, by the path of a WebSocket.
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class Server:
 
     @asynccontextmanager
     async def _ahead(self, _app: Starlette) -> AsyncGenerator[None]:
-        """Make what can be drawn of each session before the first page asks for it."""
+        """Make the stage of each session before the first page asks."""
 
         async def make() -> None:
             await asyncio.to_thread(compress_all)
@@ -180,7 +180,7 @@ class Server:
         return Response(rows.astype("<f8").tobytes(), media_type=_BINARY)
 
     async def _events(self, _request: Request) -> Response:
-        """Answer with what happened in a recording."""
+        """Answer with the events of a recording."""
         try:
             recorded = self._console.recorded()
             found = await asyncio.to_thread(lambda: recorded.events)
@@ -189,7 +189,7 @@ class Server:
         return JSONResponse([one.as_json() for one in found])
 
     async def _sessions(self, _request: Request) -> Response:
-        """Answer with the sessions that run on this machine."""
+        """Answer with the running sessions of this machine."""
         try:
             live = self._console.live()
             return JSONResponse(await asyncio.to_thread(live.sessions))
@@ -197,7 +197,7 @@ class Server:
             return PlainTextResponse(f"{error}\n", status_code=400)
 
     async def _start(self, request: Request) -> Response:
-        """Answer an operator with the installed scenarios, or with the form of one."""
+        """Answer an operator with the installed scenarios, or with the form of a scenario."""
         if request.state.role != "operator":
             return PlainTextResponse("a viewer starts no session\n", status_code=403)
         name = request.query_params.get("scenario")
@@ -209,11 +209,11 @@ class Server:
             return PlainTextResponse(f"{error}\n", status_code=400)
 
     async def _fork(self, _request: Request) -> Response:
-        """Answer with what the form of a fork offers."""
+        """Answer with the form of a fork."""
         return await self._of_recording(fork_form)
 
     async def _forks(self, _request: Request) -> Response:
-        """Answer with the tree of the recordings beside this one."""
+        """Answer with the tree of the recordings beside this recording."""
         return await self._of_recording(tree_of)
 
     async def _of_recording(self, make: Callable[[Recording], object]) -> Response:

@@ -18,7 +18,7 @@ class Outlet(NamedTuple):
     participant: str
     port: Port
     live: bool = True
-    """Whether its values can be seen while the session runs."""
+    """Whether the values can be seen while the session runs."""
 
     @property
     def name(self) -> str:
@@ -30,18 +30,18 @@ class Value(NamedTuple):
     """The newest message of a port."""
 
     time_ns: int
-    """Simulated time at which it is valid."""
+    """Simulated time of the value, ns."""
     payload: bytes
-    """As CDR."""
+    """Message in CDR."""
 
 
 class Source(Protocol):
-    """What is shown on the pages of one server."""
+    """Source of the pages of a server: a running session or a recording."""
 
     kind: str
     """`live` or `recording`."""
     generation: int
-    """Counts the sessions that were shown: another one has other ports and another scene."""
+    """Count of the sessions shown: another session has different ports and a different scene."""
 
     @property
     def scenario(self) -> Scenario | None:
@@ -51,23 +51,23 @@ class Source(Protocol):
     def params(self, participant: str) -> Params:
         """Return the validated parameters of a participant.
 
-        Raises TrocarError if they are not valid, or not to be trusted.
+        Raises TrocarError if the parameters are not valid, or not to be trusted.
         """
         ...
 
     @property
     def outlets(self) -> Sequence[Outlet]:
-        """The output ports, by participant, in the order in which they are declared."""
+        """The output ports, by participant, in order of declaration."""
         ...
 
     @property
     def guided(self) -> str | None:
-        """The participant that a person guides from a page; None if there is none, as in every recording."""
+        """The participant guided by a person from a page; None without guidance, as in every recording."""
         ...
 
     @property
     def state(self) -> Mapping[str, Any]:
-        """What the page's head shows, ready for JSON: name, state, times, counts."""
+        """Contents of the page's head, ready for JSON: name, state, times, counts."""
         ...
 
     def want(self, names: frozenset[str]) -> None:
@@ -79,7 +79,7 @@ class Source(Protocol):
         ...
 
     def first(self, name: str) -> Value | None:
-        """Return the value of an outlet at the beginning, which alone holds the surface of an organ."""
+        """Return the value of an outlet at the beginning; only there is the surface of an organ."""
         ...
 
     def close(self) -> None:

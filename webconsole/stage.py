@@ -1,4 +1,4 @@
-"""What of a session can be drawn: scenes of its participants, soft surfaces, markers, pictures, numbers."""
+"""The drawable parts of a session: scenes of participants, soft surfaces, markers, pictures, numbers."""
 
 from __future__ import annotations
 
@@ -35,47 +35,47 @@ __all__ = ["GROUP", "Stage"]
 log = logging.getLogger(__name__)
 
 GROUP = "trocar.scenes"
-"""Entry-point group: kind of participant -> what makes its scene of its parameters."""
+"""Entry-point group: kind of participant -> function from parameters to a scene."""
 _LENGTH = struct.Struct("<I")
 _FLESH: Rgb = (0.8, 0.38, 0.33)
-"""Colour of a surface that no scene has."""
+"""Colour of a surface without a scene."""
 _GRID_M = 2.0**-16
-"""Vertices are rounded to 15 um: it is not seen, and zeros at their ends compress."""
+"""Step of rounded vertices, m: 15 um are not seen, and trailing zeros compress."""
 
 
 class Stage:
-    """All that a page may show of one session.
+    """The contents of the pages of a session.
 
-    A scene that cannot be made is left out, and `notes` says why: plots and pictures work without it.
+    A failed scene is left out, and `notes` says why: plots and pictures work without a scene.
     """
 
     def __init__(
         self, scenario: Scenario, outlets: Sequence[Outlet], params: Callable[[str], Params]
     ) -> None:
-        """`params` returns the validated parameters of a participant, or raises what is noted."""
+        """`params` returns the validated parameters of a participant, or raises an error to be noted."""
         self.notes: list[str] = []
         self.scenes: dict[str, Scene] = {}
-        """By participant, those with something to draw."""
+        """Scenes by participant, where there is something to draw."""
         self._outlets = {one.name: one for one in outlets}
         colours = self._draw(scenario, params)
         signals = [one for one in outlets if one.port.variability == "signal"]
         self.surfaces = {name: colours.get(name, _FLESH) for name in _of_type(signals, SoftBodyState)}
-        """Colour of each soft surface, by the outlet of its nodes."""
+        """Colour of each soft surface, by the outlet of the nodes."""
         self.markers = _of_type(outlets, ShownMarkers)
         self.pictures = _of_type(outlets, CompressedImage)
         self.numbers = {one.name: VectorCodec(one.port) for one in signals if has_vector(one.port.type)}
         """The numeric outlets."""
         self.gauges = {one.name: GAUGES[one.port.type] for one in signals if one.port.type in GAUGES}
-        """The outlets of the hub that can be plotted too."""
+        """The plottable outlets of the hub."""
         drawn = {name for participant in self.scenes for name in self.inputs(participant)}
         self._codecs = {name: codec for name, codec in self.numbers.items() if name in drawn}
         self.arrows = bond_arrows(scenario, self.numbers)
         self.felt = felt_wrenches(scenario, self.numbers)
-        """By device that pages lead: the wrenches on the instruments that it moves."""
+        """Outlets of the wrenches on the moved instruments, by device led from pages."""
         of_hands = (name for names in self.felt.values() for name in names)
         of_arrows = (name for bond in self.arrows for name in bond)
         self.shown = frozenset((*self._codecs, *self.surfaces, *self.markers, *of_arrows, *of_hands))
-        """The outlets that the scene itself needs."""
+        """The outlets needed for the scene itself."""
 
     def _draw(self, scenario: Scenario, params: Callable[[str], Params]) -> dict[str, Rgb]:
         """Make the scenes, and return the colours of their surfaces by outlet."""
@@ -102,9 +102,9 @@ class Stage:
         return None
 
     def poses(self, participant: str, values: Mapping[str, Value]) -> NDArray[np.float32]:
-        """Return the poses of a participant's bodies, shape (bodies, 7), for its newest values by outlet.
+        """Return the poses of a participant's bodies, shape (bodies, 7), for the newest values by outlet.
 
-        Raises MessageError if one is not valid.
+        Raises MessageError for an invalid value.
         """
         scene = self.scenes[participant]
         return scene.poses(
@@ -116,11 +116,11 @@ class Stage:
         )
 
     def inputs(self, participant: str) -> tuple[str, ...]:
-        """Return the outlets that the poses of a participant are made of."""
+        """Return the outlets needed for the poses of a participant."""
         return tuple(f"{participant}.{port}" for port in self.scenes[participant].inputs)
 
     def section(self, name: str, value: Value) -> Section:
-        """Return what a frame has of an outlet that is a surface, markers or a picture."""
+        """Return the section of an outlet of a surface, markers or a picture."""
         if name in self.surfaces:
             nodes = np.frombuffer(first_sequence(value.payload, 4), "<f4")
             content = node_content(nodes) if nodes.size else b""
@@ -144,7 +144,7 @@ class Stage:
         return name in self.numbers or name in self.gauges
 
     def sample(self, index: int, name: str, value: Value) -> Section:
-        """Return time (s) and numbers of a numeric outlet; raises MessageError if they are not valid."""
+        """Return time (s) and numbers of a numeric outlet; raises MessageError if invalid."""
         gauge = self.gauges.get(name)
         numbers = self.numbers[name].decode(value.payload) if gauge is None else gauge.read(value.payload)
         row = np.concatenate([[value.time_ns / 1e9], numbers])
@@ -159,13 +159,13 @@ class Stage:
         return Section(SectionKind.ARROWS, self.arrows.index(bond), rows.astype("<f4").tobytes())
 
     def force(self, device: str, values: Mapping[str, Value]) -> Section:
-        """Return the force on the instruments that a device moves; raises MessageError if it is not valid."""
+        """Return the force on the instruments moved by a device; raises MessageError if invalid."""
         forces = [self.numbers[name].decode(value.payload)[:3] for name, value in values.items()]
         norm = np.linalg.norm(np.sum(forces, axis=0))
         return Section(SectionKind.FELT, [*self.felt].index(device), norm.astype("<f4").tobytes())
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page must know before its first frame, ready for JSON."""
+        """Return the description for a page before the first frame, ready for JSON."""
         return {
             "scenes": [*self.scenes],
             "surfaces": [{"name": name, "colour": rgb} for name, rgb in self.surfaces.items()],
@@ -207,7 +207,7 @@ class Stage:
 
     @cached_property
     def geometry(self) -> bytes:
-        """The scenes as a page loads them once: length of the text (u32), JSON, zeros to 4, then numbers.
+        """The scenes as loaded once by a page: length of the text (u32), JSON, zeros to 4, then numbers.
 
         In the JSON, `at` is where in the numbers, in bytes, and `count` how many.
         """
@@ -239,7 +239,7 @@ class Stage:
 
 
 def _of_type(outlets: Iterable[Outlet], message: type[Message]) -> tuple[str, ...]:
-    """Return the names of the outlets that publish messages of a type."""
+    """Return the names of the outlets with messages of a type."""
     return tuple(one.name for one in outlets if one.port.type == message.ros_type)
 
 
@@ -254,7 +254,7 @@ def _parts(scene: Scene, blob: bytearray) -> Iterator[dict[str, Any]]:
 
 
 def _columns(codec: VectorCodec) -> list[str]:
-    """Return the name of each number: `position.x`, `position.yaw`, `data.0`; one number alone has ''."""
+    """Return the name of each number: `position.x`, `position.yaw`, `data.0`; a single number has ''."""
     names = [f"{i}" for i in range(codec.size)]
     for field, block in codec.fields.items():
         if "." in field and block.stop - block.start == 1 and field.count(".") == 1:

@@ -1,4 +1,4 @@
-"""Sessions from a page: the form of an installed scenario, made from its models, and the command of it."""
+"""Sessions from a page: the form of an installed scenario, made from models, and the start command."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ __all__ = ["start_arguments", "start_form"]
 
 
 def start_form(name: str) -> dict[str, Any]:
-    """Return the groups of fields of an installed scenario, and its devices; raises as `load` does.
+    """Return the groups of fields and the devices of an installed scenario; raises as `load` does.
 
-    A field has the path of its value as on the command line, `kind` (`number`, `whole`, `switch`, `choice`),
-    its value in the scenario, and if the model has them: unit, limits, choices, a description. What the scene
-    says for several participants at once is not offered.
+    A field has the path of a value as on the command line, `kind` (`number`, `whole`, `switch`, `choice`),
+    the value in the scenario, and unit, limits, choices and description if the model has any. Values of the
+    scene, for several participants at once, are not offered.
     """
     _require_installed(name)
     file = load(name)
@@ -50,10 +50,10 @@ def start_form(name: str) -> dict[str, Any]:
 
 
 def start_arguments(order: Start, directory: Path) -> list[str]:
-    """Return the arguments of `trocar` that start a scenario as a page asks; it is recorded in `directory`.
+    """Return the arguments of `trocar` to start a scenario on a page's order, recorded in `directory`.
 
     Raises MessageError if the scenario is not installed or a page may not change a value, ScenarioError with
-    one line for each value that is rejected.
+    a line for each rejected value.
     """
     _require_installed(order.scenario)
     scenario = load(order.scenario).scenario
@@ -73,7 +73,7 @@ def _require_installed(name: str) -> None:
 
 
 def _described(field: Field, value: Any) -> dict[str, Any]:
-    """Return a field with its value in the scenario, ready for JSON."""
+    """Return a field with the value in the scenario, ready for JSON."""
     return {
         "path": field.path,
         "label": field.label,

@@ -1,4 +1,4 @@
-"""Sessions that an operator has started from a page: each a process of `trocar` with a page of its own."""
+"""Sessions started by an operator from a page: each a process of `trocar` with a separate page."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 _COMMAND = "hub.command_line"
 _MOST = 4
-"""Sessions that may run at once: each takes a core and more."""
+"""Most sessions at once: each takes a core and more."""
 _LOOK_S = 0.1
 _PATIENCE_S = 5.0
 _MOST_SAID = 4000
@@ -41,10 +41,10 @@ _LINK = re.compile(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+")
 
 
 class Ready:
-    """The processes of a session to come, hub and page, which wait for their arguments.
+    """The processes of a session to come, hub and page, waiting for their arguments.
 
     Args:
-        modules: What the hub's process imports meanwhile.
+        modules: Imported by the hub's process meanwhile.
     """
 
     def __init__(self, modules: Sequence[str]) -> None:
@@ -58,19 +58,19 @@ class Ready:
 
 
 def _scenes() -> list[str]:
-    """Return the modules of the scenes that a page may draw."""
+    """Return the modules of a page's scenes."""
     return sorted({entry.module for entry in entry_points(group=GROUP)})
 
 
 class StartedSession:
-    """One session: its hub's process, and the process of its page.
+    """A session: the process of the hub, and the process of the page.
 
     Args:
-        number: By which pages name it.
-        title: What it is, for people.
-        arguments: Those of `trocar`, checked.
-        live_from_s: Simulated time from which on it is live: before, a past is simulated again.
-        ready: The processes, which wait for their arguments.
+        number: Number of the session, on pages.
+        title: Title for people.
+        arguments: Arguments of `trocar`, checked.
+        live_from_s: Simulated time at which the session becomes live: before, a past is simulated again.
+        ready: The processes, waiting for their arguments.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class StartedSession:
         return self._hub.poll() is not None
 
     def as_json(self) -> dict[str, Any]:
-        """Return what a page shows of it: its state, how much of the past is done, and its link."""
+        """Return the session for pages: state, share of the past already simulated, and link."""
         live = bool(self.link) and self.time_s >= self.live_from_s
         over = not self._thread.is_alive()  # only then is it known whether it failed
         state = "failed" if self.error else "ended" if over else "live" if live else "starting"
@@ -111,19 +111,19 @@ class StartedSession:
         }
 
     def end(self) -> None:
-        """End the session as SIGTERM does; its recording is closed in order."""
+        """End the session as SIGTERM does; the recording is closed in order."""
         if not self.ended:
             self._asked_to_end = True
             self._hub.terminate()  # not SIGINT: a shell lets a server in the background ignore it
 
     def close(self) -> None:
-        """End the session and wait for it."""
+        """End the session and wait for the end."""
         self.end()
         _wait(self._hub)
         self._thread.join(_PATIENCE_S)
 
     def _follow(self) -> None:
-        """Open the session's page once its hub listens, and watch it to its end."""
+        """Open the session's page once the hub listens, and watch the session to the end."""
         with ExitStack() as stack:
             client: zenoh.Session | None = None
             while not self.ended:
@@ -154,7 +154,7 @@ class StartedSession:
 
 
 class Started:
-    """The sessions that pages of one server have started; they end with the server."""
+    """The sessions started from the pages of a server; all end with the server."""
 
     def __init__(self) -> None:
         self._sessions: list[StartedSession] = []
@@ -162,14 +162,14 @@ class Started:
         self._lock = threading.Lock()
 
     def prepare(self, modules: Sequence[str]) -> None:
-        """Have processes ready for a session that somebody is about to start; `modules`: of its hub."""
+        """Have processes ready for a session about to be started; `modules`: imported by the hub."""
         with self._lock:
             if self._ready is None and not self._full:
                 self._ready = Ready(modules)
 
     @property
     def waiting(self) -> tuple[subprocess.Popen[bytes], ...]:
-        """The processes that are ready for a session."""
+        """The processes ready for a session."""
         return () if self._ready is None else (self._ready.hub.process, self._ready.page.process)
 
     @property
@@ -177,7 +177,7 @@ class Started:
         return sum(not one.ended for one in self._sessions) >= _MOST
 
     def start(self, title: str, arguments: Sequence[str], live_from_s: float = 0.0) -> StartedSession:
-        """Start `trocar` with arguments that were checked; raises MessageError if too many run already."""
+        """Start `trocar` with checked arguments; raises MessageError if too many sessions run already."""
         with self._lock:
             if self._full:
                 raise MessageError(f"{_MOST} sessions that were started here are running: end one first")
@@ -198,11 +198,11 @@ class Started:
         return {one.pid for one in self._sessions}
 
     def as_json(self) -> list[dict[str, Any]]:
-        """Return all of them, ready for JSON."""
+        """Return all sessions, ready for JSON."""
         return [one.as_json() for one in self._sessions]
 
     def close(self) -> None:
-        """End them all."""
+        """End all sessions."""
         for one in self._sessions:
             one.end()
         for one in self._sessions:
@@ -212,14 +212,14 @@ class Started:
 
 
 def page_devices(scenario: Scenario, names: Sequence[str]) -> list[str]:
-    """Return the changes that have pages lead these devices; raises MessageError if one is not there."""
+    """Return the changes for pages to lead these devices; raises MessageError for an absent device."""
     if unknown := set(names) - set(scenario.participants):
         raise MessageError(f"there is no device '{min(unknown)}' in scenario '{scenario.name}'")
     return [f"participants.{name}={_PAGE_DEVICE}" for name in names]
 
 
 def recorded_in(parent: Path, stem: str) -> Path:
-    """Return a directory for a recording that is not there yet: the stem, or the stem and a number."""
+    """Return a new directory for a recording: the stem, or the stem and a number."""
     names = (stem, *(f"{stem}-{number}" for number in range(2, 1000)))
     return next(place for name in names if not (place := parent / name).exists())
 

@@ -1,4 +1,4 @@
-"""What Foxglove gets of a session: its outputs as they were published, and what the page draws as a scene."""
+"""Foxglove's topics of a session: the outputs as published, and the page's drawing as a scene."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ Newest = Callable[[str], Value | None]
 
 
 class Channel:
-    """One topic, made of `outlets`.
+    """A topic, made of `outlets`.
 
     Args:
-        topic: Its name.
-        outlets: By name, as in `Source.newest`.
-        schema: Of its messages.
-        encoding: Of its messages.
-        context: That of the server.
+        topic: Name of the topic.
+        outlets: Names of the outlets, as in `Source.newest`.
+        schema: Schema of the messages.
+        encoding: Encoding of the messages.
+        context: Context of the server.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Channel:
         return self._channel.has_sinks()
 
     def put(self, newest: Newest) -> None:
-        """Send what is new, if a client subscribes; raises MessageError if it is not valid."""
+        """Send new values, if a client subscribes; raises MessageError if a value is not valid."""
         if not self.wanted:
             self._sent = None
             return
@@ -73,11 +73,11 @@ class Channel:
         self._sent = values
 
     def _messages(self, values: dict[str, Value]) -> Iterator[bytes]:
-        """Yield what is sent of new values: here as they were published."""
+        """Yield the messages of new values: here as published."""
         return (value.payload for value in values.values())
 
     def again(self) -> None:
-        """Send what there is once more: somebody has only now subscribed."""
+        """Send the present values once more: somebody has only now subscribed."""
         self._sent = None
 
     def close(self) -> None:

@@ -1,9 +1,9 @@
 """The door to Foxglove: the SDK's server, reached through the page's server alone.
 
-The SDK's server (0.30) lets any website of this machine's browsers connect, without a credential. So it
-listens on loopback with a certificate that is made anew each time and that no browser accepts, and the page's
-server relays to it those who have its secret link. It has no capability by which a client could send data,
-parameters or calls, and is fed only while somebody is connected by the link.
+The SDK's server (0.30) lets any website of this machine's browsers connect, without a credential. So the
+SDK's server listens on loopback with a certificate made anew each time, accepted by no browser, and the
+page's server relays clients with the secret link. The SDK's server has no capability for data, parameters or
+calls from a client, and is fed only while somebody is connected by the link.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ _PERIOD_S = 1.0 / 30.0
 _TROUBLE_S = 1.0
 _MOST_CLIENTS = 8
 _BACKLOG = 256
-"""Messages that wait for a client; then the oldest one is dropped."""
+"""Messages waiting for a client; beyond, the oldest is dropped."""
 _LOOPBACK = "127.0.0.1"
 
 
 class _Subscribed(ServerListener):
-    """Takes note of the topics that somebody has newly subscribed to, in the SDK's own thread."""
+    """Takes note of newly subscribed topics, in the SDK's own thread."""
 
     def __init__(self) -> None:
         self.topics = deque[str]()
@@ -56,7 +56,7 @@ class _Subscribed(ServerListener):
 
 
 class Face:
-    """Serves Foxglove what the pages of a console can show; close it at the end."""
+    """Serves Foxglove the contents of a console's pages; to be closed at the end."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -89,7 +89,7 @@ class Face:
         self._server.stop()
 
     async def relay(self, websocket: WebSocket) -> None:
-        """Connect a client that was let in with the SDK's server, until one of them leaves."""
+        """Connect an admitted client with the SDK's server, until either leaves."""
         if self._clients >= _MOST_CLIENTS:
             await websocket.close(1013, f"{_MOST_CLIENTS} clients are connected already")
             return
@@ -124,7 +124,7 @@ class Face:
             await websocket.close()
 
     async def _feed(self) -> None:
-        """Send what clients subscribe to, as soon as it is new, at most 30 times a second."""
+        """Send new values of the subscribed topics, at most 30 times a second."""
         source, troubles = self._console.source, set[str]()
         while True:
             try:
@@ -144,14 +144,14 @@ class Face:
         return (name for channel in self._channels if channel.wanted for name in channel.outlets)
 
     def _repeat(self) -> None:
-        """Let those who have just subscribed get what does not change any more."""
+        """Send constant values once more to new subscribers."""
         asked = {self._subscribed.topics.popleft() for _ in range(len(self._subscribed.topics))}
         for channel in self._channels:
             if channel.topic in asked:
                 channel.again()
 
     async def _follow(self) -> None:
-        """Offer the topics of the session that is shown now."""
+        """Offer the topics of the session shown now."""
         source = self._console.live()
         if source.generation == self._generation:
             return
@@ -182,7 +182,7 @@ async def _out(websocket: WebSocket, inside: ClientConnection) -> None:
 
 
 def _certificate() -> tuple[bytes, bytes]:
-    """Return certificate and key of loopback, in PEM, that are known to no other process."""
+    """Return certificate and key of loopback, in PEM, known to this process alone."""
     key = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "Trocar, for itself alone")])
     now = datetime.now(UTC)
