@@ -81,7 +81,7 @@ class Network(_Command):
     do: Literal["network"]
     device: Name
     delay: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=10.0)] | None = None
-    """Delay in each direction, s; None leaves the link's value, here and below."""
+    """Delay in each direction, s; for all three values None leaves the present value."""
     jitter: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=10.0)] | None = None
     """Largest additional delay of a message, s."""
     loss: Annotated[float, Field(allow_inf_nan=False, ge=0.0, lt=1.0)] | None = None

@@ -44,7 +44,7 @@ class HostedDevices:
     def join(self, endpoint: str, plan: Plan) -> None:
         """Host the devices for pages to lead in a session; devices hosted by another process are left alone.
 
-        Each device is offered once it takes part: a page's earlier input would wait until then.
+        Each device is offered once the device takes part: a page's earlier input would wait until then.
         """
         led = [
             name

@@ -186,7 +186,7 @@ class Page:
         self._changed.set()
 
     def _past_ns(self, time_s: float) -> int:
-        """Return an instant of the past, ns, of a time in s; raises MessageError if there is no past to show."""
+        """Return a time of the past in ns; raises MessageError if the page has no past to show."""
         source = self._console.source
         if isinstance(source, Live):
             if source.past is None:

@@ -136,7 +136,7 @@ def _serve(
 
 
 def _foxglove(console: Console) -> Face:
-    """Return the door to Foxglove; imports packages needed here alone."""
+    """Return the door to Foxglove, imported here: without Foxglove the packages may be missing."""
     from webconsole.foxglove.face import Face
 
     return Face(console)
