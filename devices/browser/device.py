@@ -1,6 +1,6 @@
 """Keys, pointer and gamepad of a page in place of a stylus or a headset (kind `browser`).
 
-The server of the page hosts the device (`host: remote`), so its samples go the way of every other device's.
+The server of the page hosts the device (`host: remote`), so the samples travel as with every other device.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from schemas.quantity import Duration
 __all__ = ["Browser", "BrowserParams"]
 
 _WAY_NS = 2_000_000
-"""Time from a read to the communication point, on one machine, ns (bench/webconsole_session.py)."""
+"""Time from a read to the communication point, on the same machine, ns (bench/webconsole_session.py)."""
 
 
 class BrowserParams(VirtualHandParams):
-    """What a page moves, how fast it moves, and when a silent page is no longer obeyed."""
+    """Frame moved from a page, speeds, and longest silence of an obeyed page."""
 
     silence: Annotated[
         Duration,
@@ -35,10 +35,10 @@ class BrowserParams(VirtualHandParams):
 
 
 class Browser(VirtualHand):
-    """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like one stylus, led from a page.
+    """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like a stylus, led from a page.
 
-    While no page leads, or the one that leads is silent, only the last: the arm holds. The moved frame starts
-    at the origin of `<participant>_base`, pointing level away from the user.
+    While no page leads, or the leading page is silent, only the diagnostics: the arm holds. The moved frame
+    starts at the origin of `<participant>_base`, pointing level away from the user.
     """
 
     params_model: ClassVar[type[Params]] = BrowserParams
@@ -60,7 +60,7 @@ class Browser(VirtualHand):
         self._reset()
 
     def read(self, t: int) -> list[Sample]:
-        """Return the present pose and twist, the buttons and the diagnosis if they have changed."""
+        """Return the present pose and twist, and changed buttons and diagnoses."""
         if not self._timer.due(t):
             return []
         seconds = self._elapse(t)
@@ -97,7 +97,7 @@ class Browser(VirtualHand):
         )
 
     def _with_drag(self, asked: PageInput, lead: int, seconds: float) -> Wish:
-        """Return the command with what is left of the pointer's way, as fast as the stylus may move."""
+        """Return the command with the rest of the pointer's way, as fast as the stylus may move."""
         if lead != self._lead:
             self._lead, self._dragged = lead, np.array(asked.drag)
         left = np.array(asked.drag) - self._dragged

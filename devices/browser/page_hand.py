@@ -1,4 +1,4 @@
-"""What the page that leads a device asks of it, from the page's server to the device, in one process."""
+"""Inputs of a leading page, from the page's server to the device, in the same process."""
 
 from __future__ import annotations
 
@@ -15,18 +15,21 @@ __all__ = ["PageHand", "PageInput", "hand_of"]
 
 @dataclass(frozen=True, slots=True)
 class PageInput:
-    """What keys, sticks and pointer of a page ask."""
+    """Commands of keys, sticks and pointer of a page."""
 
     wish: Wish
     drag: Vector3 = (0.0, 0.0, 0.0)
-    """Way of the pointer since the page leads, m: ahead, left, up; a message lost is in the next."""
+    """Way of the pointer since the page leads, m: ahead, left, up; the next message makes up for a lost
+    message.
+    """
     tracked: tuple[Vector3, Quaternion] | None = None
-    """Where a headset has the head or hand, in the base frame, in place of shares and way. Its own
-    axes, too, are x ahead, y left, z up."""
+    """Pose of the head or hand by a headset, in the base frame, in place of shares and way. The axes of
+    head and hand, too, are x ahead, y left, z up.
+    """
 
 
 class PageHand:
-    """The newest input of the page that leads; the page's server writes it, the device reads it."""
+    """The newest input of the leading page, written by the page's server, read by the device."""
 
     def __init__(self, clock: Callable[[], int] = monotonic_ns) -> None:
         self._clock = clock
@@ -42,13 +45,13 @@ class PageHand:
             self._newest = asked, self._clock()
 
     def release(self) -> None:
-        """Forget it: no page leads any more."""
+        """Forget the input: no page leads any more."""
         with self._lock:
             self._newest = None
             self._leads += 1
 
     def newest(self) -> tuple[PageInput, int, int] | None:
-        """Return the input, its age (ns) and which lead it is of; None if no page leads."""
+        """Return the input, its age (ns) and the number of the lead; None if no page leads."""
         with self._lock:
             if self._newest is None:
                 return None

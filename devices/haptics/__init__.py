@@ -1,1 +1,1 @@
-"""Force on a person's hand: contact rendered at the device's rate, and the limits that every force passes."""
+"""Force on a person's hand: contact rendered at the device's rate, and the limits of every force."""

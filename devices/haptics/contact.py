@@ -1,4 +1,4 @@
-"""Contact models for a haptic loop: planes as plain floats, checked once when they arrive."""
+"""Contact models for a haptic loop: planes as plain floats, checked once on arrival."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ZERO: Vector3 = (0.0, 0.0, 0.0)
 
 _MOST_PLANES = 4
 _UNIT_TOLERANCE = 1e-3
-"""How far the length of a normal may be from 1: wide enough for rounding, too narrow for any other vector."""
+"""Tolerance of a normal's length of 1: wide enough for rounding, too narrow for any other vector."""
 
 
 class Plane(NamedTuple):
@@ -42,9 +42,9 @@ def planes_of(model: ContactModel) -> tuple[Plane, ...]:
 
 
 def checked(planes: Sequence[Plane]) -> tuple[Plane, ...] | None:
-    """Return `planes` with normals of length 1, or None if they are invalid.
+    """Return `planes` with normals of length 1, or None if invalid.
 
-    Invalid are more than four, a number that is not finite, a negative coefficient, a normal that is no
+    Invalid are more than four planes, a number not finite, a negative coefficient, a normal without a
     direction.
     """
     if len(planes) > _MOST_PLANES:

@@ -1,4 +1,4 @@
-"""Diagnoses of a haptic device's force, for people: the condition, and what to do."""
+"""Diagnoses of a haptic device's force, for people: the condition, and the remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Limits of a force on a hand, in SI units: those of `devices.haptics.safety`, and those of a device."""
+"""Limits of a force on a hand, in SI units: the limits of `devices.haptics.safety`, and a device's."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 __all__ = ["TOUCH", "DeviceLimits", "Limits"]
 
 _SHARE_OF_NOMINAL = 0.6
-"""Share of a device's nominal maximum force used: the nominal force is a peak that the motors hold
-in the best posture only, and not for long.
+"""Usable share of a device's nominal maximum force: the motors hold the nominal force, a peak, in the best
+posture only, and not for long.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceLimits:
-    """Limits of a device, as its maker states them.
+    """Limits of a device, as stated by the maker.
 
     HDAPI: HD_NOMINAL_MAX_FORCE, _STIFFNESS and _DAMPING, here in SI units.
     """
@@ -28,7 +28,7 @@ class DeviceLimits:
 
     @property
     def usable_force(self) -> float:
-        """The largest force (N) commanded."""
+        """Largest commanded force, N."""
         return _SHARE_OF_NOMINAL * self.force
 
 
@@ -38,9 +38,9 @@ TOUCH = DeviceLimits(force=3.3, stiffness=400.0, damping=4.0)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The limits of one stylus.
+    """The limits of a stylus.
 
-    The defaults are the widest allowed, for a device that states no limits of its own. They come from
+    The defaults are the widest allowed, for a device without stated limits. The sources are
     drivers in use: 2 N is the clamp of sawSensablePhantom, waiting for less than 0.2 N is CHAI3D's; 400 N/m
     never oscillated in a simulated hand, 700 N/m did; the times are ours (docs/decisions/0022).
     """
@@ -52,21 +52,21 @@ class Limits:
     damping: float = 4.0
     """Damping, likewise, N s/m."""
     slew: float = 0.1
-    """Largest growth or turn of the force in one tick, N. It may fall at once."""
+    """Largest growth or turn of the force in a tick, N. The force may fall at once."""
     speed: float = 1.0
     """A faster hand gets no force until the dead-man is released, m/s."""
     hold: float = 0.1
-    """Silence of the simulation up to which its last contact model has its full force, s."""
+    """Longest silence of the simulation with the full force of the last contact model, s."""
     decay: float = 0.02
-    """Time constant of the force's decay after that, s."""
+    """Time constant of the force's decay after `hold`, s."""
     silence: float = 0.13
-    """Silence after which there is no force, s.
+    """Silence until zero force, s.
 
-    After a hub's end the force must be zero within 150 ms, of which its last model and a busy device host
-    may take 20.
+    After a hub's end the force must be zero within 150 ms; the hub's last model and a busy device host may
+    take 20 ms of this time.
     """
     ramp: float = 1.0
-    """Time in which the force rises after it was off, s."""
+    """Rise time of the force from zero, s."""
     calm_force: float = 0.2
     """The force rises only after less than this was due ..., N."""
     calm_ticks: int = 4

@@ -1,6 +1,6 @@
-"""The haptic loop of one stylus: at every tick of the device a safe force from the newest contact model.
+"""The haptic loop of a stylus: at every tick of the device a safe force from the newest contact model.
 
-Plain floats and one clock, so that it fits into a servo callback: no numpy, no pydantic, no lock.
+Plain floats and a single clock, to fit into a servo callback: no numpy, no pydantic, no lock.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from devices.vendor_axes import Vector3
 __all__ = ["HapticLoop"]
 
 _READ_BEFORE = 0.01
-"""Another thread receives models, so one may have arrived (s) after the tick's time was read; a time
-farther in the future is wrong.
+"""Largest lead of a model's arrival over the tick's time, s: another thread receives models, possibly after
+the time was read. A time farther in the future is wrong.
 """
 
 
@@ -48,19 +48,19 @@ class HapticLoop:
 
     @property
     def condition(self) -> Condition:
-        """Why that force was on or off."""
+        """Reason for the last force on or off."""
         return self._chain.condition
 
     def receive(self, planes: Sequence[Plane], stamp_ns: int, arrived: float) -> bool:
-        """Use a contact model from the next tick on; return False if it is ignored.
+        """Use a contact model from the next tick on; return False if ignored.
 
-        Ignored are invalid planes, and a stamp that is not newer than the newest. After a silence in which
-        the force went to zero every stamp is accepted, because another session starts at 0 again.
+        Ignored are invalid planes, and a stamp not newer than the newest. After a silence down to zero
+        force every stamp is accepted, because another session starts at 0 again.
 
         Args:
-            planes: of the model, base frame.
-            stamp_ns: stamp, ns.
-            arrived: when it arrived here, s of the clock of `tick`.
+            planes: planes of the model, base frame.
+            stamp_ns: stamp of the model, ns.
+            arrived: time of arrival, s of the clock of `tick`.
         """
         if stamp_ns <= self._stamp_ns and arrived - self._arrived <= self._limits.silence:
             return False
@@ -77,7 +77,7 @@ class HapticLoop:
         """Return the force (N) on the hand from this tick to the next.
 
         Args:
-            now: time of the tick, s of a clock that only goes forward.
+            now: time of the tick, s of a monotonic clock.
             position: of the hand, m.
             velocity: of the hand, m/s.
             permitted: whether the dead-man is held.

@@ -1,4 +1,4 @@
-"""The limits of a force in a scenario, which may make each narrower, none wider."""
+"""The limits of a force in a scenario; a scenario may make a limit narrower, never wider."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _HOLD_NS, _DECAY_NS, _SILENCE_NS, _RAMP_NS = (
 
 
 class SafetyParams(Params):
-    """Limits of the force on one hand.
+    """Limits of the force on a hand.
 
-    The defaults are the widest; the first three are the device's own where those are lower.
+    The defaults are the widest; for the first three, lower limits of the device take precedence.
     """
 
     force: Annotated[Force, Field(gt=0.0, le=_WIDEST.force)] | None = Field(

@@ -1,8 +1,8 @@
-"""A passivity observer and controller: the hand gets back no more energy than it has put in.
+"""A passivity observer and controller: the hand gets back no more energy than put in.
 
 After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Transactions on Robotics
-and Automation 18(1), 2002. Between two ticks a device holds its force, so the work is exactly force times
-displacement. The sum starts at zero whenever the hand gets no force: energy dissipated in one contact does
+and Automation 18(1), 2002. Between two ticks a device holds the force, so the work is exactly force times
+displacement. The sum starts at zero whenever the hand gets no force: energy dissipated in a contact does
 not allow more in the next.
 """
 
@@ -15,22 +15,22 @@ __all__ = ["Passivity"]
 
 
 class Passivity:
-    """Sums the energy that the hand has put into the contact, and damps as soon as more would come back."""
+    """Sums the energy put into the contact by the hand, and damps as soon as more would come back."""
 
     def __init__(self, damping: float) -> None:
-        """`damping`: the largest that it may add, N s/m."""
+        """`damping`: largest added damping, N s/m."""
         self._damping = damping
         self.reset()
 
     def reset(self) -> None:
         """Start at zero."""
         self.energy = 0.0
-        """Energy that the hand has put in and not got back, J."""
+        """Energy put in by the hand and not got back, J."""
         self._given: Vector3 = ZERO
         self._position: Vector3 = ZERO
 
     def correct(self, wanted: Vector3, position: Vector3, velocity: Vector3, dt: float) -> Vector3:
-        """Return the force `wanted` (N), damped if the hand would get more energy than it has put in.
+        """Return the force `wanted` (N), damped if the hand would get more energy than put in.
 
         Args:
             wanted: force of the contact, N.

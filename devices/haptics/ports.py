@@ -1,4 +1,4 @@
-"""The ports of one stylus, the same for every haptic device, so that a scenario can exchange devices."""
+"""The ports of a stylus, the same for every haptic device: a scenario can exchange devices."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["StylusPorts", "StylusSamples", "stylus_ports"]
 
 
 class StylusPorts(NamedTuple):
-    """Beside these a stylus has `<stylus>/diagnostics`, which `devices.diagnosis` declares."""
+    """Ports of a stylus, besides `<stylus>/diagnostics`, declared by `devices.diagnosis`."""
 
     pose: Port
     twist: Port
@@ -47,7 +47,7 @@ def stylus_ports(participant: str, stylus: str, *, simulated_time: bool, max_age
 
 
 class StylusSamples:
-    """What a stylus samples at every reading, in the frame of its ports, at a time (ns) of their clock."""
+    """Samples of a stylus at every reading, in the frame of the ports, at a time (ns) of the ports' clock."""
 
     def __init__(self, ports: StylusPorts) -> None:
         self._pose, self._twist, self._force = map(VectorCodec, (ports.pose, ports.twist, ports.force))
@@ -57,7 +57,7 @@ class StylusSamples:
         return VectorSample(self._pose, np.array((*position, *orientation)), time_ns)
 
     def twist(self, time_ns: int, linear: Vector3, angular: Vector3) -> Sample:
-        """Return the velocity (m/s) of the tip and its angular velocity (rad/s)."""
+        """Return the velocity (m/s) of the tip and the angular velocity (rad/s)."""
         return VectorSample(self._twist, np.array((*linear, *angular)), time_ns)
 
     def force(self, time_ns: int, force: Vector3) -> Sample:

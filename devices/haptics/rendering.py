@@ -2,7 +2,7 @@
 
 Friction is a spring to an anchor on the surface (the tangential part of a god-object: Zilles and Salisbury, A
 constraint-based god-object method for haptic display, 1995). The anchor stays while the spring's force is
-within the friction cone, and is dragged along when it is not; so a hand at rest feels a constant force, where
+within the friction cone, and is dragged along beyond; so a hand at rest feels a constant force, where
 a law on the sign of the velocity would chatter.
 """
 
@@ -18,17 +18,17 @@ from schemas.plain_sum import plain_sum
 __all__ = ["DEAD_RECKONING", "Renderer"]
 
 DEAD_RECKONING = 0.05
-"""A surface moves on with its velocity for at most this time (s) after its model arrived."""
+"""Longest motion of a surface with constant velocity after the arrival of a model, s."""
 
 
 class Renderer:
     """Renders contact models.
 
-    Stiffness and damping are bounded in sum, so that four planes in one place are no stiffer than one.
+    Stiffness and damping are bounded in sum: four planes in one place are no stiffer than a single plane.
     """
 
     def __init__(self, stiffness: float, damping: float) -> None:
-        """`stiffness` (N/m) and `damping` (N s/m): the largest that may be rendered."""
+        """`stiffness` (N/m) and `damping` (N s/m): the largest to be rendered."""
         self._stiffness, self._damping = stiffness, damping
         self._anchor: Vector3 | None = None
 
@@ -40,8 +40,8 @@ class Renderer:
         """Return the force (N) on the hand, in the base frame.
 
         Args:
-            planes: of the contact model.
-            age: time since it arrived, s.
+            planes: planes of the contact model.
+            age: time since the model's arrival, s.
             position: of the hand, m.
             velocity: of the hand, m/s.
         """
@@ -105,7 +105,7 @@ _Rubbing = tuple[float, float, float, float, float, float]
 
 
 def _across(v: Vector3, nx: float, ny: float, nz: float) -> Vector3:
-    """Return the part of `v` in the plane with that normal."""
+    """Return the part of `v` in the plane with this normal."""
     along = v[0] * nx + v[1] * ny + v[2] * nz
     return v[0] - along * nx, v[1] - along * ny, v[2] - along * nz
 
@@ -115,18 +115,18 @@ def _difference(v: Vector3, w: Vector3) -> Vector3:
 
 
 def _at_most(v: Vector3, most: float) -> Vector3:
-    """Return `v`, shortened to length `most` if it is longer."""
+    """Return `v`, shortened to length `most` if longer."""
     length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     return (v[0] * most / length, v[1] * most / length, v[2] * most / length) if length > most else v
 
 
 def _share(planes: list[Plane], index: int, most: float) -> float:
-    """Return the factor for the coefficients number `index` by which their sum stays within `most`.
+    """Return the factor for the coefficients number `index` that keeps their sum within `most`.
 
     Each coefficient is at most `most`, and the bound holds in every direction.
 
     The sum of c n n^T over planes has no eigenvalue above the largest row sum of sqrt(c_i c_j) |n_i . n_j|
-    (Gershgorin, on the Gram matrix); a plane with friction acts in every direction, so its coefficient is
+    (Gershgorin, on the Gram matrix); a plane with friction acts in every direction, so the coefficient is
     added in full.
     """
     if len(planes) == 1:

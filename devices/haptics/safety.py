@@ -1,9 +1,9 @@
-"""The chain that every force passes before it reaches a hand, tick by tick.
+"""The chain of limits for every force on a hand, tick by tick.
 
-In this order: numbers that are not finite, silence of the simulation, dead-man and calibration, speed of
+In this order: numbers not finite, silence of the simulation, dead-man and calibration, speed of
 the hand, waiting for a small force, norm, ramp, slew. (Stiffness and damping are bounded where planes are
-rendered.) Every violation gives zero force at once, after which the force rises slowly. The slew is last,
-so its bound holds for the force that the hand feels.
+rendered.) Every violation gives zero force at once; then the force rises slowly. The slew is last,
+so the bound holds for the force felt by the hand.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class Condition(Enum):
 
 
 class SafetyChain:
-    """Keeps the force of one stylus within its limits.
+    """Keeps the force of a stylus within the limits.
 
     After every tick |F| <= limits.force, and F lies within `limits.slew` of the segment between zero and the
     force of the tick before: so |F| grows by `slew` at most, nor does a turn add more in any new direction.
-    It is zero in the same tick in which a condition forbids it.
+    The force is zero in the same tick as a forbidding condition.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -44,14 +44,14 @@ class SafetyChain:
         self.reset()
 
     def reset(self) -> None:
-        """Set the force to zero; it rises again as at the start.
+        """Set the force to zero, to rise again as at the start.
 
-        For a device lost, and for the last frame before it stops.
+        For a lost device, and for the last frame before a stop.
         """
         self._off(Condition.OFF)
 
     def soften(self, size: float) -> None:
-        """Let the force of a suddenly new contact rise by the ramp, unless its size (N) is small."""
+        """Let the force of a suddenly new contact rise by the ramp, unless the size (N) is small."""
         limits = self._limits
         if size > limits.calm_force:
             self._gain = min(self._gain, limits.calm_force / min(size, limits.force))
@@ -72,8 +72,8 @@ class SafetyChain:
             wanted: force of the contact, N.
             velocity: of the hand, m/s.
             age: time since a contact model arrived, s; infinite if none did.
-            permitted: whether the dead-man is held; only its release ends the lock of a hand that was too
-                fast.
+            permitted: whether the dead-man is held; only a release ends the lock after too fast a
+                hand.
             dt: time since the last tick, s.
             ready: whether the device is calibrated and has no fault.
         """
@@ -126,7 +126,7 @@ def _slewed(last: Vector3, wanted: Vector3, slew: float) -> Vector3:
 
     Let p be the segment's point nearest to `wanted`; the answer is p, moved towards `wanted` by at most
     `slew`: |answer| <= |p| + slew <= |last| + slew. As p and `wanted` are no longer than the norm's limit,
-    nor is anything between them.
+    nor is anything between.
     """
     lx, ly, lz = last
     wx, wy, wz = wanted

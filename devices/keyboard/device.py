@@ -1,6 +1,6 @@
 """Keyboard or gamepad in place of a stylus or a headset (kind `keyboard`).
 
-pygame-ce gives window, keys and gamepads on every desktop. The window is opened in the thread that reads.
+pygame-ce gives window, keys and gamepads on every desktop. The window is opened in the reading thread.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ __all__ = ["Keyboard", "KeyboardParams"]
 
 
 class KeyboardParams(VirtualHandParams):
-    """What the keys move, and how fast it moves."""
+    """Frame moved by the keys, and speeds."""
 
 
 class Keyboard(VirtualHand):
-    """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like one stylus.
+    """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like a stylus.
 
-    While its window is not in focus, only the last. The moved frame starts at the origin of
+    While the window is not in focus, only the diagnostics. The moved frame starts at the origin of
     `<participant>_base`, pointing level away from the user; devices.keyboard.keys has the keys.
     """
 
@@ -55,7 +55,7 @@ class Keyboard(VirtualHand):
         self._reset()
 
     def read(self, t: int) -> list[Sample]:
-        """Return the present pose and twist, the buttons and the diagnosis if they have changed."""
+        """Return the present pose and twist, and changed buttons and diagnoses."""
         if not self._timer.due(t):
             return []
         try:

@@ -1,4 +1,4 @@
-"""The first gamepad, if there is one: sticks and buttons as SDL maps those of any maker to one layout."""
+"""The first gamepad, if present: sticks and buttons in SDL's common layout for all makers."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _DEAD_ZONE = 7849 / _FULL
 
 
 class Gamepad:
-    """Reads the gamepad, which may be plugged in and out at any time."""
+    """Reads the gamepad; plugging in and out is allowed at any time."""
 
     def __init__(self) -> None:
-        """Look for a gamepad. pygame's display must be initialised, because SDL needs its events."""
+        """Look for a gamepad. pygame's display must be initialised: SDL needs the display's events."""
         controller.init()
         self._pad: controller.Controller | None = None
         self.find()
 
     def find(self) -> None:
-        """Look for a gamepad again, after one was plugged in or out."""
+        """Look for a gamepad again, after plugging in or out."""
         pads = (number for number in range(controller.get_count()) if controller.is_controller(number))
         first = next(pads, None)
         self._pad = None if first is None else controller.Controller(first)
@@ -40,7 +40,7 @@ class Gamepad:
         controller.quit()
 
     def wish(self) -> Wish:
-        """Return what sticks and buttons ask for; nothing without a gamepad."""
+        """Return the command of sticks and buttons; no motion without a gamepad."""
         if self._pad is None or not self._pad.attached():
             return NOTHING
         close = max(0.0, self._axis(pygame.CONTROLLER_AXIS_TRIGGERRIGHT))
@@ -61,7 +61,7 @@ class Gamepad:
         )
 
     def _axis(self, axis: int) -> float:
-        """Return a share from -1 to 1 that grows from 0 at the edge of the dead zone."""
+        """Return a share from -1 to 1, growing from 0 at the edge of the dead zone."""
         assert self._pad is not None
         value = self._pad.get_axis(axis) / _FULL
         beyond = max(0.0, min(abs(value), 1.0) - _DEAD_ZONE) / (1.0 - _DEAD_ZONE)

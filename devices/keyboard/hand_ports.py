@@ -1,4 +1,4 @@
-"""The ports of a virtual hand, led by keys, by a gamepad or from a page: those of one stylus or head."""
+"""The ports of a virtual hand, led by keys, by a gamepad or from a page, as of a single stylus or head."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The keys, and what each commands."""
+"""The keys and their commands."""
 
 from __future__ import annotations
 

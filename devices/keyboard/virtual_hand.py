@@ -1,4 +1,4 @@
-"""A hand that something other than a person's arm moves: what keys, gamepads and pages have in common."""
+"""A hand without a person's arm: the common part of keys, gamepads and pages."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class VirtualHandParams(Params):
 
 
 class VirtualHand(Device):
-    """Ports, stylus and timer of a virtual hand; a kind reads the commands to it."""
+    """Ports, stylus and timer of a virtual hand; a kind reads the commands to the hand."""
 
     longest_pause_ns: ClassVar[int]
-    """After a longer pause between reads the stylus moves for this time only: it must not leap."""
+    """Longest motion of the stylus after a pause between reads, ns: the stylus must not leap."""
 
     def __init__(self, name: str, params: VirtualHandParams) -> None:
         super().__init__(name, params)
@@ -68,7 +68,7 @@ class VirtualHand(Device):
         return elapsed_ns * 1e-9
 
     def _press(self, t: int, wish: Wish) -> list[Sample]:
-        """Return the sample of the buttons if they have changed."""
+        """Return the sample of changed buttons."""
         pressed = wish.dead_man, wish.jaw
         if pressed == self._pressed:
             return []

@@ -1,4 +1,4 @@
-"""A virtual stylus: it moves at the speed that keys and sticks command, and stays where they leave it."""
+"""A virtual stylus, moved at the speed commanded by keys and sticks, and at rest without a command."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from schemas.vectors import Vector
 __all__ = ["NOTHING", "VirtualStylus", "Wish"]
 
 _LEVEL = rotation.from_matrix(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
-"""Pointing level away from the user: its z ahead, its x to the right, its y down; in axes of REP 103."""
+"""Orientation level away from the user: z ahead, x to the right, y down; in axes of REP 103."""
 _GRIPPER_SPEED = 1.0
 """1/s; ours: from open to closed in the time of an unhurried hand."""
 
@@ -26,7 +26,8 @@ class Wish:
     linear: Vector3 = (0.0, 0.0, 0.0)
     """Ahead, left, up."""
     angular: Vector3 = (0.0, 0.0, 0.0)
-    """About the stylus' own axes: x (the point moves up), y (it moves right), z (as a screw going in)."""
+    """Angular shares about the stylus' own axes: x (the point moves up), y (right), z (as a screw going in).
+    """
     gripper: float = 0.0
     """1 opens, -1 closes."""
     dead_man: bool = False
@@ -57,7 +58,7 @@ def _limited(share: Vector3, speed: float) -> Vector:
 
 
 class VirtualStylus:
-    """Pose and twist in its base frame (x ahead, y left, z up), and how far its gripper is open."""
+    """Pose and twist in the base frame (x ahead, y left, z up), and opening of the gripper."""
 
     def __init__(
         self, speed: float, turn_speed: float, stands_for: Literal["stylus", "head"] = "stylus"
@@ -67,7 +68,7 @@ class VirtualStylus:
         Args:
             speed: largest velocity, m/s.
             turn_speed: largest angular velocity, rad/s.
-            stands_for: whose axes the moved frame has; a head's are x ahead, y left, z up.
+            stands_for: object with the moved frame's axes; a head's are x ahead, y left, z up.
         """
         self._speed, self._turn_speed = speed, turn_speed
         self._axes = np.array([0.0, 0.0, 0.0, 1.0]) if stands_for == "stylus" else rotation.conjugate(_LEVEL)
@@ -91,7 +92,7 @@ class VirtualStylus:
         )
 
     def follow(self, position: Vector3, orientation: Quaternion, gripper: float, dt: float) -> None:
-        """Move for `dt` seconds towards a tracked frame (x ahead, y left, z up), at most at its speed."""
+        """Move for `dt` seconds towards a tracked frame (x ahead, y left, z up), within the speed limits."""
         if dt <= 0.0:
             return
         goal = rotation.product(np.array(orientation), _LEVEL)

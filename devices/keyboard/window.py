@@ -1,4 +1,4 @@
-"""The small window that reads the keys and shows them."""
+"""The small window for reading and showing the keys."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _UNSEEN = {"offscreen", "dummy"}
 
 
 class Window:
-    """For one thread only, as some systems demand."""
+    """The window, for a single thread, as some systems demand."""
 
     def __init__(self, title: str) -> None:
         """Open the window.
@@ -70,7 +70,7 @@ class Window:
         return wish_of(self._pressed) + self._gamepad.wish() if self.focused else Wish()
 
     def _handle(self, event: pygame.Event) -> None:
-        """Handle one event; a request to close the window is ignored, as the session ends the device."""
+        """Handle an event; a request to close the window is ignored, as the session ends the device."""
         if event.type == pygame.KEYDOWN:
             self._pressed.add(pygame.key.name(event.key))
         elif event.type == pygame.KEYUP:

@@ -1,9 +1,9 @@
-"""The C interface of LibOVR 1.32: layouts, functions and values of OVR_CAPI.h that a head's pose needs.
+"""The C interface of LibOVR 1.32: layouts, functions and values of OVR_CAPI.h for a head's pose.
 
-The library is part of the Oculus (Meta Quest Link) application of Windows, is loaded from where that has put
-it, and is 64-bit. What the SDK's own loader adds is done here: the flag RequestVersion and the minor version,
-by which the library chooses the layouts. Those whose size a compiler has shown are asserted below, with
-8-byte alignment on every platform. Convention cdecl.
+The library is part of the Oculus (Meta Quest Link) application of Windows, is loaded from the application's
+place, and is 64-bit. The additions of the SDK's own loader are made here: the flag RequestVersion and the
+minor version, for the library's choice of layouts. Layouts of a size shown by a compiler are asserted below,
+with 8-byte alignment on every platform. Convention cdecl.
 """
 
 from __future__ import annotations
@@ -179,19 +179,21 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
 }
 
 Api = Any
-"""The loaded library: its functions by name, with their types set."""
+"""The loaded library: functions by name, with types set."""
 
 
 def default_library() -> str:
-    """Return the name by which the SDK's own loader looks for the library."""
+    """Return the library's name as used by the SDK's own loader."""
     return "LibOVRRT64_1.dll" if sys.platform == "win32" else "libOVRRT64.so.1"
 
 
 @cache
 def load(library: str) -> Api:
-    """Return the library at this path, or of this name in the system's search path; a process loads it once.
+    """Return the library at this path, or of this name in the system's search path.
 
-    Raises DeviceError if it cannot be loaded or is another one.
+    A process loads a library once.
+
+    Raises DeviceError for another library, or if loading fails.
     """
     try:
         api = ctypes.CDLL(library, winmode=0)  # 0: PATH, too, is searched, as the SDK's loader does
@@ -204,7 +206,7 @@ def load(library: str) -> Api:
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether this machine has the library, its version, and the remedy: for `trocar doctor`."""
+    """Return whether this machine has the library, the version, and the remedy: for `trocar doctor`."""
     remedy = "install the Oculus (Meta Quest Link) application (Windows)"
     try:
         return (

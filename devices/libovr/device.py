@@ -1,4 +1,4 @@
-"""A headset of Oculus (kind `libovr`): a client that is invisible to the wearer and reads poses only."""
+"""A headset of Oculus (kind `libovr`): a client invisible to the wearer, reading poses only."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["LibOvr", "LibOvrParams"]
 
 
 class LibOvrParams(HeadsetParams):
-    """Where the library is, and what is read."""
+    """Path of the library, and poses to read."""
 
     native_code = ("library",)
     library: Annotated[
@@ -54,14 +54,14 @@ class LibOvr(Headset):
     params: LibOvrParams
 
     def open(self, directory: Path) -> None:
-        """Load the library if its path is given. Raises DeviceError if that is not possible."""
+        """Load the library if a path is given. Raises DeviceError on failure."""
         super().open(directory)
         if self.params.library:
             ovr.load(str(directory / self.params.library))
         self._library = str(directory / self.params.library) if self.params.library else ovr.default_library()
 
     def connect(self) -> _Session:
-        """Initialise the runtime and make a session. Raises DeviceError if it or the headset is not there."""
+        """Initialise the runtime and make a session. Raises DeviceError without runtime or headset."""
         try:
             library = ovr.load(self._library)
         except DeviceError as error:

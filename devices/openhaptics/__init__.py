@@ -1,1 +1,1 @@
-"""Haptic styluses on OpenHaptics: HDAPI, its driver in the servo process, and the device."""
+"""Haptic styluses on OpenHaptics: HDAPI, the driver in the servo process, and the device."""

@@ -1,4 +1,4 @@
-"""HDAPI as a driver of the servo process: frames, calibration and errors of its styluses."""
+"""HDAPI as a driver of the servo process: frames, calibration and errors of the styluses."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ __all__ = ["HdapiDriver"]
 
 _CALIBRATED = Calibration.OK.value
 _CONFIGURATION = "/usr/share/3DSystems"
-"""The Linux driver needs to know the directory of its devices' configuration and calibration (TouchDriver
+"""The Linux driver needs to know the directory of the devices' configuration and calibration (TouchDriver
 2019.2.15).
 """
 
 
 class HdapiDriver(Driver):
-    """All devices of HDAPI. There is one scheduler thread; a frame makes a device the current device."""
+    """All devices of HDAPI. There is a single scheduler thread; a frame makes a device the current device."""
 
     def __init__(self, library: str) -> None:
         """Load the library. Raises DeviceError if the file is no HDAPI."""
@@ -80,12 +80,12 @@ class HdapiDriver(Driver):
         self._devices[handle].write(force)
 
     def release(self, handle: int) -> None:
-        """Do one frame without force."""
+        """Do a frame without force."""
         self.hd.hdBeginFrame(handle)
         self._devices[handle].write(ZERO)
 
     def errors(self) -> Sequence[DriverError]:
-        """Return the errors of this tick: first those of the calibration, then HDAPI's stack."""
+        """Return the errors of this tick: first the calibration's, then HDAPI's stack."""
         found = [error for device in self._devices.values() for error in device.pop_errors()]
         found += errors(self.hd)
         return [DriverError(code, handle, _phase(code)) for code, handle in found]
@@ -172,12 +172,12 @@ class _Device:
         self._hd.hdEndFrame(self._handle)
 
     def pop_errors(self) -> list[tuple[int, int]]:
-        """Return the errors (code, handle) of this tick from before the calibration, and forget them."""
+        """Return the errors (code, handle) of this tick from before the calibration, once each."""
         found, self._errors = self._errors, []
         return found
 
     def _calibrate(self) -> None:
-        """Check the calibration, and update it where possible; keep the errors of HDAPI from before.
+        """Check the calibration, and update where possible; keep the errors of HDAPI from before.
 
         Force output is enabled only while the stylus is calibrated.
         """

@@ -1,9 +1,9 @@
-"""HDAPI, the C interface of 3D Systems' OpenHaptics 3: functions, values and errors that a stylus needs.
+"""HDAPI, the C interface of 3D Systems' OpenHaptics 3: functions, values and errors for a stylus.
 
-They are from its public reference. The library is proprietary, comes with the driver or the SDK, and is
-loaded from where these install it. It needs a program of its own word size: the driver's hd.dll is 64-bit.
-A library unloaded does not load again (CHAI3D, CPhantomDevices.cpp): a process loads it once, and
-a new process is how to recover.
+The source is the public reference. The library is proprietary, comes with the driver or the SDK, and is
+loaded from the installed place. Library and program need the same word size: the driver's hd.dll is 64-bit.
+An unloaded library does not load again (CHAI3D, CPhantomDevices.cpp): a process loads the library once, and
+a new process is the way to recover.
 """
 
 from __future__ import annotations
@@ -47,8 +47,7 @@ PRIORITY_MAX = 65535
 SCHEDULER_HERTZ = 1000
 
 PLACEHOLDER_MM = (0.0, -110.0, -35.0)
-"""Position, with joint angles of exactly 0, that a Touch gives to a process that does not own it
-(hopezzzz/3dtouch, README).
+"""Position, with joint angles of exactly 0, from a Touch owned by another process (hopezzzz/3dtouch, README).
 """
 
 
@@ -69,7 +68,7 @@ class Get:
     SERIAL_NUMBER = 0x2504
     CALIBRATION_STYLE = 0x2555
     MAX_STIFFNESS = 0x2602
-    """N/mm (the reference says 0 to 1; its guide and devices in use have N/mm)."""
+    """Largest stiffness, N/mm (the reference says 0 to 1; the guide and devices in use have N/mm)."""
     MAX_FORCE = 0x2603
     MAX_DAMPING = 0x2609
     """N s/mm."""
@@ -85,7 +84,7 @@ class Calibration(IntEnum):
 
 
 class Style(IntEnum):
-    """Bits of HD_CALIBRATION_STYLE, by preference: a Premium that offers two refuses the encoder reset."""
+    """Bits of HD_CALIBRATION_STYLE, by preference: a Premium with two styles refuses the encoder reset."""
 
     AUTO = 2
     INKWELL = 4
@@ -120,7 +119,7 @@ class Code(IntEnum):
 
     @staticmethod
     def is_fault(code: int) -> bool:
-        """Whether the device has failed, and its use must end."""
+        """Whether the device has failed, and the use must end."""
         return code & 0xF00 == 0x300
 
     @staticmethod
@@ -130,13 +129,13 @@ class Code(IntEnum):
 
     @staticmethod
     def text(code: int) -> str:
-        """Return the name of a code, as the reference has it, and its number."""
+        """Return the name of a code, as in the reference, and the number."""
         known = code in Code._value2member_map_
         return f"HD_{Code(code).name} (0x{code:04x})" if known else f"HDAPI error 0x{code:04x}"
 
 
 class ErrorInfo(Structure):
-    """HDErrorInfo, which hdGetError returns by value."""
+    """HDErrorInfo, returned by hdGetError by value."""
 
     _fields_ = (("errorCode", c_uint), ("internalErrorCode", c_int), ("hHD", c_uint))
 
@@ -176,17 +175,17 @@ Linux.
 """
 
 _SWITCHES = "hdGetBooleanv"
-"""Needed only for a dead-man that is a switch."""
+"""Function needed only for a switch as dead-man."""
 
 _MOST_ERRORS = 64
 """Taken at a time, to bound the duration of a callback."""
 
 Hdapi = Any
-"""The loaded library: its functions by name, with their types set."""
+"""The loaded library: functions by name, with types set."""
 
 
 def find(library: Path | None) -> Path:
-    """Return the path of the library: `library`, or where the installers of 3D Systems put it.
+    """Return the path of the library: `library`, or the place of the installers of 3D Systems.
 
     Raises DeviceError naming the places looked at.
     """
@@ -236,7 +235,7 @@ def _places() -> Iterator[Path]:
 
 
 def load(path: Path) -> Hdapi:
-    """Load the library. Raises DeviceError if it cannot be loaded or is another one."""
+    """Load the library. Raises DeviceError for another library, or if loading fails."""
     try:
         if sys.platform == "win32":
             os.add_dll_directory(str(path.parent))  # hd.dll needs its siblings

@@ -11,23 +11,23 @@ from devices.vendor_axes import Vector3, vector
 __all__ = ["Tip"]
 
 _SMOOTHING = 0.01
-"""Time constant with which the angular velocity is smoothed, s: a Touch's gimbal has potentiometers, and a
+"""Time constant for smoothing the angular velocity, s: a Touch's gimbal has potentiometers, and a
 hand turns no faster than some Hz.
 """
 _UNIT = 0.1
-"""How far the squared length of an axis may be from 1: HDAPI's rotations have small errors, other matrices
-large ones.
+"""Tolerance of an axis' squared length of 1: HDAPI's rotations have small errors, any other matrix large
+errors.
 """
 
 
 class Tip:
     """Pose and twist of a stylus' tip.
 
-    Its own frame has z out of the point, x to the right and y down when it points level away from the user.
+    The tip's frame has z out of the point, x to the right and y down when pointing level away from the user.
     """
 
     def __init__(self, offset: float) -> None:
-        """`offset`: from the centre of the gimbal, whose pose HDAPI gives, to the tip, m."""
+        """`offset`: from the centre of the gimbal, the point of HDAPI's poses, to the tip, m."""
         self._offset = offset
         self._time = -inf
         self.position: Vector3 = ZERO
@@ -68,8 +68,8 @@ class Tip:
         """Return the smoothed angular velocity.
 
         The sum of axis x axis' over the three axes of a rotating frame is 2 sin(angle) along the axis of
-        rotation. HDAPI has an angular velocity, but does not document its frame, and a driver in use
-        (Touch, ROS) notes that it does not work well.
+        rotation. HDAPI has an angular velocity, but does not document the frame, and a driver in use
+        (Touch, ROS) notes poor results.
         """
         dt, self._time = now - self._time, now
         if not 0.0 < dt < inf:

@@ -1,4 +1,4 @@
-"""Parameters of the haptic styluses of one host."""
+"""Parameters of the haptic styluses of a host."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ __all__ = ["StylusParams", "TouchParams"]
 
 
 class StylusParams(ServoStylusParams):
-    """A stylus."""
+    """A stylus on OpenHaptics."""
 
     tip_offset: Annotated[
         Length, Field(ge=0.0, le=0.2, description="from the centre of the gimbal to the tip")
     ] = 0.039
-    """The default is that of sawSensablePhantom (mtsSensableHD.cpp)."""
+    """Offset of the tip; the default is from sawSensablePhantom (mtsSensableHD.cpp)."""
 
 
 class TouchParams(Params):
-    """The styluses of one host: one process of one host may use OpenHaptics."""
+    """The styluses of a host: a single process per host may use OpenHaptics."""
 
     native_code = ("library",)
     library: Annotated[

@@ -1,6 +1,6 @@
-"""The runtime's time, which OpenXR gives only by converting a clock of the operating system.
+"""The runtime's time, given by OpenXR only through conversion of a clock of the operating system.
 
-Each operating system has an extension of its own for that.
+Each operating system has a separate extension for the conversion.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ def _now() -> Any:
 
 
 def runtime_clock(instance: xr.Instance) -> Callable[[], int]:
-    """Return a function that returns the present time as an XrTime, ns.
+    """Return a function for the present time as an XrTime, ns.
 
     The instance must have been created with `EXTENSION`. The function raises TimeInvalidError if the
-    runtime does not know the time yet, and DeviceError if it fails.
+    runtime does not know the time yet, and DeviceError on failure.
     """
     prototype = CFUNCTYPE(c_int32, c_void_p, c_void_p, POINTER(c_int64))
     convert = prototype(cast(xr.get_instance_proc_addr(instance, _FUNCTION), c_void_p).value or 0)

@@ -16,7 +16,7 @@ __all__ = ["OpenXr", "OpenXrParams", "check"]
 
 
 class OpenXrParams(HeadsetParams):
-    """What is read; the system chooses the runtime (on Linux also XR_RUNTIME_JSON)."""
+    """Poses to read; the system chooses the runtime (on Linux also XR_RUNTIME_JSON)."""
 
     origin: Annotated[
         Literal["eye", "floor"],
@@ -45,12 +45,12 @@ class OpenXr(Headset):
 
 
 def _silence_loader() -> None:
-    """Keep the loader from printing at every attempt what the diagnosis reports once."""
+    """Keep the loader from printing at every attempt; the diagnosis reports a failure once."""
     os.environ.setdefault("XR_LOADER_DEBUG", "none")
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether this machine has a usable runtime, which, and the remedy, for `trocar doctor`."""
+    """Return whether this machine has a usable runtime, its name, and the remedy, for `trocar doctor`."""
     if find_spec("xr") is None:
         return False, "pyopenxr is not installed", "pip install 'trocar[openxr]'"
     from devices.openxr.runtime import lacking, offered

@@ -17,19 +17,21 @@ from schemas.errors import DeviceError
 __all__ = ["ORIGINS", "OpenXrRuntime", "lacking", "offered"]
 
 HEADLESS, PRESENCE = "XR_MND_headless", "XR_EXT_user_presence"
-"""A session without graphics, required; events about whether the headset is worn, optional."""
+"""Extensions: a session without graphics, required; events about wearing the headset, optional."""
 ORIGINS = {"eye": xr.ReferenceSpaceType.LOCAL, "floor": xr.ReferenceSpaceType.STAGE}
 _VALID = xr.SpaceLocationFlags.ORIENTATION_VALID_BIT | xr.SpaceLocationFlags.POSITION_VALID_BIT
-"""Not those that say `tracked`: some runtimes, among them those of simulated headsets, never set that of the
-position.
+"""Flags of a valid pose, without `tracked`: some runtimes, such as of simulated headsets, never set `tracked`
+for the position.
 """
 _Event = TypeVar("_Event", bound=Structure)
 
 
 def offered() -> set[str]:
-    """Return the names of the extensions of the system's active runtime, which this loads and does not start.
+    """Return the names of the extensions of the system's active runtime.
 
-    Raises DeviceError where there is none.
+    The runtime is loaded, not started.
+
+    Raises DeviceError without a runtime.
     """
     try:
         return {
@@ -40,7 +42,7 @@ def offered() -> set[str]:
 
 
 def lacking(found: set[str]) -> str:
-    """Return what is missing of a runtime that offers `found`; empty if it can give the head's pose."""
+    """Return the missing parts of a runtime with extensions `found`; empty if enough for the head's pose."""
     missing = [name for name in (HEADLESS, clock.EXTENSION) if name not in found]
     return (
         f"this OpenXR runtime does not offer {' and '.join(missing)}, without which it cannot give a"
@@ -51,10 +53,10 @@ def lacking(found: set[str]) -> str:
 
 
 class OpenXrRuntime:
-    """An instance, its session and two spaces: the origin and the head."""
+    """An instance, a session and two spaces: the origin and the head."""
 
     def __init__(self, origin: str) -> None:
-        """Connect to the runtime that the system has chosen.
+        """Connect to the runtime chosen by the system.
 
         Raises DeviceError if there is none, or no headset.
         """
@@ -162,7 +164,7 @@ class OpenXrRuntime:
                 raise DeviceError("the OpenXR runtime ends; start it again")
 
     def _change_to(self, state: xr.SessionState) -> None:
-        """Handle a change of the session's state; in states not named here it continues."""
+        """Handle a change of the session's state; in states not named here the session continues."""
         assert self._session is not None
         if state == xr.SessionState.READY:
             xr.begin_session(self._session, xr.SessionBeginInfo())
@@ -176,7 +178,7 @@ class OpenXrRuntime:
             )
 
     def close(self) -> None:
-        """Destroy session and instance, as far as they still exist."""
+        """Destroy session and instance, as far as still existing."""
         with suppress(xr.exception.XrException):
             if self._session is not None:
                 xr.destroy_session(self._session)

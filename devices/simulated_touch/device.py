@@ -1,6 +1,6 @@
 """Kind `simulated-touch`: a haptic stylus and a hand in simulated time.
 
-Ports, renderer and safety chain at 1 kHz are those of a real stylus.
+Ports, renderer and safety chain at 1 kHz are the same as with a real stylus.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _TICK_NS = 1_000_000
 class SimulatedTouch(Device):
     """Styluses in simulated hands, each with the limits of a Touch.
 
-    A scenario may have the kind `touch` in its place.
+    A scenario may have the kind `touch` instead.
     """
 
     params_model: ClassVar[type[Params]] = SimulatedTouchParams
@@ -92,7 +92,7 @@ def _diagnosis(participant: str, stylus: str) -> Diagnosis:
 
 
 class _Stylus:
-    """A stylus: at every tick the force follows from the hand's position, and the hand moves under it."""
+    """A stylus: at every tick a force follows from the hand's position, and the force moves the hand."""
 
     def __init__(
         self, participant: str, stylus: str, params: SimulatedStylusParams, ports: StylusPorts
@@ -117,7 +117,7 @@ class _Stylus:
         self._condition: Condition | None = None
 
     def receive(self, model: ContactModel) -> None:
-        """Keep a contact model until the tick at which it was written, the time of the next `read`."""
+        """Keep a contact model until the tick of the writing, the time of the next `read`."""
         self._written, self._written_ns = (planes_of(model), model.header.stamp.ns), None
 
     def read(self, t: int) -> list[Sample]:
@@ -140,7 +140,7 @@ class _Stylus:
         ]
 
     def _tick(self) -> list[Sample]:
-        """Advance to the next tick, and compute the force that holds from there."""
+        """Advance to the next tick, and compute the force from there on."""
         time_ns = self._ticks * _TICK_NS
         now = time_ns * 1e-9
         if self._ticks:

@@ -11,14 +11,14 @@ __all__ = ["Hand"]
 
 
 class Hand:
-    """Follows the exact solution of its differential equation while force and target are held for a tick.
+    """A hand moved by the exact solution of a differential equation, with force and target held for a tick.
 
-    The exact motion matters: a force that is held while the hand moves is what makes sampled walls active,
-    and a step of semi-implicit Euler would hide just that.
+    The exact motion matters: a force held during the hand's motion makes sampled walls active, and a step of
+    semi-implicit Euler would hide just this effect.
     """
 
     def __init__(self, mass: float, stiffness: float, damping: float, tick: float, position: Vector3) -> None:
-        """Start at rest at `position` (m). Mass (kg), grip (N/m, N s/m), and the time (s) of one `move`."""
+        """Start at rest at `position` (m). Mass (kg), grip (N/m, N s/m), and the time (s) of a `move`."""
         self.position, self.velocity = position, ZERO
         self._stiffness, self._damping = stiffness, damping
         # m e'' + c e' + k e = 0 from e, v over one tick: e^(-a t) [[C + a S, S], [-(k/m) S, C - a S]], a =

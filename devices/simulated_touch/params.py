@@ -1,4 +1,4 @@
-"""Parameters of simulated styluses and of the hands that hold them."""
+"""Parameters of simulated styluses and of the hands at the styluses."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from schemas.quantity import Damping, Duration, Length, Mass, Stiffness
 __all__ = ["LEVEL", "HandParams", "SimulatedStylusParams", "SimulatedTouchParams", "Waypoint"]
 
 LEVEL = (-0.5, 0.5, -0.5, 0.5)
-"""Orientation (x, y, z, w) of a stylus that points level away from the user: its z along x of the base frame,
-its x along -y, its y along -z.
+"""Orientation (x, y, z, w) of a stylus pointing level away from the user: z along x of the base frame,
+x along -y, y along -z.
 """
 
 
@@ -48,9 +48,9 @@ class Waypoint(Params):
 
 
 class HandParams(Params):
-    """A hand with the stylus: a mass that spring and damper pull to the target.
+    """A hand with the stylus: a mass pulled to the target by spring and damper.
 
-    The defaults are those of the study that chose the limits of the force (docs/decisions/0022).
+    The defaults are from the study of the limits of the force (docs/decisions/0022).
     """
 
     mass: Mass = Field(default=0.15, gt=0.0, description="of the stylus and what moves with it")
@@ -59,7 +59,7 @@ class HandParams(Params):
 
 
 class SimulatedStylusParams(Params):
-    """A stylus, the hand that holds it, and the limits of the force on that hand."""
+    """A stylus, the hand at the stylus, and the limits of the force on the hand."""
 
     path: Annotated[
         Annotated[tuple[Waypoint, ...], Tag("waypoints")] | Annotated[Path, Tag("recording")],
@@ -106,7 +106,7 @@ class SimulatedStylusParams(Params):
 
 
 class SimulatedTouchParams(Params):
-    """The styluses of one simulated device."""
+    """The styluses of a simulated device."""
 
     open_to_pages: ClassVar[bool] = True
 

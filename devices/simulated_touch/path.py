@@ -1,8 +1,8 @@
 """Targets of a simulated hand: on a path of waypoints, or of a recorded hand.
 
-Between two waypoints it moves as people reach: along a straight line, with the least jerk and at rest at both
-ends (Flash and Hogan, The coordination of arm movements, Journal of Neuroscience 5(7), 1985). Between two
-recorded poses it moves evenly. It rotates about one axis, with the same course in time.
+Between two waypoints the hand moves as people reach: along a straight line, with the least jerk and at rest
+at both ends (Flash and Hogan, The coordination of arm movements, Journal of Neuroscience 5(7), 1985). Between
+two recorded poses the hand moves evenly. The rotation is about a single axis, with the same course in time.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class _Press(NamedTuple):
 class HandPath:
     """A path in the stylus' base frame, m and rad, over time in s.
 
-    Before the time of the first stop the hand is at its pose, without a button.
+    Before the time of the first stop the hand is at the stop's pose, without a button.
     """
 
     def __init__(
@@ -52,12 +52,12 @@ class HandPath:
         presses: Sequence[_Press],
         course: Callable[[float], tuple[float, float]],
     ) -> None:
-        """`course`: share of the way between two stops, and its derivative, at a share of the time."""
+        """`course`: share of the way between two stops, and the derivative, at a share of the time."""
         self._stops, self._presses, self._course = stops, presses, course
         self._times = [stop.time for stop in stops]
         self._pressed_at = [press.time for press in presses]
         self._turning: tuple[_Stop, _Stop] | None = None
-        """The stops between which the hand rotates by `_turn`, a rotation vector (rad)."""
+        """Stops before and after the rotation by `_turn`, a rotation vector (rad)."""
         self._turn = np.zeros(3)
 
     def position(self, t: float) -> tuple[Vector3, Vector3]:
@@ -81,12 +81,12 @@ class HandPath:
         return (x, y, z, w), (wx, wy, wz)
 
     def buttons(self, t: float) -> _Buttons:
-        """Return which of the two buttons are held."""
+        """Return whether each of the two buttons is held."""
         index = bisect_right(self._pressed_at, t) - 1
         return self._presses[index].buttons if index >= 0 else _RELEASED
 
     def _between(self, t: float) -> tuple[_Stop, _Stop, float, float]:
-        """Return the stops before and after `t`, the share of the way that is done, and its rate (1/s)."""
+        """Return the stops before and after `t`, the share of the way done, and the share's rate (1/s)."""
         index = bisect_right(self._times, t) - 1
         if index < 0 or index == len(self._times) - 1:
             stop = self._stops[max(index, 0)]
@@ -111,10 +111,10 @@ def scripted(waypoints: Sequence[Waypoint]) -> HandPath:
 
 
 def recorded(file: Path, stylus: str, dead_man: int) -> HandPath:
-    """Return the path of the hand in a recording, from its first pose on.
+    """Return the path of the hand in a recording, from the first pose on.
 
     Without recorded buttons the hand holds the dead-man. Of several topics with poses (or with buttons) the
-    one of this stylus is used: `.../<stylus>/pose`. Raises RecordingError if there is none.
+    topic of this stylus is used: `.../<stylus>/pose`. Raises RecordingError if there is none.
     """
     bag = Bag(file)
     poses, joys = (
@@ -147,7 +147,7 @@ def recorded(file: Path, stylus: str, dead_man: int) -> HandPath:
 
 
 def _topic(bag: Bag, kind: str, end: str) -> str | None:
-    """Return the only topic of that type, or the only one of those that ends so."""
+    """Return the only topic of this type, or the only topic of this type and end."""
     found = [topic for topic, type_ in bag.topics.items() if type_ == kind]
     own = [topic for topic in found if f"/{topic}".endswith(f"/{end}")]
     return own[0] if len(own) == 1 else found[0] if len(found) == 1 else None

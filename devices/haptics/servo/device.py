@@ -30,21 +30,21 @@ from schemas.trocar_msgs import ContactModel
 __all__ = ["HapticDevice"]
 
 _SETTLING = 1.0
-"""Time without valid frames after which it is reported, s: the first frames never are valid."""
+"""Time without valid frames until the diagnosis says so, s: the first frames never are valid."""
 
 
 class HapticDevice(Device):
-    """The styluses of this machine; a kind states its driver and the parameters of each stylus.
+    """The styluses of this machine; a kind states the driver and the parameters of each stylus.
 
-    An absent, busy, uncalibrated or faulty stylus gives no pose, twist or force; the diagnosis says how to
-    mend that, and a stylus that works again is used at once.
+    An absent, busy, uncalibrated or faulty stylus gives no pose, twist or force; the diagnosis has the
+    remedy, and a stylus back at work is used at once.
     """
 
     driver: ClassVar[str]
-    """The class of the driver, `module:Class`; only the servo process imports it."""
+    """The class of the driver, `module:Class`; imported by the servo process alone."""
     words: ClassVar[diagnoses.Words] = diagnoses.Words()
     nominal: ClassVar[DeviceLimits] = TOUCH
-    """Limits for what a stylus does not state."""
+    """Limits in place of limits not stated by a stylus."""
     buttons: ClassVar[int] = 2
 
     def __init__(
@@ -54,9 +54,9 @@ class HapticDevice(Device):
 
         Args:
             name: the participant's name.
-            params: parameters.
+            params: parameters of the participant.
             styluses: parameters of each stylus.
-            max_age_ns: age at which a pose or twist is marked stale.
+            max_age_ns: age of a stale pose or twist.
         """
         super().__init__(name, params)
         self._stylus_params, self._max_age_ns = dict(styluses), max_age_ns
@@ -84,7 +84,7 @@ class HapticDevice(Device):
         self._supervisor.start(perf_counter())
 
     def driver_options(self, directory: Path) -> dict[str, Any]:  # noqa: ARG002
-        """Return the keyword arguments of the driver; `directory` is that of the scenario."""
+        """Return the keyword arguments of the driver; `directory`: of the scenario."""
         return {}
 
     def read(self, t: int) -> list[Sample]:
@@ -138,7 +138,7 @@ class HapticDevice(Device):
 
 
 class _Stylus:
-    """The samples of one stylus."""
+    """The samples of a stylus."""
 
     def __init__(self, device: HapticDevice, stylus: str, params: ServoStylusParams, max_age_ns: int) -> None:
         self._name, self._params = stylus, params
@@ -155,7 +155,7 @@ class _Stylus:
         self._settling: float | None = None
 
     def opened(self, process: ServoProcess, hardware: str, stated: dict[str, float]) -> None:
-        """Allow `process` to give force within the scenario's limits, unless one exceeds the device's.
+        """Allow `process` to give force within the scenario's limits, unless a limit exceeds the device's.
 
         The kind's nominal limit stands for a limit without a statement of the device.
         """
@@ -174,7 +174,7 @@ class _Stylus:
             self._refusal = str(error)
 
     def read(self, states: list[State], lost: Lost | None, offset_ns: int) -> list[Sample]:
-        """Return the samples of these states, in the clock that is `offset_ns` ahead of time.perf_counter."""
+        """Return the samples of these states, in the clock `offset_ns` ahead of time.perf_counter."""
         if lost is not None:
             diagnosis = (
                 diagnoses.FOUND

@@ -1,4 +1,4 @@
-"""Diagnoses of a stylus, for people: the condition, and what to do about it."""
+"""Diagnoses of a stylus, for people: the condition, and the remedy."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _CONDITIONS = tuple(Condition)
 
 
 class Words:
-    """A driver's numbers in words; a vendor overrides what it knows better."""
+    """A driver's numbers in words; a vendor overrides methods for better words."""
 
     def error(self, code: int) -> str:
         """Return an error code in words."""
         return f"error {code}"
 
     def warning(self, code: int) -> str:
-        """Return a warning in words, and what to do about it."""
+        """Return a warning in words, with the remedy."""
         return self.error(code)
 
     def calibration(self, style: int) -> str:  # noqa: ARG002
@@ -39,7 +39,7 @@ def lost(phase: Phase, error: str, cause: str, device: str | None) -> tuple[Leve
     Args:
         phase: ABSENT, BUSY or FAULT.
         error: the library's error in words, or empty.
-        cause: what else is known, or empty.
+        cause: further facts, or empty.
         device: name of the device in the vendor's configuration.
     """
     why = cause or error or "no cause is known"
@@ -62,7 +62,7 @@ def lost(phase: Phase, error: str, cause: str, device: str | None) -> tuple[Leve
 
 
 def present(state: State, words: Words, refusal: str) -> tuple[Level, str]:
-    """Return the diagnosis of an open stylus; `refusal`: why its limits were refused, or empty."""
+    """Return the diagnosis of an open stylus; `refusal`: why the limits were refused, or empty."""
     phase = Phase(state.phase)
     if phase is Phase.SETTLING:
         return Level.STALE, "it gives no valid frames; if that lasts, switch it off and on"

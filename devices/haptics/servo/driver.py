@@ -1,8 +1,8 @@
 """The interface between the servo process and a vendor's library.
 
-The servo process makes one driver for all styluses of a host, of the class named by the device. Each tick is
-`read`, then `write`, stylus after stylus, then `errors`. Watchdog, dead-man, clamp, slew and ramp are part of
-the servo, so no driver can leave a limit out.
+The servo process makes a single driver for all styluses of a host, of the class named by the device. Each
+tick is `read`, then `write`, stylus after stylus, then `errors`. Watchdog, dead-man, clamp, slew and ramp are
+part of the servo, so no driver can leave a limit out.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["Driver", "DriverError", "Opened", "Reading", "StylusSpec", "Unavaila
 
 @dataclass(frozen=True)
 class StylusSpec:
-    """A stylus as the servo process gets it."""
+    """A stylus as described to the servo process."""
 
     name: str
     device: str | None
@@ -30,10 +30,10 @@ class StylusSpec:
     dead_man: int | str
     """Index of a button, or `safety-switch`.
 
-    Not the inkwell's switch: a dropped stylus is out of it, too.
+    Not the inkwell's switch: a dropped stylus is out of the inkwell, too.
     """
     tip_offset: float
-    """Distance from the point whose pose the library gives to the tip, m."""
+    """Distance to the tip from the point of the library's poses, m."""
 
 
 class Opened(NamedTuple):
@@ -76,16 +76,16 @@ class Reading(NamedTuple):
     switch: bool = False
     """Whether the safety switch is held; False without a switch."""
     valid: bool = True
-    """Whether the pose is one."""
+    """Whether the pose is valid."""
     owned: bool = True
-    """False: these numbers stand in for those of a stylus that another program has."""
+    """False: another program has the stylus; these numbers are placeholders."""
     calibrated: bool = True
     style: int = 0
-    """The driver's number for the way in which an uncalibrated stylus is calibrated."""
+    """The driver's number for the way of calibrating an uncalibrated stylus."""
 
 
 class DriverError(NamedTuple):
-    """An error that the library reports."""
+    """An error reported by the library."""
 
     code: int
     handle: int
@@ -95,13 +95,13 @@ class DriverError(NamedTuple):
 
 
 class Driver(ABC):
-    """Styluses of one vendor. All methods but `open`, `start`, `stop` and `close` run in the servo loop."""
+    """Styluses of a vendor. All methods but `open`, `start`, `stop` and `close` run in the servo loop."""
 
     rate = 1000.0
     """Ticks per second of the default loop."""
 
     def __init__(self, **options: Any) -> None:
-        """Load the library; `options` are those of the device. Raises DeviceError if it cannot be loaded."""
+        """Load the library; `options`: of the device. Raises DeviceError if the library cannot be loaded."""
         self.options = options
         self._timed_loop: TimedLoop | None = None
 
@@ -111,7 +111,7 @@ class Driver(ABC):
 
     @abstractmethod
     def read(self, handle: int, now: float) -> Reading:
-        """Begin a tick at `now` (s of time.perf_counter) and return what the stylus measures."""
+        """Begin a tick at `now` (s of time.perf_counter) and return the stylus' measurements."""
 
     @abstractmethod
     def write(self, handle: int, force: Vector3) -> None:
@@ -126,7 +126,7 @@ class Driver(ABC):
         return ()
 
     def start(self, tick: Callable[[float], bool]) -> None:
-        """Call `tick` with the time (s of time.perf_counter) at `rate` until it is False; return at once."""
+        """Start calling `tick` with the time (s of time.perf_counter) at `rate`, until `tick` is False."""
         self._timed_loop = TimedLoop(self.rate, tick)
 
     def stop(self) -> None:

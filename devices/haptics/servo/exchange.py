@@ -1,8 +1,8 @@
-"""Records of doubles in shared memory between a servo process and its device, without locks.
+"""Records of doubles in shared memory between a servo process and the device, without locks.
 
-Each direction is a ring with one writer and one reader. A slot has a number, and a checksum over number and
-content, so a reader recognises a record under change, on any processor. A writer that ends half-way leaves
-the slots before intact: neither side ever waits. The memory has no name: on Linux the reading process
+Each direction is a ring with a single writer and a single reader. A slot has a number, and a checksum over
+number and content, so a reader recognises a record under change, on any processor. A writer's end half-way
+leaves the slots before intact: neither side ever waits. The memory has no name: on Linux the reading process
 inherits the file, on Windows the memory ends with the last handle.
 
 Behind the rings is a counter, the sign of life of the watcher.
@@ -42,8 +42,8 @@ _HEAD = struct.Struct("<QI4x")
 _COUNTER = 8
 
 MODEL_SLOTS, STATE_SLOTS = 2, 64
-"""Only the newest model counts. Of the states, which contain the buttons, none is lost for a reader that
-pauses for some hundredths of a second.
+"""Slots of the rings of models and states. Only the newest model counts. States contain the buttons; a reader
+may pause for some hundredths of a second without loss.
 """
 MOST_PLANES = 4
 MODEL_DOUBLES = 3 + MOST_PLANES * len(Plane._fields)
@@ -60,7 +60,7 @@ def model_doubles(planes: Sequence[Plane], stamp_ns: int, arrived: float) -> lis
 
 
 def planes_in(record: Sequence[float]) -> list[Plane]:
-    """Return the planes that `model_doubles` was given."""
+    """Return the planes in a record made by `model_doubles`."""
     width = len(Plane._fields)
     return [Plane(*record[3 + width * i : 3 + width * (i + 1)]) for i in range(int(record[2]))]
 
@@ -69,7 +69,7 @@ class State(NamedTuple):
     """A tick of a stylus, base frame, SI units."""
 
     time: float
-    """When the tick began, s of time.perf_counter, which all processes of a machine share."""
+    """Begin of the tick, s of time.perf_counter, shared by all processes of a machine."""
     phase: int
     """A `devices.haptics.servo.phase.Phase`."""
     code: int
@@ -104,13 +104,13 @@ class State(NamedTuple):
 
 
 def ring_size(slots: int, doubles: int) -> int:
-    """Return the bytes that a ring takes."""
+    """Return the size of a ring, bytes."""
     return _COUNTER + slots * (_HEAD.size + 8 * doubles)
 
 
 class _Ring:
     def __init__(self, memory: memoryview, slots: int, doubles: int) -> None:
-        """Use `memory`, `ring_size` bytes that start at a multiple of 8."""
+        """Use `memory`, `ring_size` bytes from a multiple of 8 on."""
         self._slots = slots
         self._record = struct.Struct(f"<{doubles}d")
         self._size = _HEAD.size + self._record.size
@@ -136,7 +136,7 @@ class RingReader(_Ring):
     _seen = 0
 
     def read(self) -> list[tuple[float, ...]]:
-        """Return the records since the last call, oldest first, without those overwritten by now."""
+        """Return the records since the last call, oldest first, without overwritten records."""
         newest = self._newest[0]
         if newest == self._seen:
             return []
@@ -157,7 +157,7 @@ class RingReader(_Ring):
 
 
 STYLUS_BYTES = ring_size(MODEL_SLOTS, MODEL_DOUBLES) + ring_size(STATE_SLOTS, STATE_DOUBLES)
-"""What one stylus takes of the shared memory."""
+"""Size of the shared memory per stylus, bytes."""
 _BEAT_BYTES = 8
 
 
@@ -167,7 +167,7 @@ def memory_size(styluses: int) -> int:
 
 
 def beat(memory: memoryview) -> memoryview:
-    """Return the watcher's counter: one integer, which is 0 before the watcher runs."""
+    """Return the watcher's counter: a single integer, 0 before the watcher runs."""
     return memory[-_BEAT_BYTES:].cast("Q")
 
 
@@ -203,7 +203,7 @@ def create(size: int) -> tuple[mmap.mmap, int | str]:
 
 
 def attach(handle: int | str, size: int) -> mmap.mmap:
-    """Return the memory that another process created."""
+    """Return the memory created by another process."""
     if sys.platform == "win32":
         return mmap.mmap(-1, size, tagname=str(handle))
     return mmap.mmap(int(handle), size)

@@ -1,4 +1,4 @@
-"""Parameters of haptic styluses that the servo process holds."""
+"""Parameters of haptic styluses held by the servo process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _DEAD_MAN = "what must be held for force: the index of a button, or the safety s
 
 
 class ServoStylusParams(Params):
-    """A stylus."""
+    """A stylus of the servo process."""
 
     device: Annotated[
         str | None,
@@ -34,5 +34,5 @@ class ServoStylusParams(Params):
     safety: SafetyParams = SafetyParams()
 
     def spec(self, name: str) -> StylusSpec:
-        """Return the stylus as the servo process gets it."""
+        """Return the stylus as described to the servo process."""
         return StylusSpec(name, self.device, self.dead_man, self.tip_offset)

@@ -11,28 +11,28 @@ class Phase(IntEnum):
     """The condition of a stylus."""
 
     ABSENT = 0
-    """It could not be opened."""
+    """The stylus could not be opened."""
     SETTLING = 1
-    """It has given no valid frames yet."""
+    """The stylus has given no valid frames yet."""
     UNCALIBRATED = 2
     READY = 3
     WARNED = 4
-    """It has a pose, and no force: the driver has reported an error within the last second."""
+    """Pose without force: the driver has reported an error within the last second."""
     BUSY = 5
-    """Another program has it."""
+    """Another program has the stylus."""
     FAULT = 6
-    """It, or the servo loop, has failed."""
+    """The stylus or the servo loop has failed."""
     UNWATCHED = 7
-    """It has a pose, and no force: the process that watches the servo process gives no sign of life."""
+    """Pose without force: the watcher of the servo process gives no sign of life."""
 
     @property
     def is_lost(self) -> bool:
-        """Whether this process cannot use the stylus any more: only a new one can."""
+        """Whether this process cannot use the stylus any more: only a new process can."""
         return self in _LOST
 
     @property
     def has_pose(self) -> bool:
-        """Whether the pose in its states is valid."""
+        """Whether the pose in the states is valid."""
         return self in _POSED
 
 

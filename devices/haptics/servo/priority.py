@@ -1,4 +1,4 @@
-"""The priority of a process whose delay a hand would feel."""
+"""The priority of the processes of the haptic loop: a hand would feel a delay."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ __all__ = ["SERVO", "WATCHER", "raise_priority"]
 
 SERVO, WATCHER = 19, 20
 """SCHED_FIFO: above all ordinary threads, below the kernel's interrupt threads (50). The watcher is above the
-servo: a servo that never sleeps must not delay the watcher. limits.conf allows a user the larger number.
+servo: a servo without sleep must not delay the watcher. limits.conf allows a user the larger number.
 """
 _HIGH_PRIORITY_CLASS = 0x80
 
 
 def raise_priority(fifo: int) -> str:
-    """Raise the priority of this process as far as the system allows; return what was reached.
+    """Raise the priority of this process as far as the system allows; return the priority reached.
 
     On Linux `fifo` with SCHED_FIFO (`real-time`), on Windows the class `high`; else `normal`.
     """

@@ -1,4 +1,4 @@
-"""A second servo process, which finds out whether lost styluses are available again. It gives no force."""
+"""A second servo process without force, to find out whether lost styluses are available again."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Finding(NamedTuple):
 
 
 class Probe:
-    """An attempt."""
+    """An attempt to open lost styluses."""
 
     def __init__(self, process: ServoProcess, now: float) -> None:
         """`process` was started at `now` (s)."""
@@ -58,5 +58,5 @@ class Probe:
 
 
 def absence(message: dict[str, Any]) -> Finding:
-    """Return the condition of a stylus that could not be opened, by the message of the servo process."""
+    """Return the condition of an unopened stylus, by the message of the servo process."""
     return Finding(Phase(message["phase"]), message["absent"])

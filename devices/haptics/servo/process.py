@@ -1,6 +1,6 @@
-"""The servo process and its watcher, from the device's side: start, send, receive, end.
+"""The servo process and the watcher, from the device's side: start, send, receive, end.
 
-Only `close` waits for it.
+Only `close` waits for the process.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ _NO_WINDOW: int = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
 
 @dataclass(frozen=True)
 class DriverChoice:
-    """The driver that a servo process makes."""
+    """Choice of the driver made by a servo process."""
 
     driver: str
     """Driver class, `module:Class`."""
     options: dict[str, Any]
-    """Keyword arguments of the class, which JSON can hold."""
+    """Keyword arguments of the class, representable in JSON."""
 
 
 class ServoProcess:
-    """A process with the devices of `specs`, from its start on."""
+    """A running process with the devices of `specs`."""
 
     def __init__(self, driver: DriverChoice, specs: Sequence[StylusSpec]) -> None:
         """Start the process. Raises OSError if the system has no process left."""
@@ -80,12 +80,12 @@ class ServoProcess:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
+        """Id of the process."""
         return self._process.pid
 
     @property
     def is_alive(self) -> bool:
-        """Whether it runs."""
+        """Whether the process runs."""
         return self._process.poll() is None
 
     @property

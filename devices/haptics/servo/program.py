@@ -1,9 +1,9 @@
 """The servo process: a vendor's library and the servo loop, and nothing else.
 
 devices.haptics.servo.process starts it. The first line of JSON on the standard input names the driver and the
-styluses; each later line states the limits of the force of one stylus. The process ends with the input: when
-the device closes the input, and when the device's process ends. Then the hand gets a last
-frame without force.
+styluses; each later line states the limits of the force of a stylus. The process ends with the input: when
+the device closes the input, and when the device's process ends. Then the hand gets a last frame without
+force.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Say = Callable[[Mapping[str, Any]], None]
 
 
 def _load(choice: str, options: Mapping[str, Any]) -> Driver:
-    """Return the driver of a class `module:Class`. Raises DeviceError if it cannot be loaded."""
+    """Return the driver of a class `module:Class`. Raises DeviceError if the class cannot be loaded."""
     module, _, name = choice.partition(":")
     try:
         kind: Any = getattr(import_module(module), name)
@@ -71,7 +71,7 @@ def _await_watcher(sign: memoryview) -> None:
 
 
 def _output() -> Say:
-    """Return a function that sends a message to the device.
+    """Return a function to send a message to the device.
 
     The standard output is redirected to the standard error: libraries may write there.
     """

@@ -1,4 +1,4 @@
-"""The servo loop: a thousand times a second, one tick of all styluses of this host."""
+"""The servo loop: a thousand times a second, a tick of all styluses of this host."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ seconds: after a pause of the whole machine the watcher is not to blame.
 
 
 class Servo:
-    """All styluses of this host behind one driver."""
+    """All styluses of this host behind a single driver."""
 
     def __init__(self, driver: Driver, styluses: list[Stylus], beat: memoryview) -> None:
         """`styluses`: all open styluses; `beat`: the watcher's counter in the shared memory."""
@@ -38,7 +38,7 @@ class Servo:
         self._driver.start(self.tick)
 
     def stop(self) -> None:
-        """Give the hands a last tick without force, and release the devices, if it was started."""
+        """Give the hands a last tick without force, and release the devices, if the loop was started."""
         self._ending = True
         if not self._started:
             return
@@ -73,7 +73,7 @@ class Servo:
         return True
 
     def _is_watched(self) -> bool:
-        """Return whether the watcher runs. Raises DeviceError if it has not for long."""
+        """Return whether the watcher runs. Raises DeviceError after a long silence."""
         beat = self._beat[0]
         self._unwatched = 0 if beat != self._last_beat else self._unwatched + 1
         self._last_beat = beat

@@ -1,6 +1,6 @@
 """A stylus inside the servo loop: condition, haptic loop and states.
 
-The code runs a thousand times a second: plain floats, one clock.
+The code runs a thousand times a second: plain floats, a single clock.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["Stylus"]
 _CLEAN_FRAMES = 3
 """A driver's loop may start before the first frame of a device exists (hopezzzz/3dtouch, touch_hd.py)."""
 _WARNING = 1.0
-"""Time without a warning of the device after which force may come back, s."""
+"""Time without a warning of the device until force may come back, s."""
 _READY, _SETTLING = Phase.READY, Phase.SETTLING
 """Plain names: Python 3.11 takes 0.25 us to look up a member of an enumeration."""
 _UNMOVED = Reading(ZERO, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), ZERO, valid=False)
@@ -49,7 +49,7 @@ class Stylus:
         self._loop = HapticLoop(limits, passivity=passivity)
 
     def frame(self, now: float, *, watched: bool) -> None:
-        """Do one tick at `now` (s of time.perf_counter); without force if not `watched`."""
+        """Do a tick at `now` (s of time.perf_counter); without force if not `watched`."""
         self._reading = reading = self._driver.read(self.handle, now)
         dead_man = self._spec.dead_man
         self._permitted = (
@@ -59,10 +59,10 @@ class Stylus:
         self._driver.write(self.handle, self._render(now))
 
     def on_error(self, code: int, phase: Phase, now: float) -> None:
-        """Handle an error that the driver reports after the tick at `now`.
+        """Handle an error reported by the driver after the tick at `now`.
 
         Only the loss of the device ends the use of the stylus. Any lesser error switches the force off for a
-        second: a warning asks for that, and after an error of the tick the sent force is unknown. An
+        second: a warning asks for force off, and after an error of the tick the sent force is unknown. An
         uncalibrated stylus has no force.
         """
         if phase.is_lost:
@@ -80,7 +80,7 @@ class Stylus:
         )
 
     def release(self) -> None:
-        """Do one tick without force: the last."""
+        """Do the last tick, without force."""
         if self._loop is not None:
             self._loop.reset()
         self._driver.release(self.handle)

@@ -1,6 +1,6 @@
 """Keeps a servo process running with every available stylus, and looks for lost styluses.
 
-All styluses of a host are in one process. When one stylus is lost, a process with the rest replaces the
+All styluses of a host are in one process. When a stylus is lost, a process with the rest replaces the
 present process: a library may recover in a new process only. A second process beside the first finds out
 whether a lost stylus is available again, so no hand loses force meanwhile. The next servo process with the
 stylus starts when no hand holds a dead-man.
@@ -27,9 +27,9 @@ log = logging.getLogger(__name__)
 _FIRST_RETRY, _LAST_RETRY = 0.25, 4.0
 """After this time (s) a lost stylus is tried again; each time twice as long ..."""
 _LASTING = 10.0
-"""... until it was available for this long."""
+"""... until the stylus was available for this long, s."""
 _LOADING, _OPENING, _SILENCE = 20.0, 10.0, 1.0
-"""How long a process may take (s) to load the library, until its first frame, and between frames."""
+"""Longest times of a process to load the library, until the first frame, and between frames, s."""
 _ENDING = 1.0
 
 _STOOD_STILL = "the servo process stood still with force on the hand and was killed, which closes the device"
@@ -53,7 +53,7 @@ class Lost:
 
 
 class Supervisor:
-    """The servo processes of one device. All methods are for one thread."""
+    """The servo processes of a device. All methods are for a single thread."""
 
     def __init__(
         self,
@@ -95,7 +95,7 @@ class Supervisor:
             self._on_message(self._process, message, now)
 
     def poll(self, now: float) -> dict[str, list[State]]:
-        """Supervise the processes; return the new states of each stylus that is open, oldest first."""
+        """Supervise the processes; return the new states of each open stylus, oldest first."""
         states: dict[str, list[State]] = {}
         if self._process is not None:
             states = self._attend(self._process, now)

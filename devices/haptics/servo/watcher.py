@@ -1,13 +1,13 @@
-"""The watcher process: kills a servo process that stands still with force on a hand.
+"""The watcher process: kills a stalled servo process with force on a hand.
 
 A motor keeps the last force while the servo stands still: stopped by a signal, or blocked in a call of the
-driver. Libraries give a device to one process only, so no second process can set the force to zero; the end
+driver. Libraries give a device to a single process, so no second process can set the force to zero; the end
 of the servo process closes the device.
 
 devices.haptics.servo.process starts the watcher beside every servo process, with the shared memory and a
 handle of the servo process. Only the end of the servo process ends the watcher: the device's process may
-have died before. Each of the three has an interpreter of its own, so none delays another. The sign of life is
-a counter in the shared memory; without it the servo gives no force (devices.haptics.servo.servo).
+have died before. Each of the three has a separate interpreter, so none delays another. The sign of life is
+a counter in the shared memory; without a sign the servo gives no force (devices.haptics.servo.servo).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = ["HAS_KILLED", "PERIOD", "Target", "Watch", "main"]
 PERIOD = 0.004
 """Time between two looks, s."""
 _STILL = 0.11
-"""Age of the last frame above which the servo stands still, s: a stop of 0.1 s is left alone."""
+"""Least age of the last frame of a stalled servo, s: a stop of 0.1 s is left alone."""
 _LOOKS = 3
 """Looks in a row before a kill: after a pause of the whole machine the servo gets time for a tick."""
 HAS_KILLED = 3
@@ -41,7 +41,7 @@ _OFF = tuple(Condition).index(Condition.OFF)
 
 
 class Watch:
-    """Finds a servo that stands still while there may be force on a hand."""
+    """Finds a servo stalled while there may be force on a hand."""
 
     def __init__(self, states: Sequence[RingReader]) -> None:
         """`states`: the reading ends of all styluses of the servo process."""
@@ -64,10 +64,10 @@ class Watch:
 
 
 class Target:
-    """The servo process, by a handle that cannot come to mean another process."""
+    """The servo process, by a handle never reused for another process."""
 
     def __init__(self, handle: int) -> None:
-        """`handle`: a process file descriptor, on Windows the id of a process that is not yet reaped."""
+        """`handle`: a process file descriptor, on Windows the id of a process not yet reaped."""
         self._handle = handle
         if sys.platform == "win32":
             terminate, synchronize = 0x1, 0x100000
@@ -81,7 +81,7 @@ class Target:
             self._poll.register(handle, select.POLLIN)
 
     def has_ended(self, timeout_s: float) -> bool:
-        """Wait for the end of the process, up to `timeout_s`; return whether it has ended."""
+        """Wait for the end of the process, up to `timeout_s`; return whether the process has ended."""
         if sys.platform == "win32":
             timed_out = 0x102
             return (
@@ -90,7 +90,7 @@ class Target:
         return bool(self._poll.poll(timeout_s * 1e3))
 
     def kill(self) -> None:
-        """End the process at once, whatever it does."""
+        """End the process at once, in any state."""
         if sys.platform == "win32":
             ctypes.windll.kernel32.TerminateProcess(self._process, 1)
         else:
