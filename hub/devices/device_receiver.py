@@ -19,7 +19,7 @@ from hub.devices.run_info import RunInfo
 from hub.observation.latency import Latencies
 from hub.participant import Value
 from hub.planning.plan import ConnectionToDevice
-from hub.transport.bundle import bundled, unpacked, use_mask
+from hub.transport.bundle import bundled_connections, unpack_bundle, use_mask
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
@@ -72,7 +72,7 @@ class DeviceReceiver:
         plan, keys, name = self._run.plan, self._run.keys, self._name
         outlets = [outlet for outlet in plan.to_devices if outlet.target == name]
         for source in dict.fromkeys(outlet.source for outlet in outlets):
-            signals = bundled(plan, source, name)
+            signals = bundled_connections(plan, source, name)
             if signals:
                 inputs = [self._input(outlet) for outlet in signals]
                 uses = session.declare_publisher(keys.uses(name, source), express=True)
@@ -150,7 +150,7 @@ class _Subscription:
         if self._whole:
             self._inputs[0].receive(tag, payload)
             return
-        for index, value in unpacked(payload):
+        for index, value in unpack_bundle(payload):
             if index >= len(self._inputs):
                 raise MessageError(f"a bundle has value {index} of {len(self._inputs)}")
             self._inputs[index].receive_packed(tag, value)

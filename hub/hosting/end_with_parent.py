@@ -1,4 +1,4 @@
-"""Ends a process together with the parent, in whatever way the parent ends.
+"""Ends a process together with its parent, however the parent ends.
 
 Why not by Zenoh alone, as orderly ends are: docs/decisions/0039-ends-of-processes.md.
 """

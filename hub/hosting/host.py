@@ -145,9 +145,9 @@ class Host:
                 outputs.put_initial_again()
             self._send_bundles(one, INITIAL, 0)
 
-    def linked(self) -> bool:
+    def has_initial_values(self) -> bool:
         """Return whether all values of remote hosts at time 0, as far as needed here, have arrived."""
-        return self._wire is None or self._wire.linked()
+        return self._wire is None or self._wire.has_initial_values()
 
     def due(self, step: int, count: int) -> list[str]:
         """Return the participants with at least a step in `count` steps from `step`, in step order."""
@@ -218,7 +218,7 @@ class Host:
             if isinstance(reader, Reader):
                 self._read(one, reader, step)
             elif reader.arrived:
-                _take(one, reader)
+                _move_messages(one, reader)
         begun = perf_counter_ns()
         try:
             outputs = one.participant.step(t, one.h_ns, one.inputs)
@@ -295,7 +295,7 @@ class Host:
             self._wire.close()
 
 
-def _take(one: HostedParticipant, queue: Queue) -> None:
+def _move_messages(one: HostedParticipant, queue: Queue) -> None:
     """Move the messages in a queue to the inputs of a participant."""
     one.events[queue.port] = (*one.events.get(queue.port, ()), *queue.arrived)
     queue.arrived.clear()

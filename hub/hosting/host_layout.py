@@ -6,11 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from typing import Protocol
 
-from hub.hosting.hosted_participant import HostedParticipant, hosted
+from hub.hosting.hosted_participant import HostedParticipant, host_participant
 from hub.hosting.outputs import DueOutputs, Listener, Output, VectorsListener
 from hub.participant import Stepped
 from hub.planning.plan import Plan, PlannedConnection, PlannedParticipant
-from hub.transport.bundle import Bundle, bundled
+from hub.transport.bundle import Bundle, bundled_connections
 from hub.transport.cells import Cell, RemoteCell
 from hub.transport.port_codec import PortCodec, codec_of
 from hub.transport.reader import DeviceInputs, Queue, Reader, as_messages
@@ -57,7 +57,7 @@ class HostLayout:
     ) -> None:
         self._name, self._plan, self._wire, self._listeners = name, plan, wire, listeners
         self.participants = [
-            hosted(plan.participants[p], participants[p], plan.step_ns)
+            host_participant(plan.participants[p], participants[p], plan.step_ns)
             for p in (*plan.order, *(one.name for one in plan.observers()))
             if plan.participants[p].host == name
         ]
@@ -158,7 +158,7 @@ class HostLayout:
         indices: dict[str, list[tuple[Bundle, int]]] = {}
         outlets = [outlet for outlet in self._plan.to_devices if outlet.source == one.name]
         for name in dict.fromkeys(outlet.target for outlet in outlets):
-            signals, target = bundled(self._plan, one.name, name), self._plan.participants[name]
+            signals, target = bundled_connections(self._plan, one.name, name), self._plan.participants[name]
             bundle = one.bundles[name] = wire.bundle(one.name, target, self._plan.step_ns, len(signals))
             for index, outlet in enumerate(signals):
                 indices.setdefault(outlet.source_port, []).append((bundle, index))

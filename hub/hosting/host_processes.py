@@ -73,7 +73,7 @@ class HostProcesses:
             pass_fds=inherited,
         )
         if link is not None:
-            link.started()
+            link.close_inherited()
         waiting = threading.Thread(target=self._wait, args=(process,), name=f"host {host}", daemon=True)
         waiting.start()
         self._waiting[host] = waiting

@@ -182,7 +182,7 @@ class HostRun:
         ready = False
         while True:
             self._host.publish_initial()
-            if not ready and self._host.linked():
+            if not ready and self._host.has_initial_values():
                 ready = True
                 for planned in self._host.participants:
                     hub.acknowledge(planned.name, Ack(self._run, 0, -1, (), (), ()))

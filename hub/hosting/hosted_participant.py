@@ -17,7 +17,7 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.vectors import Vector
 
-__all__ = ["HostedParticipant", "hosted"]
+__all__ = ["HostedParticipant", "host_participant"]
 
 
 @dataclass(slots=True)
@@ -28,7 +28,7 @@ class HostedParticipant:
     planned: PlannedParticipant
     name: str
     period: int
-    """Period, communication steps."""
+    """Period of the participant, in communication steps."""
     h_ns: int
     """Step of the participant, ns."""
     inputs: Inputs
@@ -55,7 +55,7 @@ class HostedParticipant:
     work_j: list[float] = field(default_factory=list[float])
 
 
-def hosted(planned: PlannedParticipant, participant: Stepped, step_ns: int) -> HostedParticipant:
+def host_participant(planned: PlannedParticipant, participant: Stepped, step_ns: int) -> HostedParticipant:
     """Return `participant` with inputs at their start values; nothing is connected yet."""
     values = {
         port.name: _start_value(port)

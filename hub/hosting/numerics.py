@@ -13,7 +13,7 @@ __all__ = ["pin_numerics"]
 _NEWER_THAN_AVX2 = "X86_V4 AVX512_ICL AVX512_SPR"
 """Groups of instructions beyond AVX2 with loops in numpy (numpy's documentation, CPU dispatch).
 
-With these groups `arctan2` and others are Intel's, different in the last bit from the C library.
+With these groups `arctan2` and others are Intel's, which differ in the last bit from the C library's.
 """
 
 

@@ -100,7 +100,7 @@ class _Observer:
 
     def look(self) -> bool:
         """Step the observer with the newest state, if new; return whether a new state has arrived."""
-        state = self._inputs.take()
+        state = self._inputs.pop_newest()
         if state is None:
             return False
         begun_s = perf_counter()

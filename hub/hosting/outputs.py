@@ -87,7 +87,7 @@ _layout = attrgetter("shape", "dtype")
 
 
 class _Passage:
-    """Passage of the values of some outputs, at every step with values due; `wire` None: to nowhere else."""
+    """Passage of the values of some outputs, at every step with values due; `wire` None: in this process."""
 
     def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
         self._wire = wire

@@ -95,14 +95,16 @@ class Watchdog:
                 for name in names:
                     self._failed(name, how)
                 continue
-            missing = [name for name in self._unanswered() if name in names] or names
+            missing = [name for name in self._list_unanswered() if name in names] or names
             others = ", ".join(name for name in names if name != missing[0])
             return missing[0], f"{how} (host '{host}' also ran {others})" if others else how
         return None
 
     def _late_answer(self, left_out_ns: int) -> tuple[str, str] | None:
         """Return a participant without an answer in time, and the cause."""
-        waiting = self._unanswered()  # first: the wait may be over, and the next one begin, at any moment
+        waiting = (
+            self._list_unanswered()
+        )  # first: the wait may be over, and the next one begin, at any moment
         if not waiting or not self._patience.is_over(self._processes.numbers, left_out_ns):
             return None
         first, *others = waiting
@@ -112,7 +114,7 @@ class Watchdog:
             cause += f"; nor have {', '.join(others)}, which may wait for it"
         return awaited or first, cause
 
-    def _unanswered(self) -> list[str]:
+    def _list_unanswered(self) -> list[str]:
         """Return the awaited participants, without participants already stepped by a host with a link."""
         passed = {name for link in self._processes.links.values() for name in link.passed}
         return [name for name in tuple(self._waiting) if name not in passed]

@@ -93,7 +93,7 @@ class AckReceiver:
             yield planned.name
 
     def look(self, waiting: Sequence[str] = ()) -> Iterator[Accepted]:
-        """Yield the arrived acks of `waiting` over Zenoh; raises ParticipantError for any unexpected ack."""
+        """Yield the acks of `waiting` that have arrived over Zenoh; raises ParticipantError for any other."""
         while (sample := self._subscriber.try_recv()) is not None:
             yield from self._from_zenoh(sample, waiting)
 
@@ -111,7 +111,7 @@ class AckReceiver:
         if str(sample.key_expr) == self._wake_key and not sample.payload:
             return
         try:
-            planned, payload, signed = self._opened(sample)
+            planned, payload, signed = self._open_message(sample)
             accepted = self._accept(planned, payload, waiting, signed=signed)
         except MessageError as error:
             self._refusals.refuse_sample(sample, error)
@@ -142,7 +142,7 @@ class AckReceiver:
         self._last[planned.name] = payload
         return planned, ack, payload
 
-    def _opened(self, sample: zenoh.Sample) -> tuple[PlannedParticipant, bytes, bool]:
+    def _open_message(self, sample: zenoh.Sample) -> tuple[PlannedParticipant, bytes, bool]:
         """Return the participant of a message, the payload, and whether the message is signed by the host.
 
         A host with a link does not sign.
@@ -173,20 +173,20 @@ class AckReceiver:
 
     def raise_failure(self) -> None:
         """Raise a failure reported by a participant itself, if such a message has arrived."""
-        for name, payload in self._arrived():
+        for name, payload in self._arrived_messages():
             with suppress(MessageError):
                 ack = unpack_ack(payload, 0, 0)
                 if ack.run == self._run and ack.error:
                     raise ParticipantError(name, ack.step, ack.error)
 
-    def _arrived(self) -> Iterator[tuple[str, bytes]]:
+    def _arrived_messages(self) -> Iterator[tuple[str, bytes]]:
         """Yield participant and payload of every arrived message of a host."""
         for link in self._links.values():
             while acks := link.acks(wait=False):
                 yield from acks
         while (sample := self._subscriber.try_recv()) is not None:
             with suppress(MessageError):
-                planned, payload, signed = self._opened(sample)
+                planned, payload, signed = self._open_message(sample)
                 if signed:
                     yield planned.name, payload
 

@@ -65,13 +65,13 @@ class Bookkeeping:
         """Stop to count wall time: the last step is done."""
         self._wall_ns = self._wall_so_far_ns
 
-    def acknowledged(self, granted_ns: int) -> None:
+    def count_answer_time(self, granted_ns: int) -> None:
         """Count the time since a grant was given at `granted_ns` (monotonic): all its steps are done."""
         self._answers.add(monotonic_ns() - granted_ns)
 
     def book(self, planned: PlannedParticipant, ack: Ack) -> int:
         """Book the hashes and the last step of an ack; return the simulated time (ns) at its end."""
-        self._digests.take(planned.name, ack.state_hash)
+        self._digests.add(planned.name, ack.state_hash)
         first = ack.step + -ack.step % planned.period
         last = self._last_steps[planned.name] = first + (len(ack.state_hash) - 1) * planned.period
         return (last + planned.period) * self._plan.step_ns
@@ -140,7 +140,7 @@ class Bookkeeping:
             recording_complete=None if recorded is None else recorded.complete,
             energy_residual_j=self._monitor.energy.residual_j,
             latency=by_way(self._latencies),
-            observers=self._observer_reports.observed(),
+            observers=self._observer_reports.observed_states(),
             measures=self._monitor.measures.results(),
             scores={name: score_numbers(card) for name, card in sorted(self._monitor.measures.cards.items())},
             ending=self.detail or None,

@@ -24,7 +24,7 @@ _CAUGHT_UP_NS = 50_000_000
 Two pictures of the endoscope drawn without a GPU take 22 ms.
 """
 _OBSERVED_NS = 5_000_000_000
-"""Wall time for a judgement of the speed of simulated time."""
+"""Wall time over which the speed of simulated time is judged."""
 _REPORT_NS = 60_000_000_000
 """Wall time between two reports of slow simulated time."""
 _SLOW = 0.8

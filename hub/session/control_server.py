@@ -122,7 +122,7 @@ class ControlServer:
         """Answer on `key`; for a pattern, a request is allowed on the key returned by `key_of`."""
         limit = TokenBucket(_RATE)
 
-        def take(query: zenoh.Query) -> None:
+        def accept(query: zenoh.Query) -> None:
             payload = b"" if query.payload is None else query.payload.to_bytes()
             try:
                 if len(payload) > MOST_BYTES:
@@ -147,7 +147,7 @@ class ControlServer:
             else:
                 _reply(query, at, reply)
 
-        return session.declare_queryable(key, Callback(take, indirect=False))
+        return session.declare_queryable(key, Callback(accept, indirect=False))
 
     def _refuse(self, query: zenoh.Query, key: str, reason: str) -> None:
         self._refusals.refuse(key, reason)

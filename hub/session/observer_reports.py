@@ -63,7 +63,7 @@ class ObserverReports:
         status = self._statuses.get(observer)
         return -1 if status is None else status.step
 
-    def observed(self) -> dict[str, Observed]:
+    def observed_states(self) -> dict[str, Observed]:
         """Return the reports of states seen, by observer."""
         rows: dict[str, Observed] = {}
         for name in self._names:

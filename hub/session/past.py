@@ -22,5 +22,4 @@ class Past:
     live_from: int | None = None
     """First live step of the run; None: the run ends with the grants."""
     new_devices: frozenset[str] = frozenset()
-    """Devices new or changed since the recording: led inputs are stale until the first sample of the device.
-    """
+    """Devices that are new or changed since the recording: inputs led by them are stale until they speak."""

@@ -48,7 +48,7 @@ class RemoteReports:
         self._bookkeeping, self._failure, self._refusals = bookkeeping, failure, refusals
         self._subscribers = [
             session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._token)),
-            session.declare_subscriber(keys.refused("*", "*"), Callback(self._refused)),
+            session.declare_subscriber(keys.refused("*", "*"), Callback(self._count_refusal)),
         ]
 
     def _token(self, sample: zenoh.Sample) -> None:
@@ -80,7 +80,7 @@ class RemoteReports:
             name,
         )
 
-    def _refused(self, sample: zenoh.Sample) -> None:
+    def _count_refusal(self, sample: zenoh.Sample) -> None:
         """Count a message refused by another host; the host has logged the reason."""
         try:
             decode(StringMessage, sample.payload.to_bytes())

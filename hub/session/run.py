@@ -124,7 +124,7 @@ class Run:
         scenario, plan, keys = spec.scenario, spec.plan, Keys(spec.scenario.name)
         self.spec, self.session, self.keys, self.state = spec, session, keys, state
         self.number = secrets.randbits(63) | 1
-        """Number of the run, marking the messages of this run."""
+        """Number that tells the messages of this run from those of any other."""
         self.recorded = recorder is not None
         answering = stack.enter_context(ExitStack())
         self.processes = HostProcesses(_links(plan))

@@ -89,7 +89,7 @@ class RunProfile:
         self.process.attach(host)
         watch.time(devices.enter, watch.phase("devices", "devices"))
         watch.time(state.wait, watch.phase("paused", "hub"))
-        watch.time_by_result(self._clock.advance, self._wall_clock, self._advanced)
+        watch.time_by_result(self._clock.advance, self._wall_clock, self._judge_steps)
 
     def watch_acks(
         self,
@@ -97,9 +97,9 @@ class RunProfile:
         receive: Callable[..., None],
         unbooked: Sequence[tuple[PlannedParticipant, Ack, bytes | None]],
     ) -> None:
-        """Time the booking of acks, and the wait for acks of remote hosts, then `unbooked`.
+        """Time the booking of acks, and the wait for the acks of remote hosts, which are then `unbooked`.
 
-        Among several hosts, the wait was for the host with the longest computing participants.
+        Among several hosts, the wait was for the host whose participants have computed longest.
         """
         watch = self.process.watch
         waiting = watch.phase("hub", "hub")
@@ -122,7 +122,7 @@ class RunProfile:
         self._waited_ns = self._queue.waited_ns()
         self.process.restart()
 
-    def _advanced(self, _: None) -> Phase:
+    def _judge_steps(self, _: None) -> Phase:
         """Judge the steps of a grant, if late, and begin the next round."""
         watch, clock = self.process.watch, self._clock
         late, self._late_steps = clock.late_steps - self._late_steps, clock.late_steps
@@ -140,7 +140,8 @@ class RunProfile:
         """Return the wall time (ns) of a grant by cause.
 
         The wait for a host is due to the participants there, as far as the participants computed. The time of
-        the hub's thread without a core is subtracted from the longest phase, the most probable place.
+        the hub's thread without a core is subtracted from the longest phase, in which most of it must have
+        been.
         """
         causes = {phase.name: ns for phase, ns in phases.items() if ns and phase is not self._wall_clock}
         for name, computed_ns in self._computed_ns.items():

@@ -166,7 +166,7 @@ def _start_and_step(
 ) -> None:
     """Start and step; nothing interrupts the code after this call.
 
-    A failure brings further failures, reported at any moment: only the first failure is raised.
+    A failure brings others, reported at any moment: only the first one is raised.
     """
     try:
         try:

@@ -10,13 +10,13 @@ __all__ = ["StateDigests"]
 
 
 class StateDigests:
-    """Takes the state hashes of each participant, in the order of the steps."""
+    """Collects the state hashes of each participant, in the order of the steps."""
 
     def __init__(self, participants: Iterable[str]) -> None:
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in participants}
 
-    def take(self, participant: str, hashes: Sequence[int]) -> None:
-        """Take the 64-bit hashes of a participant's next steps."""
+    def add(self, participant: str, hashes: Sequence[int]) -> None:
+        """Add the 64-bit hashes of a participant's next steps."""
         self._digests[participant].update(struct.pack(f"<{len(hashes)}Q", *hashes))
 
     @property

@@ -25,7 +25,7 @@ _PROGRESS_S = 0.1
 _STATUS_S = 0.5
 """Everything so far goes to the recorder with a status."""
 _RECORDED_TOGETHER = 64
-"""Messages that are recorded before a status is due: a call of the recorder costs as much as some ten."""
+"""Messages that go to the recorder before a status is due: a call costs as much as some ten messages."""
 _VALUES_NS = 5_000_000_000
 """Longest time for values of the last steps over Zenoh after the arrival of the acks."""
 
@@ -169,7 +169,7 @@ class StepLoop:
                 run.monitor.grant(grant, payload)
         run.host.run(grant, self._done_here)
         self._receive_acks([name for name in due if name in self._away], grant, steps)
-        run.bookkeeping.acknowledged(granted_ns)
+        run.bookkeeping.count_answer_time(granted_ns)
         for participant, reason in run.host.ended.items():
             run.end(participant, reason)
         if run.clock.realtime:

@@ -56,7 +56,7 @@ class SteppedSession:
         # it ends where its caller ends it, in a re-simulation too
         self._scenario = in_one_host(loaded.scenario).model_copy(update={"duration": None})
         self.plan: Plan
-        self.plan, self._stepped = self._made()
+        self.plan, self._stepped = self._make_participants()
         self._window = most_steps(self.plan, self._scenario.window)
         self._codecs = self._inlets()
         self._recorder: Recorder | None = None
@@ -64,7 +64,7 @@ class SteppedSession:
         self._host = Host("hub", self.plan, self._stepped)
         self._configure()
 
-    def _made(self) -> tuple[Plan, dict[str, Stepped]]:
+    def _make_participants(self) -> tuple[Plan, dict[str, Stepped]]:
         plan, made = plan_of(self._scenario, self._loaded.params)
         stepped = {name: one for name, one in made.items() if isinstance(one, Stepped)}
         if devices := sorted(made.keys() - stepped.keys()):
@@ -86,7 +86,7 @@ class SteppedSession:
     def _configure(self) -> None:
         """Configure all participants, and keep the initial states for `restart`."""
         self._host.configure(self._loaded.source.directory)
-        self._first = {name: _copied(self._host.newest(name)) for name in self.plan.order}
+        self._first = {name: _copy_outputs(self._host.newest(name)) for name in self.plan.order}
         try:
             self._saved = {name: self._stepped[name].save() for name in self.plan.order}
         except StateError:
@@ -106,7 +106,7 @@ class SteppedSession:
             self._begin(record)
             return
         self.close()
-        self.plan, self._stepped = self._made()
+        self.plan, self._stepped = self._make_participants()
         self._host = Host("hub", self.plan, self._stepped)
         self._configure()
         if record is not None:
@@ -133,8 +133,8 @@ class SteppedSession:
         `inputs` enter before the first step, by `participant.port`: for a signal a value, for an event port a
         tuple of messages. Only inputs without a connection can be given; given inputs keep their values.
 
-        Raises ParticipantError if a participant fails, SessionError for an input not open to the caller, and
-        MessageError for a value not fitting the port. After an error only `restart` goes on.
+        Raises ParticipantError if a participant fails, SessionError for an input that cannot be given, and
+        MessageError for a value that does not fit the port. After an error only `restart` goes on.
         """
         entering = tuple(
             sample for port, value in (inputs or {}).items() for sample in self._samples(port, value)
@@ -169,7 +169,7 @@ class SteppedSession:
             self._monitor.record()
 
     def _book(self, planned: PlannedParticipant, ack: Ack) -> None:
-        self._digests.take(planned.name, ack.state_hash)
+        self._digests.add(planned.name, ack.state_hash)
         if self._monitor is not None:
             first = ack.step + -ack.step % planned.period
             end = first + len(ack.state_hash) * planned.period
@@ -181,7 +181,7 @@ class SteppedSession:
         return bool(self._saved)
 
     def participant(self, name: str) -> Stepped:
-        """Return a participant, such as a task with goals. Do not step the participant."""
+        """Return a participant, such as a task that knows its goals. Do not step the participant."""
         return self._stepped[name]
 
     @property
@@ -221,11 +221,11 @@ class SteppedSession:
             participant.configure(Setup(h, directory, planned.bond_plans, connected))
             self._looking.add(observer)
             if self.step:  # what is sent once is sent at time 0
-                participant.step(0, h, self._seen(observer, self._first))
+                participant.step(0, h, self._inputs_of(observer, self._first))
         newest = {name: self._host.newest(name) for name in self.plan.order}
-        return participant.step(self.time_ns, h, self._seen(observer, newest))
+        return participant.step(self.time_ns, h, self._inputs_of(observer, newest))
 
-    def _seen(self, observer: str, outputs: Mapping[str, Outputs]) -> Inputs:
+    def _inputs_of(self, observer: str, outputs: Mapping[str, Outputs]) -> Inputs:
         feeding = (one for one in self.plan.to_devices if one.target == observer)  # as observers are fed
         return Inputs({one.target_port: outputs[one.source][one.source_port] for one in feeding})
 
@@ -263,5 +263,5 @@ class SteppedSession:
         self.close()
 
 
-def _copied(outputs: Outputs) -> dict[str, Value]:
+def _copy_outputs(outputs: Outputs) -> dict[str, Value]:
     return {name: v.copy() if isinstance(v, np.ndarray) else v for name, v in outputs.items()}

@@ -18,14 +18,14 @@ from hub.transport.publisher import Publisher
 from hub.transport.refusals import Refusals
 from schemas.errors import MessageError
 
-__all__ = ["Bundle", "DeviceBundle", "ObserverBundle", "bundled", "unpacked", "use_mask"]
+__all__ = ["Bundle", "DeviceBundle", "ObserverBundle", "bundled_connections", "unpack_bundle", "use_mask"]
 
 _HEAD = struct.Struct("<II")
-"""Index of the connection, and the number of bytes of the value behind."""
+"""Index of the connection, and number of bytes of the value that follows."""
 _WANTED, _UNUSED = b"\1", b"\0"
 
 
-def bundled(plan: Plan, source: str, target: str) -> list[ConnectionToDevice]:
+def bundled_connections(plan: Plan, source: str, target: str) -> list[ConnectionToDevice]:
     """Return the connections in a bundle (signals only), in the order of their indices."""
     return [
         outlet
@@ -164,7 +164,7 @@ class ObserverBundle(Bundle):
         super()._matched()
 
     def takes(self, time_ns: int, stride_ns: int) -> bool:
-        """Return whether the value of `time_ns` holds at a multiple of the period and is to be added."""
+        """Return whether to add the value of `time_ns`: it holds at a multiple of the period."""
         return self._publisher.needed and -time_ns % self._period_ns < stride_ns
 
     def send(self, tag: bytes, *, first: bool = False) -> None:
@@ -177,7 +177,7 @@ class ObserverBundle(Bundle):
         super().send(tag)
 
 
-def unpacked(payload: bytes) -> Iterator[tuple[int, bytes]]:
+def unpack_bundle(payload: bytes) -> Iterator[tuple[int, bytes]]:
     """Yield index and bytes of each value in a bundle; raises MessageError if invalid."""
     at = 0
     while at < len(payload):

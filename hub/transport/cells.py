@@ -91,7 +91,7 @@ class RemoteCell(Cell):
         self.waiting = False
         """Whether `get` waits for a value now."""
 
-    def primed(self) -> bool:
+    def has_initial_value(self) -> bool:
         """Return whether the value at time 0 has arrived; to be called before any `get`."""
         while INITIAL not in self._values and (arrived := self._receiver.poll()) is not None:
             self._keep(*arrived)

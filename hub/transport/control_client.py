@@ -18,7 +18,7 @@ from schemas.ros import StringMessage
 __all__ = ["ask", "ask_as_child", "join_session"]
 
 _STARTING_S = 5.0
-"""A hub just started answers within this time."""
+"""A hub that has only just started to listen answers within this time."""
 _ANSWER_S = 10.0
 _RETRY_S = 0.1
 

@@ -1,8 +1,8 @@
 """The link of the hub to a host started by the hub: a socket for grants and acks, and a shared number.
 
 The socket is made before the process, and the process inherits an end: without a name no other process can
-connect, and no name can be left behind. In the number the host notes the participant being stepped: the hub
-needs no message of each step for this. Linux only; hosts of remote machines have Zenoh.
+connect, and no name can be left behind. In the number the host notes which participant it steps: the hub
+knows without a message of each. Linux only; other hosts have Zenoh.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _ACK = struct.Struct("<HI")
 _WORD = 8
 _CHUNK = 4096
 _LOOK_S = 0.02
-"""Longest single wait of the hub: other hosts need attention too."""
+"""Longest single wait of the hub, which may have to look elsewhere."""
 _TIME_LIMIT = struct.pack("@ll", 0, round(_LOOK_S * 1e6))
 """`struct timeval` of socket(7), SO_RCVTIMEO."""
 
@@ -38,7 +38,7 @@ def has_link(host: str) -> bool:
 
 
 class _Messages:
-    """Messages of any length on a stream socket, each behind a length."""
+    """Messages of any length on a stream socket, each with its length in front."""
 
     def __init__(self, stream: socket.socket) -> None:
         self.stream = stream
@@ -95,7 +95,7 @@ class HubLink:
         """The descriptors for the host's process to inherit, for `HostLink`."""
         return self._theirs.fileno(), self._file
 
-    def started(self) -> None:
+    def close_inherited(self) -> None:
         """Close the descriptors inherited by the host's process: the socket then ends with the process."""
         self._theirs.close()
         if self._file >= 0:
@@ -135,7 +135,7 @@ class HubLink:
         self._messages.stream.close()
         self._place.release()
         self._memory.close()
-        self.started()
+        self.close_inherited()
 
 
 class HostLink:

@@ -92,7 +92,7 @@ class LoopbackPort:
 
     def _hold(self) -> None:
         for port in self._ports:
-            held = _bound(port)
+            held = _bind_socket(port)
             if held is not None:
                 finalize(self, held.close)  # where no hub ever listens
                 self._held, self.endpoint = held, f"tcp/127.0.0.1:{held.getsockname()[1]}"
@@ -119,7 +119,7 @@ def listening_ports(endpoints: Iterable[str]) -> tuple[LoopbackPort, list[str]]:
     return LoopbackPort(inside[0] if inside else None, free), outside
 
 
-def _bound(port: int) -> socket.socket | None:
+def _bind_socket(port: int) -> socket.socket | None:
     """Return a socket bound to `port`; None if the port is taken."""
     held = socket.socket()
     try:

@@ -12,7 +12,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hub.planning.plan import ConnectionToDevice, Plan
-from hub.transport.bundle import bundled, unpacked
+from hub.transport.bundle import bundled_connections, unpack_bundle
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
@@ -77,7 +77,7 @@ class ObserverInputs:
         self._subscribers: list[zenoh.Subscriber[None]] = []
         outlets = [outlet for outlet in plan.to_devices if outlet.target == name]
         for source in dict.fromkeys(outlet.source for outlet in outlets):
-            inputs = [_Input(plan, outlet) for outlet in bundled(plan, source, name)]
+            inputs = [_Input(plan, outlet) for outlet in bundled_connections(plan, source, name)]
             self._inputs += inputs
             receive = Callback(partial(self._receive, inputs), indirect=False)
             self._subscribers.append(session.declare_subscriber(keys.signals(source, name), receive))
@@ -90,7 +90,7 @@ class ObserverInputs:
             if tag.run != self._run:
                 raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run:x}")
             with self._lock:
-                for index, payload in unpacked(sample.payload.to_bytes()):
+                for index, payload in unpack_bundle(sample.payload.to_bytes()):
                     if index >= len(inputs):
                         raise MessageError(f"a bundle has value {index} of {len(inputs)}")
                     inputs[index].keep(tag, payload)
@@ -99,7 +99,7 @@ class ObserverInputs:
             return
         self._arrived()
 
-    def take(self) -> State | None:
+    def pop_newest(self) -> State | None:
         """Return the newest complete state, unless returned before; the first is the state at time 0.
 
         Complete means: of every input, the value that holds at a multiple of the period has arrived.

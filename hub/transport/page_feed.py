@@ -1,7 +1,7 @@
 """The feed of an output for pages: of a signal some values a second of wall time, of events each message.
 
-A page is no reader of the simulation: nothing waits for a page, messages are dropped where sending is
-impossible, and only values for a page are encoded. While no page looks, an output costs nothing more.
+A page is no reader of the simulation: nothing waits for a page, a message that cannot be sent is dropped, and
+no value is encoded that a page would not show. While no page looks, an output costs nothing more.
 """
 
 from __future__ import annotations
@@ -41,9 +41,7 @@ class PageFeed:
     ) -> None:
         self._codec, self._run, self._changed = codec, run, changed
         self._first: tuple[bytes, bytes] | None = None
-        """State of a message at time 0, possibly with data missing in later messages: the surface of an
-        organ.
-        """
+        """State at time 0 of a message, which may hold data that later ones lack: the surface of an organ."""
         self._due_ns = self._first_due_ns = 0
         self._publisher = Publisher(session, key, zenoh.CongestionControl.DROP, self._matched, always=False)
 

@@ -92,9 +92,9 @@ def codec_of(port: Port) -> PortCodec:
 
     A published or recorded output has a codec of its own, with the newest message.
     """
-    return _kept(cast("Hashable", port))
+    return _kept_codec(cast("Hashable", port))
 
 
 @lru_cache(maxsize=_PORTS)
-def _kept(port: Hashable) -> PortCodec:
+def _kept_codec(port: Hashable) -> PortCodec:
     return PortCodec(cast("Port", port))

@@ -57,7 +57,7 @@ class PortReceiver:
                     return None  # it is repeated until every host has it
                 raise MessageError(f"the value of step {tag.step} has arrived already")
             payload = sample.payload.to_bytes()
-            value = self._batched(tag, payload) if self._codec.is_event else self._codec.decode(payload)
+            value = self._add_to_batch(tag, payload) if self._codec.is_event else self._codec.decode(payload)
         except MessageError as error:
             self._refusals.refuse_sample(sample, error)
             return None
@@ -66,7 +66,7 @@ class PortReceiver:
         self._newest = tag.step
         return tag.step, value
 
-    def _batched(self, tag: Tag, payload: bytes) -> tuple[Message, ...] | None:
+    def _add_to_batch(self, tag: Tag, payload: bytes) -> tuple[Message, ...] | None:
         """Add an event to the events of the same step; return all events of the step when complete."""
         batch = self._batch if tag.step == self._batch_step else ()
         if tag.index != len(batch):

@@ -1,4 +1,4 @@
-"""A publisher on Zenoh with knowledge of its subscribers."""
+"""A publisher on Zenoh that knows whether it has subscribers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Publisher:
     Args:
         session: The Zenoh session.
         key: The key.
-        congestion: Whether a message is dropped or waits if sending is impossible now.
+        congestion: Whether a message that cannot be sent now is dropped or waits.
         changed: Is called whenever `needed` may have changed.
         always: Publish without subscribers too.
     """

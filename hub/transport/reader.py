@@ -20,7 +20,7 @@ Messages = Callable[[Any, int], tuple[Message, ...]]
 
 @dataclass(slots=True)
 class Reader:
-    """An input port, the cell feeding the port, and the way of reading."""
+    """An input port, the cell that feeds it, and the way of reading."""
 
     port: str
     cell: Cell

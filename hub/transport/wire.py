@@ -115,9 +115,9 @@ class Wire:
         self._cells.append(cell)
         return cell
 
-    def linked(self) -> bool:
+    def has_initial_values(self) -> bool:
         """Return whether the initial value of every remote cell has arrived."""
-        return all(cell.primed() for cell in self._cells)
+        return all(cell.has_initial_value() for cell in self._cells)
 
     def close(self) -> None:
         """Stop publishing and receiving; the session stays open."""

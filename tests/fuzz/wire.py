@@ -20,7 +20,7 @@ from pydantic import BaseModel, ValidationError
 
 from hub.devices.network_link import NetworkLinkOrder
 from hub.devices.network_link_control import NetworkLinkRequest
-from hub.transport.bundle import unpacked
+from hub.transport.bundle import unpack_bundle
 from hub.transport.control_messages import JoinReply, JoinRequest, Refusal, SetRequest, StepRequest
 from hub.transport.envelope import Stamp, Tag
 from hub.transport.port_codec import PortCodec
@@ -142,7 +142,7 @@ def _made(source: random.Random) -> tuple[str, bytes, Reader]:
         case 3:
             parts = [cdr(source.choice(names), source, wild=False)[:300] for _ in range(3)]
             whole = b"".join(struct.pack("<II", i, len(part)) + part for i, part in enumerate(parts))
-            return "bundle", whole, lambda data: list(unpacked(data))
+            return "bundle", whole, lambda data: list(unpack_bundle(data))
         case 4:
             return "grant", cdr("trocar_msgs/msg/Grant", source, wild=source.random() < 0.5), unpack_grant
         case 5:

@@ -10,7 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from zenoh.handlers import FifoChannel
 
-from hub.transport.bundle import Bundle, DeviceBundle, ObserverBundle, bundled, unpacked, use_mask
+from hub.transport.bundle import (
+    Bundle,
+    DeviceBundle,
+    ObserverBundle,
+    bundled_connections,
+    unpack_bundle,
+    use_mask,
+)
 from hub.transport.envelope import Tag
 from hub.transport.refusals import Refusals
 from hub.transport.zenoh_session import open_session
@@ -37,7 +44,7 @@ def test_a_bundle_unpacks_to_the_values_that_were_added(bundle, values):
     bundle.send(b"tag")
     sample = bundle.received.recv()
     assert sample.attachment.to_bytes() == b"tag"
-    assert list(unpacked(sample.payload.to_bytes())) == values
+    assert list(unpack_bundle(sample.payload.to_bytes())) == values
 
 
 def test_it_is_filled_by_values_and_emptied_by_sending(bundle):
@@ -55,7 +62,7 @@ def test_invalid_bytes_are_refused(bundle, cut, where):
     bundle.send(b"")
     payload = bundle.received.recv().payload.to_bytes()
     with pytest.raises(MessageError, match=where):
-        list(unpacked(payload[:cut]))
+        list(unpack_bundle(payload[:cut]))
 
 
 def test_both_ends_number_the_same_connections():
@@ -64,11 +71,11 @@ def test_both_ends_number_the_same_connections():
     plan = plan_of(
         arm, console, connections=["arm.b -> console.x", "arm.e -> console.z", "arm.a -> console.y"]
     )
-    assert [(k.source_port, k.target_port) for k in bundled(plan, "arm", "console")] == [
+    assert [(k.source_port, k.target_port) for k in bundled_connections(plan, "arm", "console")] == [
         ("b", "x"),
         ("a", "y"),
     ]
-    assert bundled(plan, "arm", "other") == []
+    assert bundled_connections(plan, "arm", "other") == []
 
 
 KEY = "trocar/test/engine/arm/signals/camera"

@@ -67,7 +67,7 @@ class Script:
 def test_a_remote_cell_gives_what_a_local_one_would(source, repetitions, fresh, reader_period):
     tags, _ = made(*source)
     cell = RemoteCell(*source, 2, Script([INITIAL] * repetitions + tags))
-    assert cell.primed()
+    assert cell.has_initial_value()
     for step in range(0, STEPS - 10, reader_period):
         tag = cell.tag(step, fresh=fresh)
         assert cell.get(tag) == tag * 10
@@ -76,8 +76,8 @@ def test_a_remote_cell_gives_what_a_local_one_would(source, repetitions, fresh, 
 
 def test_a_remote_cell_is_primed_by_the_value_at_time_0_only():
     cell = RemoteCell(1, 1, 1, Script([]))
-    assert not cell.primed()
-    assert RemoteCell(1, 1, 1, Script([INITIAL])).primed()
+    assert not cell.has_initial_value()
+    assert RemoteCell(1, 1, 1, Script([INITIAL])).has_initial_value()
 
 
 def test_a_lost_value_is_an_error():

@@ -21,7 +21,7 @@ def ends():
     """Return both ends of a link, as the hub and the host's process have them."""
     hub = HubLink(NAMES)
     host = HostLink(*map(os.dup, hub.inherited))
-    hub.started()
+    hub.close_inherited()
     yield hub, host
     hub.close()
     host.close()

@@ -58,7 +58,7 @@ class Sources:
 
     def take(self):
         """Return time (ms), both values and the number of missed states; None if there is nothing new."""
-        state = self.inputs.take()
+        state = self.inputs.pop_newest()
         if state is None:
             return None
         values = (float(state.values[port][0]) for port in "ab")
