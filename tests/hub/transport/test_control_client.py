@@ -25,7 +25,6 @@ REPLY = JoinReply(
     params={},
     directory="/",
     watched=[],
-    sent_with_acks=[],
     ack_key="",
     programs_endpoint="",
     profile=False,
