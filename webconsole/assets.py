@@ -9,7 +9,7 @@ from importlib.resources import files
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
-__all__ = ["asset", "compress_all", "compressed"]
+__all__ = ["asset", "compress_all", "gzip_response"]
 
 _TYPES = {
     "html": "text/html; charset=utf-8",
@@ -24,10 +24,10 @@ async def asset(request: Request) -> Response:
     name = request.path_params.get("name", "index.html")
     if name not in _names():
         return PlainTextResponse("no such file\n", status_code=404)
-    return compressed(_content(name), _TYPES[name.rpartition(".")[2]], cache=name.startswith("vendor/"))
+    return gzip_response(_content(name), _TYPES[name.rpartition(".")[2]], cache=name.startswith("vendor/"))
 
 
-def compressed(content: bytes, kind: str, *, cache: bool = False) -> Response:
+def gzip_response(content: bytes, kind: str, *, cache: bool = False) -> Response:
     """Return a response of gzip-compressed content; `cache`: for a day, as the content never changes."""
     headers = {"Content-Encoding": "gzip"}
     if cache:

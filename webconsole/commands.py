@@ -25,8 +25,8 @@ __all__ = [
     "Show",
     "Start",
     "Watch",
-    "asked_for",
     "command",
+    "command_name",
 ]
 
 MOST_BYTES = 16_384
@@ -225,7 +225,7 @@ class _Asked(BaseModel):
     do: Annotated[str, Field(max_length=20)] = ""
 
 
-def asked_for(text: str) -> str:
+def command_name(text: str) -> str:
     """Return the `do` of a message of any content; empty without `do`."""
     try:
         return _Asked.model_validate_json(text).do

@@ -15,7 +15,7 @@ from webconsole.changes import wrong_fields
 from webconsole.commands import Control, Fork, Network, Pick, Say, Start
 from webconsole.fork import fork_arguments, fork_modules
 from webconsole.frame import Section, SectionKind, pose_content
-from webconsole.guide import guiding
+from webconsole.guide import guide_request
 from webconsole.live import Live
 from webconsole.log import card_of
 from webconsole.pilot import Pilots
@@ -60,7 +60,7 @@ class Console:
                 self._stage = await asyncio.to_thread(
                     Stage, scenario, self.source.outlets, self.source.params
                 )
-                await asyncio.to_thread(lambda: self._stage and self._stage.packed)
+                await asyncio.to_thread(lambda: self._stage and self._stage.packed_geometry)
                 self._generation, self._made = generation, {}
                 await asyncio.to_thread(self.drawable)
             return self._stage
@@ -92,13 +92,13 @@ class Console:
 
     async def control(self, order: Control) -> None:
         """Pause, resume, step or stop the session; raises MessageError or ConnectError."""
-        live = self.live()
+        live = self.live_source()
         request = StepRequest(steps=order.steps) if order.do == "step" else Empty()
         await asyncio.to_thread(live.ask, _VERBS[order.do], request, Empty)
 
     async def network(self, order: Network) -> None:
         """Change a device's network link; raises MessageError or ConnectError."""
-        live = self.live()
+        live = self.live_source()
         given: dict[str, Any] = order.model_dump(exclude={"do"}, exclude_none=True)
         whole_ns = {key: f"{given[key] * 1e9:.0f} ns" for key in ("delay", "jitter") if key in given}
         request = NetworkLinkRequest.model_validate(given | whole_ns)
@@ -106,8 +106,8 @@ class Console:
 
     async def guide(self, order: Pick | Say) -> None:
         """Pass on a person's pick or word; raises MessageError or ConnectError."""
-        live = self.live()
-        await asyncio.to_thread(live.ask, "set", guiding(live.guided, order), Empty)
+        live = self.live_source()
+        await asyncio.to_thread(live.ask, "set", guide_request(live.guided, order), Empty)
 
     async def prepare(self) -> None:
         """Have processes ready for a session about to be started from here."""
@@ -117,7 +117,7 @@ class Console:
 
     async def fork(self, order: Fork) -> int:
         """Start a fork of the recording; return the session's number. Raises MessageError, ScenarioError."""
-        recording = self.recorded().recording
+        recording = self.recorded_source().recording
         arguments = await asyncio.to_thread(fork_arguments, recording, order)
         title = f"fork of {recording.file.parent.name} at {order.time:g} s"
         return (await asyncio.to_thread(self.started.start, title, arguments, order.time)).number
@@ -135,13 +135,13 @@ class Console:
             raise
         return {"number": (await asyncio.to_thread(self.started.start, order.scenario, arguments)).number}
 
-    def live(self) -> Live:
+    def live_source(self) -> Live:
         """Return the running session's source; raises MessageError if this is a recording."""
         if not isinstance(self.source, Live):
             raise MessageError("this page shows a recording, which cannot be steered")
         return self.source
 
-    def recorded(self) -> Recorded:
+    def recorded_source(self) -> Recorded:
         """Return the recording's source; raises MessageError if this is a running session."""
         if not isinstance(self.source, Recorded):
             raise MessageError("this page shows a running session; its recording has a timeline")

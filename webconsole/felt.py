@@ -22,10 +22,10 @@ def felt_wrenches(scenario: Scenario, numbers: Collection[str]) -> dict[str, tup
     wrenches = {name for name in numbers if name.endswith(_WRENCH)}
     arms = {name.partition(".")[2].removesuffix(_WRENCH) for name in wrenches}
     led = [name for name, spec in scenario.participants.items() if spec.kind == _KIND]
-    return {device: found for device in led if (found := _reached(scenario, device, wrenches, arms))}
+    return {device: found for device in led if (found := _find_wrenches(scenario, device, wrenches, arms))}
 
 
-def _reached(
+def _find_wrenches(
     scenario: Scenario, device: str, wrenches: Collection[str], arms: Collection[str]
 ) -> tuple[str, ...]:
     waiting, found = deque([(device, "")]), set[str]()

@@ -19,7 +19,7 @@ from schemas.scenario import Scenario
 from webconsole.changes import overrides
 from webconsole.commands import Fork
 from webconsole.fields import Field, participant_fields
-from webconsole.started import page_devices, recorded_in
+from webconsole.started import new_recording_path, page_devices
 
 __all__ = ["fork_arguments", "fork_form", "fork_modules", "tree_of"]
 
@@ -83,7 +83,7 @@ def fork_arguments(recording: Recording, order: Fork) -> list[str]:
         arguments += ["--pace", order.pace]
     if order.record:
         home = recording.file.resolve().parent
-        arguments += ["--record", str(recorded_in(home.parent, f"{home.name}-at-{order.time:g}s"))]
+        arguments += ["--record", str(new_recording_path(home.parent, f"{home.name}-at-{order.time:g}s"))]
     return arguments
 
 

@@ -23,9 +23,9 @@ __all__ = [
     "VERSION",
     "Section",
     "SectionKind",
-    "acknowledged",
     "frame",
     "node_content",
+    "parse_acknowledgement",
     "pose_content",
     "sections",
 ]
@@ -125,7 +125,7 @@ def sections(data: bytes) -> tuple[int, int, list[Section]]:
     return number, time_ns, found
 
 
-def acknowledged(data: bytes) -> int:
+def parse_acknowledgement(data: bytes) -> int:
     """Return the number of the frame acknowledged by a page; raises MessageError for other data."""
     if len(data) != _ACK.size:
         raise MessageError(f"an acknowledgement of {len(data)} bytes, expected {_ACK.size}")

@@ -96,7 +96,7 @@ class Gate:
         headers = Headers(scope=scope)
         token = parse_qs(scope["query_string"].decode("ascii", "replace")).get("token", [""])[0]
         if scope["type"] == "websocket" and scope["path"] in self._links:
-            await self._linked(token, headers, scope, receive, send)
+            await self._admit_by_link(token, headers, scope, receive, send)
             return
         problem = self._foreign(scope, headers)
         role = self._role(headers)
@@ -118,7 +118,7 @@ class Gate:
 
         await self._app(scope, receive, with_headers if scope["type"] == "http" else send)
 
-    async def _linked(
+    async def _admit_by_link(
         self, token: str, headers: Mapping[str, str], scope: Scope, receive: Receive, send: Send
     ) -> None:
         """Let a program in by a link."""
@@ -153,14 +153,14 @@ class Gate:
         for pair in headers.get("cookie", "").split(";"):
             name, _, value = pair.strip().partition("=")
             if name == self._cookie:
-                return _looked_up(self._in, value)
+                return _find_role(self._in, value)
         return None
 
     async def _admit(
         self, token: str, known: Role | None, scope: Scope, receive: Receive, send: Send
     ) -> None:
         """Admit a browser by its token; an admitted browser only gets the page."""
-        role = _looked_up(self._invited, token)
+        role = _find_role(self._invited, token)
         if role is None and known is not None:
             await RedirectResponse("/", status_code=303, headers=_HEADERS)(scope, receive, send)
             return
@@ -194,7 +194,7 @@ def _head_bytes(scope: Scope) -> int:
     return target + sum(len(name) + len(value) for name, value in scope["headers"])
 
 
-def _looked_up(known: Mapping[str, Role], token: str) -> Role | None:
+def _find_role(known: Mapping[str, Role], token: str) -> Role | None:
     """Return the role of a token, in a time independent of the token."""
     found: Role | None = None
     for one, role in known.items():

@@ -13,14 +13,14 @@ from schemas.errors import MessageError
 from schemas.ros import PointStamped, StringMessage
 from webconsole.commands import Pick, Say
 
-__all__ = ["guided", "guiding"]
+__all__ = ["guide_request", "guided_participant"]
 
 _PICK, _COMMAND = "operator/pick", "operator/command"
 _TYPES = {_PICK: PointStamped.ros_type, _COMMAND: StringMessage.ros_type}
 _EYES = ("left", "right")
 
 
-def guided(plan: Plan) -> str | None:
+def guided_participant(plan: Plan) -> str | None:
     """Return the first participant guided by a person; None without such a participant."""
     for name, planned in plan.participants.items():
         inputs = {port.name: port.type for port in planned.ports if port.causality == "input"}
@@ -29,7 +29,7 @@ def guided(plan: Plan) -> str | None:
     return None
 
 
-def guiding(participant: str | None, order: Pick | Say) -> SetRequest:
+def guide_request(participant: str | None, order: Pick | Say) -> SetRequest:
     """Return the request to the hub; raises MessageError if nothing is guided, or no such picture."""
     if participant is None:
         raise MessageError("nothing in this session is guided by a person")

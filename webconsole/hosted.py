@@ -88,10 +88,10 @@ def _give(device: str, hand: Hand | None) -> None:
         hand_of(device).release()
         return
     wish = Wish(hand.linear, hand.angular, hand.gripper, hand.dead_man, hand.jaw)
-    hand_of(device).give(PageInput(wish, hand.drag, _tracked(hand)))
+    hand_of(device).give(PageInput(wish, hand.drag, _tracked_pose(hand)))
 
 
-def _tracked(hand: Hand) -> tuple[Vector3, Quaternion] | None:
+def _tracked_pose(hand: Hand) -> tuple[Vector3, Quaternion] | None:
     """Return where a headset has the head or hand, in the axes of REP 103."""
     if hand.tracked is None:
         return None

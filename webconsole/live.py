@@ -41,7 +41,7 @@ from schemas.network_link import NetworkLinkSpec
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import ScoreCard, SessionStatus
 from webconsole.gauges import HUB, hub_outlets
-from webconsole.guide import guided
+from webconsole.guide import guided_participant
 from webconsole.log import LOGGED, Entries, Entry
 from webconsole.past import Past
 from webconsole.source import Outlet, Value
@@ -223,7 +223,7 @@ class Live:
 
     def _look(self) -> None:
         """Show a session until its end; raises ConnectError without a session."""
-        endpoint, name = self._found()
+        endpoint, name = self._find_session()
         with reach(endpoint, OBSERVER) as session:
             keys = Keys(name)
             described = ask(session, keys.control("describe"), Empty(), DescribeReply)
@@ -252,7 +252,7 @@ class Live:
             raise ScenarioError("there is no session")
         return SessionParameters.of_scenario(self.scenario, Files(Path.cwd())).validated(participant)
 
-    def _found(self) -> tuple[str, str]:
+    def _find_session(self) -> tuple[str, str]:
         for endpoint in self._endpoints():
             for status in live_sessions([endpoint]):
                 if self._session_wanted in (None, status.session):
@@ -283,7 +283,7 @@ class Live:
             ),
             *hub_outlets(described.scenario),
         )
-        self.guided = guided(described.plan)
+        self.guided = guided_participant(described.plan)
         self._by_name = {one.name: one for one in self.outlets}
         self._device_keys = {
             planned.name for planned in described.plan.participants.values() if planned.role == "device"
@@ -316,7 +316,7 @@ class Live:
                 if outlet.participant in self._untagged
                 else self._keys.view(outlet.participant, outlet.port.name)
             )
-            take = Callback(partial(self._take, outlet), indirect=False)
+            take = Callback(partial(self._store, outlet), indirect=False)
             self._subscribers[name] = session.declare_subscriber(key, take)
 
     def _output_key(self, outlet: Outlet) -> str:
@@ -330,7 +330,7 @@ class Live:
             subscriber.undeclare()
         self._subscribers = {}
 
-    def _take(self, outlet: Outlet, sample: zenoh.Sample) -> None:
+    def _store(self, outlet: Outlet, sample: zenoh.Sample) -> None:
         """Keep a value, to be decoded when needed for a frame."""
         payload = sample.payload.to_bytes()
         if outlet.participant in self._untagged:
@@ -351,7 +351,7 @@ class Live:
         self._values[outlet.name] = value
         if outlet.port.type in LOGGED:
             try:
-                for entry in self._lines.of(outlet, value):
+                for entry in self._lines.lines_of(outlet, value):
                     self._note(entry)
             except MessageError as error:
                 self._note(Entry(value.time_ns / 1e9, "warn", outlet.name, f"not shown: {error}"))

@@ -44,7 +44,7 @@ class Entries:
         self._states: dict[str, str] = {}
         """Last line of each periodically published state."""
 
-    def of(self, outlet: Outlet, value: Value) -> Iterator[Entry]:
+    def lines_of(self, outlet: Outlet, value: Value) -> Iterator[Entry]:
         """Yield the new lines of a message; raises MessageError if the message is not valid."""
         for entry in _entries(outlet, value):
             if outlet.port.type == OperatingState.ros_type:

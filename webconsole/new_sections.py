@@ -74,7 +74,7 @@ class NewSections:
             yield name, partial(self._markers, stage, name)
         if show.pictures and (self._at_ns is not None or self._may_send(stage.pictures)):
             for name in stage.pictures:
-                yield name, partial(self._changed, stage, name)
+                yield name, partial(self._changed_section, stage, name)
         for index, name in enumerate(show.numbers):
             if stage.is_numeric(name):
                 yield name, partial(self._sample, stage, index, name)
@@ -92,7 +92,7 @@ class NewSections:
                 return
             self._surfaces.add(name)
             yield surface
-        yield from self._changed(stage, name)
+        yield from self._changed_section(stage, name)
 
     def _arrows(self, stage: Stage, bond: BondArrows) -> Iterator[Section]:
         place, force = self._newest(bond.place), self._newest(bond.force)
@@ -120,7 +120,7 @@ class NewSections:
                     return self._pictures.spend(monotonic_ns())
         return False
 
-    def _changed(self, stage: Stage, name: str) -> Iterator[Section]:
+    def _changed_section(self, stage: Stage, name: str) -> Iterator[Section]:
         value = self._newest(name)
         if value is not None and self._are_new({name: value}):
             yield self._console.section(stage, name, value)

@@ -30,11 +30,11 @@ from webconsole.commands import (
     Show,
     Start,
     Watch,
-    asked_for,
     command,
+    command_name,
 )
 from webconsole.console import Console
-from webconsole.frame import acknowledged, frame
+from webconsole.frame import frame, parse_acknowledgement
 from webconsole.gate import Gate, Role
 from webconsole.live import Live
 from webconsole.new_sections import NewSections
@@ -109,17 +109,17 @@ class Page:
             if not self._rate.spend(monotonic_ns()):
                 await self._refuse("", f"more than {_MESSAGES_PER_S:g} messages/s")
                 continue
-            await self._take(message.get("text"), message.get("bytes"))
+            await self._receive(message.get("text"), message.get("bytes"))
             if self._refused > _MOST_REFUSED:
                 log.warning("a page is closed: %d invalid messages", self._refused)
                 await self._socket.close(1008, "too many invalid messages")
                 return
 
-    async def _take(self, text: str | None, data: bytes | None) -> None:
+    async def _receive(self, text: str | None, data: bytes | None) -> None:
         asked = ""
         try:
             if data is not None:
-                number = acknowledged(data)
+                number = parse_acknowledgement(data)
                 if not self._acknowledged < number <= self._number:
                     raise MessageError(f"frame {number} is acknowledged, the last one was {self._number}")
                 self._acknowledged = number
@@ -131,7 +131,7 @@ class Page:
                 raise MessageError("a viewer may look, and nothing else: ask the operator for a link")
             answer = await self._do(order)
         except TrocarError as error:
-            await self._refuse(asked or asked_for(text or ""), str(error))
+            await self._refuse(asked or command_name(text or ""), str(error))
             return
         if answer is not None:
             await self._tell({"is": "answer", "to": asked, **answer})
@@ -147,7 +147,7 @@ class Page:
             case At():
                 self._at_ns = None if order.time is None else self._past_ns(order.time)
             case Hand():
-                self._console.pilots.take(self, order)
+                self._console.pilots.pass_on(self, order)
                 return None
             case Lead():
                 self._console.pilots.lead(self, order.device, beside=order.beside)
@@ -174,7 +174,7 @@ class Page:
                 self._console.started.end(order.number)
                 return {}
             case Watch():
-                self._console.live().watch(order.session)
+                self._console.live_source().watch(order.session)
             case Invite():
                 return {"path": self._gate.invite(order.role), "role": order.role}
         self._changed.set()

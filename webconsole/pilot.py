@@ -58,7 +58,7 @@ class Pilots:
         for device in [name for name, holder in self._pages.items() if holder is page]:
             self._release(device)
 
-    def take(self, page: object, hand: Hand) -> None:
+    def pass_on(self, page: object, hand: Hand) -> None:
         """Pass a page's wish to the page's device; raises MessageError if the page leads no such device."""
         led = [name for name, holder in self._pages.items() if holder is page]
         if not led:

@@ -48,7 +48,7 @@ class ReadyProcess:
         with suppress(PermissionError):  # an open file of Windows keeps its name
             self._file.unlink()
 
-    def said(self) -> str:
+    def read_output(self) -> str:
         """Return the output of the process so far."""
         self._said.seek(0)
         return self._said.read().decode(errors="replace")

@@ -140,7 +140,7 @@ class Recorded:
             columns, pyramid = self._pyramid(name)
         return columns, pyramid.rows(start_s, end_s, buckets)
 
-    def pressed(self, bond: BondArrows, most: int) -> Vector:
+    def force_rows(self, bond: BondArrows, most: int) -> Vector:
         """Return rows of time (s), point (m) and force (N) of a bond with a single point, shape (n, 7).
 
         Of more than `most` rows, each second, third, ... is kept. Raises RecordingError.
@@ -188,7 +188,7 @@ class Recorded:
         damaged = list[Entry]()
         for message in self.recording.messages(self._topics[outlet.name]):
             try:
-                yield from lines.of(outlet, Value(message.time_ns, message.payload))
+                yield from lines.lines_of(outlet, Value(message.time_ns, message.payload))
             except MessageError as error:
                 damaged.append(Entry(message.time_ns / 1e9, "warn", outlet.name, str(error)))
         if damaged:

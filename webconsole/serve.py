@@ -26,7 +26,7 @@ from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
 from webconsole.server import Server
 
-__all__ = ["opened_recording", "serve"]
+__all__ = ["open_recording", "serve"]
 
 if TYPE_CHECKING:
     from webconsole.foxglove.face import Face
@@ -75,7 +75,7 @@ def serve(
             signal.signal(signal.SIGHUP, _terminate)
         listening = on_loopback(port) if listen is None else with_tls(listen, certificates)
         stack.enter_context(listening.socket)
-        source = Live(endpoint, session, parent) if recording is None else opened_recording(recording, stack)
+        source = Live(endpoint, session, parent) if recording is None else open_recording(recording, stack)
         _serve(source, listening, role, browse=browse, foxglove=foxglove)
 
 
@@ -83,7 +83,7 @@ def _terminate(_number: int, _frame: FrameType | None) -> None:
     signal.raise_signal(signal.SIGTERM)
 
 
-def opened_recording(recording: Path, stack: ExitStack) -> Recorded:
+def open_recording(recording: Path, stack: ExitStack) -> Recorded:
     """Return a recording, open as long as `stack`; of a truncated recording, the whole part."""
     try:
         return Recorded(recording)
@@ -112,7 +112,7 @@ def _serve(
         console.drawable = join
         source.start()
 
-    def started() -> None:
+    def announce_link() -> None:
         _say(f"the page is at {link}")
         if listening.certificate is not None:
             authority = listening.certificate.with_name("ca.pem")
@@ -128,7 +128,7 @@ def _serve(
             webbrowser.open(link)
 
     try:
-        server.run(started)
+        server.run(announce_link)
     finally:
         hosted.close()
         if face is not None:

@@ -19,7 +19,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from hub.planning.scenario_file import installed_scenarios
 from hub.recording.recording import Recording
 from schemas.errors import MessageError, TrocarError
-from webconsole.assets import asset, compress_all, compressed
+from webconsole.assets import asset, compress_all, gzip_response
 from webconsole.commands import MOST_BYTES
 from webconsole.console import Console
 from webconsole.fork import fork_form, tree_of
@@ -71,7 +71,7 @@ class Server:
                 Route("/web/{name:path}", asset),
                 Route("/scene", self._scene),
                 Route("/series", self._series),
-                Route("/pressed", self._pressed),
+                Route("/pressed", self._force_rows),
                 Route("/events", self._events),
                 Route("/sessions", self._sessions),
                 Route("/start", self._start),
@@ -146,7 +146,7 @@ class Server:
         stage = await self._console.stage()
         if stage is None:
             return PlainTextResponse("no session\n", status_code=404)
-        return compressed(stage.packed, _BINARY)
+        return gzip_response(stage.packed_geometry, _BINARY)
 
     async def _series(self, request: Request) -> Response:
         """Answer with the rows of a numeric port of a recording, f64; their columns are in a header."""
@@ -156,7 +156,7 @@ class Server:
             buckets = min(int(query.get("buckets", "1000")), _MOST_BUCKETS)
             if buckets < 1 or not isfinite(start):
                 raise ValueError(f"from {start}, {buckets} buckets")
-            recorded = self._console.recorded()
+            recorded = self._console.recorded_source()
             columns, rows = await asyncio.to_thread(
                 recorded.series, query.get("port", ""), start, end, buckets
             )
@@ -166,15 +166,15 @@ class Server:
             rows.astype("<f8").tobytes(), media_type=_BINARY, headers={"X-Width": str(len(columns) + 1)}
         )
 
-    async def _pressed(self, request: Request) -> Response:
+    async def _force_rows(self, request: Request) -> Response:
         """Answer with time, point and force of a bond of a recording, rows of seven f64."""
         try:
-            recorded, stage = self._console.recorded(), await self._console.stage()
+            recorded, stage = self._console.recorded_source(), await self._console.stage()
             name = request.query_params.get("bond")
             found = [one for one in (stage.arrows if stage else ()) if one.name == name and one.at_one_point]
             if not found:
                 raise MessageError("no bond of this name acts at one point")
-            rows = await asyncio.to_thread(recorded.pressed, found[0], _MOST_BUCKETS)
+            rows = await asyncio.to_thread(recorded.force_rows, found[0], _MOST_BUCKETS)
         except TrocarError as error:
             return PlainTextResponse(f"{error}\n", status_code=400)
         return Response(rows.astype("<f8").tobytes(), media_type=_BINARY)
@@ -182,7 +182,7 @@ class Server:
     async def _events(self, _request: Request) -> Response:
         """Answer with the events of a recording."""
         try:
-            recorded = self._console.recorded()
+            recorded = self._console.recorded_source()
             found = await asyncio.to_thread(lambda: recorded.events)
         except TrocarError as error:
             return PlainTextResponse(f"{error}\n", status_code=400)
@@ -191,7 +191,7 @@ class Server:
     async def _sessions(self, _request: Request) -> Response:
         """Answer with the running sessions of this machine."""
         try:
-            live = self._console.live()
+            live = self._console.live_source()
             return JSONResponse(await asyncio.to_thread(live.sessions))
         except TrocarError as error:
             return PlainTextResponse(f"{error}\n", status_code=400)
@@ -218,6 +218,6 @@ class Server:
 
     async def _of_recording(self, make: Callable[[Recording], object]) -> Response:
         try:
-            return JSONResponse(await asyncio.to_thread(make, self._console.recorded().recording))
+            return JSONResponse(await asyncio.to_thread(make, self._console.recorded_source().recording))
         except TrocarError as error:
             return PlainTextResponse(f"{error}\n", status_code=400)

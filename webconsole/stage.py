@@ -201,7 +201,7 @@ class Stage:
         }
 
     @cached_property
-    def packed(self) -> bytes:
+    def packed_geometry(self) -> bytes:
         """The geometry, compressed by gzip."""
         return gzip.compress(self.geometry, 5, mtime=0)
 

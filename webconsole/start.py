@@ -12,7 +12,7 @@ from schemas.errors import MessageError
 from webconsole.changes import overrides
 from webconsole.commands import Start
 from webconsole.fields import Field, participant_fields, session_fields
-from webconsole.started import page_devices, recorded_in
+from webconsole.started import new_recording_path, page_devices
 
 __all__ = ["start_arguments", "start_form"]
 
@@ -28,12 +28,12 @@ def start_form(name: str) -> dict[str, Any]:
     file = load(name)
     scenario = file.scenario
     scene = cast("dict[str, Any]", file.source.tree.get("scene") or {})
-    session = [_described(field, getattr(scenario, field.label)) for field in session_fields()]
+    session = [_describe_field(field, getattr(scenario, field.label)) for field in session_fields()]
     groups = [{"name": "session", "kind": "", "fields": session}]
     for participant, params in file.params.items():
         kind = scenario.participants[participant].kind
         fields = [
-            _described(field, getattr(params, field.label))
+            _describe_field(field, getattr(params, field.label))
             for field in participant_fields(participant, kind)
             if field.label not in scene
         ]
@@ -63,7 +63,7 @@ def start_arguments(order: Start, directory: Path) -> list[str]:
     if order.pace is not None:
         arguments += ["--pace", order.pace]
     if order.record:
-        arguments += ["--record", str(recorded_in(directory, order.scenario))]
+        arguments += ["--record", str(new_recording_path(directory, order.scenario))]
     return arguments
 
 
@@ -72,7 +72,7 @@ def _require_installed(name: str) -> None:
         raise MessageError(f"there is no installed scenario '{shown(name)}': a page starts no other")
 
 
-def _described(field: Field, value: Any) -> dict[str, Any]:
+def _describe_field(field: Field, value: Any) -> dict[str, Any]:
     """Return a field with the value in the scenario, ready for JSON."""
     return {
         "path": field.path,

@@ -26,7 +26,7 @@ from schemas.trocar_msgs import SessionStatus
 from webconsole.ready import ReadyProcess
 from webconsole.stage import GROUP
 
-__all__ = ["Started", "StartedSession", "page_devices", "recorded_in"]
+__all__ = ["Started", "StartedSession", "new_recording_path", "page_devices"]
 
 log = logging.getLogger(__name__)
 
@@ -136,7 +136,7 @@ class StartedSession:
                     self._look(client)
                 sleep(_LOOK_S)
         if self._hub.returncode and not self._asked_to_end:
-            said = self._ready.hub.said()[-_MOST_SAID:]
+            said = self._ready.hub.read_output()[-_MOST_SAID:]
             self.error = said.partition("error: ")[2].strip() or said.strip() or "it ended without a word"
         if self._viewer is not None:
             self._viewer.terminate()
@@ -144,7 +144,7 @@ class StartedSession:
         self._ready.close()
 
     def _look(self, client: zenoh.Session) -> None:
-        if not self.link and (found := _LINK.search(self._ready.page.said())):
+        if not self.link and (found := _LINK.search(self._ready.page.read_output())):
             self.link = found[0]
         if self.time_s < self.live_from_s:
             for reply in client.get(Keys("*").status, timeout=_PATIENCE_S):
@@ -218,7 +218,7 @@ def page_devices(scenario: Scenario, names: Sequence[str]) -> list[str]:
     return [f"participants.{name}={_PAGE_DEVICE}" for name in names]
 
 
-def recorded_in(parent: Path, stem: str) -> Path:
+def new_recording_path(parent: Path, stem: str) -> Path:
     """Return a new directory for a recording: the stem, or the stem and a number."""
     names = (stem, *(f"{stem}-{number}" for number in range(2, 1000)))
     return next(place for name in names if not (place := parent / name).exists())

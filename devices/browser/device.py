@@ -67,7 +67,7 @@ class Browser(VirtualHand):
         newest = self._hand.newest()
         if newest is None:
             self._spent |= self._pressed[0]
-            return self._press(t, Wish()) + self._diagnosis.report(Level.WARN, self._unled())
+            return self._press(t, Wish()) + self._diagnosis.report(Level.WARN, self._describe_missing_lead())
         asked, age_ns, lead = newest
         if age_ns > self._longest_age_ns:
             self._spent |= self._pressed[0]
@@ -88,7 +88,7 @@ class Browser(VirtualHand):
             self._stylus.place(*asked.tracked)
         return samples + self._motion(t)
 
-    def _unled(self) -> str:
+    def _describe_missing_lead(self) -> str:
         if self._hand.served:
             return f"no page leads: choose 'Lead {self.name}' on the page of `trocar view`"
         return (

@@ -11,7 +11,7 @@ from devices.vendor_axes import Vector3
 if TYPE_CHECKING:  # a servo process does without pydantic
     from schemas.trocar_msgs import ContactModel
 
-__all__ = ["ZERO", "Plane", "checked", "planes_of"]
+__all__ = ["ZERO", "Plane", "check_planes", "planes_of"]
 
 ZERO: Vector3 = (0.0, 0.0, 0.0)
 
@@ -41,7 +41,7 @@ def planes_of(model: ContactModel) -> tuple[Plane, ...]:
     )
 
 
-def checked(planes: Sequence[Plane]) -> tuple[Plane, ...] | None:
+def check_planes(planes: Sequence[Plane]) -> tuple[Plane, ...] | None:
     """Return `planes` with normals of length 1, or None if invalid.
 
     Invalid are more than four planes, a number not finite, a negative coefficient, a normal without a

@@ -72,7 +72,7 @@ class Limits:
     calm_ticks: int = 4
     """... for this number of ticks."""
 
-    def bounded(self, device: DeviceLimits) -> Limits:
+    def bound_by(self, device: DeviceLimits) -> Limits:
         """Return these limits, each no larger than the limit of `device`."""
         return replace(
             self,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot, inf
 
-from devices.haptics.contact import Plane, checked
+from devices.haptics.contact import Plane, check_planes
 from devices.haptics.limits import Limits
 from devices.haptics.passivity import Passivity
 from devices.haptics.rendering import Renderer
@@ -64,7 +64,7 @@ class HapticLoop:
         """
         if stamp_ns <= self._stamp_ns and arrived - self._arrived <= self._limits.silence:
             return False
-        valid = checked(planes)
+        valid = check_planes(planes)
         if valid is None or not abs(arrived) < inf:
             return False
         self._appeared = bool(valid) and (self._appeared or not self._planes)
@@ -96,7 +96,7 @@ class HapticLoop:
             wanted = self._passivity.correct(wanted, position, velocity, dt)
         given = self._chain.tick(wanted, velocity, age=age, permitted=permitted, dt=dt, ready=ready)
         if self._passivity is not None:
-            self._passivity.applied(given)
+            self._passivity.remember_force(given)
         if self._chain.condition is Condition.INVALID:
             self._renderer.reset()
         return given

@@ -107,4 +107,4 @@ class SafetyParams(Params):
             ramp=self.ramp * 1e-9,
             calm_force=self.calm_force,
             calm_ticks=self.calm_ticks,
-        ).bounded(device)
+        ).bound_by(device)

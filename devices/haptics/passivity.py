@@ -50,6 +50,6 @@ class Passivity:
         damping = min(-left / (square * dt), self._damping)
         return fx - damping * vx, fy - damping * vy, fz - damping * vz
 
-    def applied(self, force: Vector3) -> None:
+    def remember_force(self, force: Vector3) -> None:
         """Remember the force (N) on the hand until the next tick."""
         self._given = force

@@ -55,9 +55,9 @@ class Renderer:
         if not touched:
             self._anchor = None
             return ZERO
-        return self._pushed(touched, position, velocity, moving=age < DEAD_RECKONING)
+        return self._contact_force(touched, position, velocity, moving=age < DEAD_RECKONING)
 
-    def _pushed(
+    def _contact_force(
         self, touched: list[tuple[Plane, float]], position: Vector3, velocity: Vector3, *, moving: bool
     ) -> Vector3:
         vx, vy, vz = velocity
@@ -77,10 +77,10 @@ class Renderer:
         if not rubbing:
             self._anchor = None
             return fx, fy, fz
-        rx, ry, rz = self._rubbed(rubbing, position, velocity)
+        rx, ry, rz = self._friction(rubbing, position, velocity)
         return fx + rx, fy + ry, fz + rz
 
-    def _rubbed(self, rubbing: list[_Rubbing], position: Vector3, velocity: Vector3) -> Vector3:
+    def _friction(self, rubbing: list[_Rubbing], position: Vector3, velocity: Vector3) -> Vector3:
         """Return the friction of all planes, each at most its cone's radius, towards their common anchor."""
         x, y, z = position
         way = _difference(self._anchor or position, position)

@@ -94,7 +94,7 @@ class SafetyChain:
             return self._off(Condition.TOO_FAST)
         self._fade(size, age, dt)
         scale = self._gain * min(1.0, limits.force / size) if size else 0.0
-        self.force = _slewed(
+        self.force = _limit_slew(
             self.force, (scale * wanted[0], scale * wanted[1], scale * wanted[2]), limits.slew
         )
         return self.force
@@ -121,7 +121,7 @@ class SafetyChain:
         return ZERO
 
 
-def _slewed(last: Vector3, wanted: Vector3, slew: float) -> Vector3:
+def _limit_slew(last: Vector3, wanted: Vector3, slew: float) -> Vector3:
     """Return the force nearest to `wanted` within `slew` of the segment between zero and `last`.
 
     Let p be the segment's point nearest to `wanted`; the answer is p, moved towards `wanted` by at most

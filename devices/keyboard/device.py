@@ -59,13 +59,13 @@ class Keyboard(VirtualHand):
         if not self._timer.due(t):
             return []
         try:
-            return self._samples(t, self._window or self._opened())
+            return self._samples(t, self._window or self._open_window())
         except DeviceError as error:
             self.close()
             self._timer.failed(t)
             return self._diagnosis.report(Level.ERROR, f"{error}; the next try is in a second")
 
-    def _opened(self) -> Window:
+    def _open_window(self) -> Window:
         from devices.keyboard.window import Window
 
         self._window = Window(self.name)

@@ -51,7 +51,7 @@ def _sum(a: Vector3, b: Vector3) -> Vector3:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-def _limited(share: Vector3, speed: float) -> Vector:
+def _limit_speed(share: Vector3, speed: float) -> Vector:
     """Return the velocity, shape (3,), of at most `speed` in any direction."""
     wish = np.array(share)
     return wish * (speed / max(1.0, float(np.linalg.norm(wish))))
@@ -79,9 +79,9 @@ class VirtualStylus:
 
     def advance(self, wish: Wish, dt: float) -> None:
         """Move for `dt` seconds by the command `wish`."""
-        own = _limited(wish.angular, self._turn_speed)
+        own = _limit_speed(wish.angular, self._turn_speed)
         self._linear, self._angular = (
-            _limited(wish.linear, self._speed),
+            _limit_speed(wish.linear, self._speed),
             rotation.matrix(self._orientation) @ own,
         )
         self._position = self._position + dt * self._linear

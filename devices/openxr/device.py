@@ -53,12 +53,12 @@ def check() -> tuple[bool, str, str]:
     """Return whether this machine has a usable runtime, its name, and the remedy, for `trocar doctor`."""
     if find_spec("xr") is None:
         return False, "pyopenxr is not installed", "pip install 'trocar[openxr]'"
-    from devices.openxr.runtime import lacking, offered
+    from devices.openxr.runtime import describe_missing, offered_extensions
 
     _silence_loader()
     remedy = "install SteamVR or Monado, and make it the system's active OpenXR runtime"
     try:
-        problem = lacking(offered())
+        problem = describe_missing(offered_extensions())
     except DeviceError as error:
         return False, str(error), remedy
     return (

@@ -14,7 +14,7 @@ from devices.openxr import clock
 from devices.vendor_axes import Vector3
 from schemas.errors import DeviceError
 
-__all__ = ["ORIGINS", "OpenXrRuntime", "lacking", "offered"]
+__all__ = ["ORIGINS", "OpenXrRuntime", "describe_missing", "offered_extensions"]
 
 HEADLESS, PRESENCE = "XR_MND_headless", "XR_EXT_user_presence"
 """Extensions: a session without graphics, required; events about wearing the headset, optional."""
@@ -26,7 +26,7 @@ for the position.
 _Event = TypeVar("_Event", bound=Structure)
 
 
-def offered() -> set[str]:
+def offered_extensions() -> set[str]:
     """Return the names of the extensions of the system's active runtime.
 
     The runtime is loaded, not started.
@@ -38,10 +38,10 @@ def offered() -> set[str]:
             extension.extension_name.decode() for extension in xr.enumerate_instance_extension_properties()
         }
     except xr.exception.XrException as error:
-        raise _unanswered(error) from error
+        raise _no_runtime_error(error) from error
 
 
-def lacking(found: set[str]) -> str:
+def describe_missing(found: set[str]) -> str:
     """Return the missing parts of a runtime with extensions `found`; empty if enough for the head's pose."""
     missing = [name for name in (HEADLESS, clock.EXTENSION) if name not in found]
     return (
@@ -81,8 +81,8 @@ class OpenXrRuntime:
         except xr.exception.XrException as error:
             self.close()
             raise DeviceError(
-                f"there is no headset, or the OpenXR runtime refuses a session ({_described(error)}); plug it"
-                " in and check the runtime"
+                f"there is no headset, or the OpenXR runtime refuses a session ({_describe_error(error)});"
+                " plug it in and check the runtime"
             ) from error
         except DeviceError:
             self.close()
@@ -90,7 +90,7 @@ class OpenXrRuntime:
 
     @staticmethod
     def _make_instance() -> xr.Instance:
-        found = offered()
+        found = offered_extensions()
         version = xr.Version(1, 0, 0)
         about = xr.ApplicationInfo(
             application_name="trocar",
@@ -107,7 +107,9 @@ class OpenXrRuntime:
         # missing extensions are checked after the failure, because only a failure makes the loader look for
         # the active runtime again
         except xr.exception.XrException as error:
-            raise DeviceError(lacking(found)) if lacking(found) else _unanswered(error) from error
+            raise (
+                DeviceError(describe_missing(found)) if describe_missing(found) else _no_runtime_error(error)
+            ) from error
 
     def locate(self) -> HeadState | NoHead:
         """Return the head's present state. Raises DeviceError if the runtime or the session is lost."""
@@ -119,15 +121,15 @@ class OpenXrRuntime:
                 )
             if not self._present:
                 return NoHead(Level.WARN, "the headset is not worn; put it on")
-            return self._located(self._now())
+            return self._locate_head(self._now())
         except xr.TimeInvalidError:  # SteamVR, at the start (cmbruns/pyopenxr_examples, issue 12)
             return NoHead(Level.WARN, "the OpenXR runtime gives no time yet; wait, or restart it")
         except xr.exception.XrException as error:
             raise DeviceError(
-                f"the OpenXR runtime or the headset is lost ({_described(error)}); start it, plug it in"
+                f"the OpenXR runtime or the headset is lost ({_describe_error(error)}); start it, plug it in"
             ) from error
 
-    def _located(self, now: int) -> HeadState | NoHead:
+    def _locate_head(self, now: int) -> HeadState | NoHead:
         velocity = xr.SpaceVelocity()
         location = xr.SpaceLocation(next=velocity)
         result = xr.check_result(xr.raw_functions.xrLocateSpace(self._head, self._base, now, byref(location)))
@@ -194,11 +196,12 @@ def _vector(v: xr.Vector3f) -> Vector3:
     return v.x, v.y, v.z
 
 
-def _unanswered(error: xr.exception.XrException) -> DeviceError:
+def _no_runtime_error(error: xr.exception.XrException) -> DeviceError:
     return DeviceError(
-        f"no OpenXR runtime answers ({_described(error)}); start one, and make it the system's active one"
+        f"no OpenXR runtime answers ({_describe_error(error)}); start one, and make it the system's"
+        " active one"
     )
 
 
-def _described(error: Exception) -> str:
+def _describe_error(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"

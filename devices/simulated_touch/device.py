@@ -18,7 +18,7 @@ from devices.haptics.safety import Condition
 from devices.samples import button_sample
 from devices.simulated_touch.hand import Hand
 from devices.simulated_touch.params import SimulatedStylusParams, SimulatedTouchParams
-from devices.simulated_touch.path import recorded, scripted
+from devices.simulated_touch.path import recorded_path, waypoint_path
 from hub.participant import Device, Params, Sample, Value
 from schemas.errors import MessageError
 from schemas.ports import Port
@@ -100,9 +100,9 @@ class _Stylus:
         self._ports, self._samples = ports, StylusSamples(ports)
         self._diagnosis = _diagnosis(participant, stylus)
         self._path = (
-            recorded(params.path, stylus, params.dead_man)
+            recorded_path(params.path, stylus, params.dead_man)
             if isinstance(params.path, Path)
-            else scripted(params.path)
+            else waypoint_path(params.path)
         )
         self._loop = HapticLoop(params.safety.within(TOUCH), passivity=params.safety.passivity)
         self._dead_man = params.dead_man

@@ -41,7 +41,7 @@ class Waypoint(Params):
 
     @field_validator("buttons")
     @classmethod
-    def _known(cls, buttons: tuple[int, ...] | None) -> tuple[int, ...] | None:
+    def _check_buttons(cls, buttons: tuple[int, ...] | None) -> tuple[int, ...] | None:
         if buttons is not None and not set(buttons) <= {0, 1}:
             raise ValueError(f"a stylus has the buttons 0 and 1, not {buttons}")
         return buttons

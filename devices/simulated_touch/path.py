@@ -23,7 +23,7 @@ from schemas.codec import decode
 from schemas.errors import RecordingError
 from schemas.ros import Joy, PoseStamped
 
-__all__ = ["HandPath", "recorded", "scripted"]
+__all__ = ["HandPath", "recorded_path", "waypoint_path"]
 
 _Buttons = tuple[bool, bool]
 _RELEASED = (False, False)
@@ -97,7 +97,7 @@ class HandPath:
         return before, after, share, rate / length
 
 
-def scripted(waypoints: Sequence[Waypoint]) -> HandPath:
+def waypoint_path(waypoints: Sequence[Waypoint]) -> HandPath:
     """Return the path through at least one waypoint, in order of their times."""
     stops: list[_Stop] = []
     presses: list[_Press] = []
@@ -110,7 +110,7 @@ def scripted(waypoints: Sequence[Waypoint]) -> HandPath:
     return HandPath(stops, presses, _least_jerk)
 
 
-def recorded(file: Path, stylus: str, dead_man: int) -> HandPath:
+def recorded_path(file: Path, stylus: str, dead_man: int) -> HandPath:
     """Return the path of the hand in a recording, from the first pose on.
 
     Without recorded buttons the hand holds the dead-man. Of several topics with poses (or with buttons) the

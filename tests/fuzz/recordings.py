@@ -257,7 +257,7 @@ def _show(file: Path, _directory: Path) -> None:
         )
         for at_ns in (None, 0, _KEPT_NS // 2):
             frame(1, at_ns or 0, sections.make(stage, show, at_ns))
-        assert stage.packed
+        assert stage.packed_geometry
     except TrocarError as error:
         raise AssertionError(f"the page of a recording ends: {error}") from error
 

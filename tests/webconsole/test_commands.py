@@ -60,7 +60,7 @@ def test_a_device_has_one_pilot(pilots):
     with pytest.raises(MessageError, match="page 1 leads 'hand'"):
         pilots.lead("second", "hand")
     with pytest.raises(MessageError, match="leads no device"):
-        pilots.take("second", hand(0))
+        pilots.pass_on("second", hand(0))
     assert pilots.state("second") == [{"device": "hand", "pilot": "page 1"}]
     pilots.leave("first")
     pilots.lead("second", "hand")
@@ -69,19 +69,19 @@ def test_a_device_has_one_pilot(pilots):
 
 def test_inputs_that_are_old_are_refused(pilots):
     pilots.lead("page", "hand")
-    pilots.take("page", hand(3, dead_man=True))
+    pilots.pass_on("page", hand(3, dead_man=True))
     with pytest.raises(MessageError, match="input 3 is old"):
-        pilots.take("page", hand(3))
+        pilots.pass_on("page", hand(3))
     assert pilots.given == [hand(3, dead_man=True)]
 
 
 def test_who_leaves_lets_go(pilots):
     pilots.lead("page", "hand")
-    pilots.take("page", hand(0, dead_man=True))
+    pilots.pass_on("page", hand(0, dead_man=True))
     pilots.leave("page")
     assert pilots.given[-1] is None
     pilots.lead("page", "hand")
-    pilots.take("page", hand(0))  # it counts from the beginning
+    pilots.pass_on("page", hand(0))  # it counts from the beginning
 
 
 def test_a_silent_page_loses_its_lease(pilots, monkeypatch):
@@ -111,7 +111,7 @@ def test_a_headset_leads_several(pilots):
     pilots.lead("page", "hand")
     pilots.lead("page", "head", beside=True)
     asked = hand(0, device="head", tracked=(0, 1, 0, 0, 0, 0, 1))
-    pilots.take("page", asked)
+    pilots.pass_on("page", asked)
     assert pilots.given == [asked]
     with pytest.raises(MessageError, match="does not lead 'eyes'"):
-        pilots.take("page", hand(1, device="eyes"))
+        pilots.pass_on("page", hand(1, device="eyes"))

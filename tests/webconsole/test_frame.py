@@ -16,9 +16,9 @@ from tests.webconsole.recorded_scene import markers
 from webconsole.frame import (
     Section,
     SectionKind,
-    acknowledged,
     frame,
     node_content,
+    parse_acknowledgement,
     pose_content,
     sections,
 )
@@ -73,9 +73,9 @@ def test_a_frame_cut_short_is_refused(parts, data):
 
 
 def test_an_acknowledgement_has_four_bytes():
-    assert acknowledged(struct.pack("<I", 7)) == 7
+    assert parse_acknowledgement(struct.pack("<I", 7)) == 7
     with pytest.raises(MessageError, match="3 bytes, expected 4"):
-        acknowledged(b"abc")
+        parse_acknowledgement(b"abc")
 
 
 def test_markers_whose_parts_do_not_fit_are_rejected():

@@ -11,24 +11,24 @@ from schemas.errors import MessageError
 from tests.waiting import until
 from tests.webconsole.test_browser import Person, running
 from webconsole.commands import Pick, Say
-from webconsole.guide import guided, guiding
+from webconsole.guide import guide_request, guided_participant
 
 PICTURE = "endoscope.right/image_raw/compressed"
 
 
 def test_the_participant_with_a_persons_inputs_is_guided():
     file = load("suturing-by-hand", [])
-    assert guided(plan_of(file.scenario, file.params)[0]) == "lead"
-    assert guided(SimpleNamespace(participants={})) is None
+    assert guided_participant(plan_of(file.scenario, file.params)[0]) == "lead"
+    assert guided_participant(SimpleNamespace(participants={})) is None
 
 
 def test_a_pixel_is_a_point_in_the_frame_of_its_picture():
-    asked = guiding("lead", Pick(do="pick", picture=PICTURE, x=12.5, y=40.0))
+    asked = guide_request("lead", Pick(do="pick", picture=PICTURE, x=12.5, y=40.0))
     assert (asked.participant, asked.port) == ("lead", "operator/pick")
     assert asked.value["header"] == {"frame_id": "endoscope_right_image"}
     assert asked.value["point"] == {"x": 12.5, "y": 40.0, "z": 0.0}
     for word in ("take over", "consent 3f2a91c0"):
-        said = guiding("lead", Say(do="say", word=word))
+        said = guide_request("lead", Say(do="say", word=word))
         assert (said.port, said.value) == ("operator/command", {"data": word})
 
 
@@ -38,7 +38,7 @@ def test_a_pixel_is_a_point_in_the_frame_of_its_picture():
 )
 def test_what_cannot_be_picked_is_refused(participant, picture, why):
     with pytest.raises(MessageError, match=why):
-        guiding(participant, Pick(do="pick", picture=picture, x=0.0, y=0.0))
+        guide_request(participant, Pick(do="pick", picture=picture, x=0.0, y=0.0))
 
 
 def test_a_stitch_is_clicked_in_a_picture_and_consented_to(browser, tmp_path):

@@ -19,7 +19,7 @@ from tests.webconsole.conftest import finish, served
 from tests.webconsole.test_gate import Visitor
 from webconsole.frame import SectionKind, sections
 from webconsole.recorded import Recorded
-from webconsole.serve import opened_recording
+from webconsole.serve import open_recording
 
 
 @asynccontextmanager
@@ -229,7 +229,7 @@ def test_a_recording_that_was_cut_short_is_shown_as_far_as_it_goes(recording, tm
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
     with ExitStack() as stack:
-        shown = opened_recording(cut, stack)
+        shown = open_recording(cut, stack)
         assert 0.1 < shown.state["end"] < 0.5
         assert "was cut short: it is shown up to" in caplog.text
         assert shown.newest("tissue.probe/wrench", None) is not None

@@ -56,13 +56,13 @@ class Channel:
         self._sent: dict[str, Value] | None = None
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether a client subscribes."""
         return self._channel.has_sinks()
 
     def put(self, newest: Newest) -> None:
         """Send new values, if a client subscribes; raises MessageError if a value is not valid."""
-        if not self.wanted:
+        if not self.has_subscribers:
             self._sent = None
             return
         values = {name: value for name in sorted(self.outlets) if (value := newest(name))}

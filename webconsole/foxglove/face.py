@@ -137,11 +137,11 @@ class Face:
                     troubles.add(str(error))
                     log.warning("not sent to Foxglove: %s", error)
                 await asyncio.sleep(_TROUBLE_S)
-            self._console.want(self, frozenset(self._wanted()))
+            self._console.want(self, frozenset(self._wanted_outlets()))
             await asyncio.sleep(_PERIOD_S)
 
-    def _wanted(self) -> Iterator[str]:
-        return (name for channel in self._channels if channel.wanted for name in channel.outlets)
+    def _wanted_outlets(self) -> Iterator[str]:
+        return (name for channel in self._channels if channel.has_subscribers for name in channel.outlets)
 
     def _repeat(self) -> None:
         """Send constant values once more to new subscribers."""
@@ -152,7 +152,7 @@ class Face:
 
     async def _follow(self) -> None:
         """Offer the topics of the session shown now."""
-        source = self._console.live()
+        source = self._console.live_source()
         if source.generation == self._generation:
             return
         stage = await self._console.stage()

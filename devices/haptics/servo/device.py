@@ -79,7 +79,9 @@ class HapticDevice(Device):
         self._styluses = self._new()
         self._offset_ns = -(2**63)
         self._supervisor = Supervisor(
-            driver, {name: params.spec(name) for name, params in self._stylus_params.items()}, self._opened
+            driver,
+            {name: params.spec(name) for name, params in self._stylus_params.items()},
+            self._start_stylus,
         )
         self._supervisor.start(perf_counter())
 
@@ -133,8 +135,8 @@ class HapticDevice(Device):
             for stylus, params in self._stylus_params.items()
         }
 
-    def _opened(self, process: ServoProcess, message: dict[str, Any]) -> None:
-        self._styluses[message["stylus"]].opened(process, message["hardware"], message["limits"])
+    def _start_stylus(self, process: ServoProcess, message: dict[str, Any]) -> None:
+        self._styluses[message["stylus"]].allow_force(process, message["hardware"], message["limits"])
 
 
 class _Stylus:
@@ -154,7 +156,7 @@ class _Stylus:
         self._posed = False
         self._settling: float | None = None
 
-    def opened(self, process: ServoProcess, hardware: str, stated: dict[str, float]) -> None:
+    def allow_force(self, process: ServoProcess, hardware: str, stated: dict[str, float]) -> None:
         """Allow `process` to give force within the scenario's limits, unless a limit exceeds the device's.
 
         The kind's nominal limit stands for a limit without a statement of the device.
@@ -179,7 +181,9 @@ class _Stylus:
             diagnosis = (
                 diagnoses.FOUND
                 if lost.found
-                else diagnoses.lost(lost.phase, self._error(lost.code), lost.cause, self._params.device)
+                else diagnoses.describe_loss(
+                    lost.phase, self._error(lost.code), lost.cause, self._params.device
+                )
             )
             return [*self._last_force(), *self._diagnosis.report(*diagnosis, self._hardware)]
         samples: list[Sample] = []

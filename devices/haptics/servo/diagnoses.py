@@ -8,7 +8,7 @@ from devices.haptics.safety import Condition
 from devices.haptics.servo.exchange import State
 from devices.haptics.servo.phase import Phase
 
-__all__ = ["FOUND", "Words", "lost", "present"]
+__all__ = ["FOUND", "Words", "describe_loss", "present"]
 
 _AGAIN = "it is tried again by itself"
 _CONDITIONS = tuple(Condition)
@@ -33,7 +33,7 @@ class Words:
 FOUND = Level.WARN, "it is back, and is used as soon as no other hand of this host holds its dead-man"
 
 
-def lost(phase: Phase, error: str, cause: str, device: str | None) -> tuple[Level, str]:
+def describe_loss(phase: Phase, error: str, cause: str, device: str | None) -> tuple[Level, str]:
     """Return the diagnosis of a lost stylus.
 
     Args:

@@ -126,7 +126,7 @@ class Driver(ABC):
         return ()
 
     def start(self, tick: Callable[[float], bool]) -> None:
-        """Start calling `tick` with the time (s of time.perf_counter) at `rate`, until `tick` is False."""
+        """Start calling `tick` (now in s of time.perf_counter) at `rate`, until `tick` returns False."""
         self._timed_loop = TimedLoop(self.rate, tick)
 
     def stop(self) -> None:

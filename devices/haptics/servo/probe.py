@@ -35,7 +35,7 @@ class Probe:
         A stylus without finding after the time limit has None.
         """
         process = self._process
-        for message in process.said():
+        for message in process.read_messages():
             if "absent" in message:
                 self._found[message["stylus"]] = absence(message)
         for name, ring in process.states.items():

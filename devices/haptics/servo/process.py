@@ -93,7 +93,7 @@ class ServoProcess:
         """Whether the watcher killed a standing process with force on a hand; known after `close`."""
         return self._watcher.returncode == HAS_KILLED
 
-    def said(self, timeout_s: float = 0.0) -> list[dict[str, Any]]:
+    def read_messages(self, timeout_s: float = 0.0) -> list[dict[str, Any]]:
         """Return the messages since the last call; wait up to `timeout_s` for the first."""
         found: list[dict[str, Any]] = []
         with contextlib.suppress(Empty):

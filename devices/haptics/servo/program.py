@@ -45,7 +45,7 @@ def _load(choice: str, options: Mapping[str, Any]) -> Driver:
     return kind(**options)
 
 
-def _opened(
+def _open_styluses(
     driver: Driver, config: Mapping[str, Any], memory: memoryview, say: Say
 ) -> Iterator[tuple[str, Stylus]]:
     """Open the devices; report model and limits of each, or the reason of a failure."""
@@ -101,7 +101,7 @@ def main() -> NoReturn:
     try:
         driver = _load(config["driver"], config["options"])
         say({"loaded": True})
-        styluses = dict(_opened(driver, config, memory, say))
+        styluses = dict(_open_styluses(driver, config, memory, say))
     except Exception as error:  # noqa: BLE001  # a driver may raise anything
         say({"failed": failure_text(error)})
         sys.exit(1)

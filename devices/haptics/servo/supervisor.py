@@ -82,7 +82,7 @@ class Supervisor:
         """Start with all styluses. Raises DeviceError if the driver cannot be loaded."""
         self._start(list(self._specs), now)
         assert self._process
-        said = self._process.said(_LOADING)
+        said = self._process.read_messages(_LOADING)
         if not said or "loaded" not in said[0]:
             self.close()
             options = ", ".join(f"{name} '{value}'" for name, value in self._driver.options.items())
@@ -119,7 +119,7 @@ class Supervisor:
         self._held = dict.fromkeys(self._specs, False)
 
     def _attend(self, process: ServoProcess, now: float) -> dict[str, list[State]]:
-        for message in process.said():
+        for message in process.read_messages():
             self._on_message(process, message, now)
         states: dict[str, list[State]] = {}
         for name in process.names:

@@ -16,7 +16,7 @@ from devices.haptics.loop import HapticLoop
 from devices.haptics.safety import Condition, SafetyChain
 from devices.vendor_axes import Vector3
 
-LIMITS = Limits().bounded(TOUCH)
+LIMITS = Limits().bound_by(TOUCH)
 TICK = 0.001
 STILL = (0.0, 0.0, 0.0)
 WALL = Plane(0.0, 0.0, 1.0, 0.0, 0.0, 400.0, 0.0, 0.0)

@@ -23,7 +23,7 @@ def test_with_enough_damping_the_hand_never_gets_more_than_it_gave(
     position, energy = np.zeros(3), 0.0
     for wanted, velocity, dt in ticks:
         force = watch.correct(wanted, tuple(position.tolist()), velocity, dt)
-        watch.applied(force)
+        watch.remember_force(force)
         step = np.array(velocity) * dt
         position += step
         energy = energy - float(np.dot(force, step)) if any(force) else 0.0
@@ -33,7 +33,7 @@ def test_with_enough_damping_the_hand_never_gets_more_than_it_gave(
 @given(forces, velocities, st.floats(0.0, 10.0))
 def test_it_only_ever_brakes(wanted: Vector3, velocity: Vector3, damping: float) -> None:
     watch = Passivity(damping)
-    watch.applied((0.0, 0.0, 1.0))
+    watch.remember_force((0.0, 0.0, 1.0))
     change = np.subtract(watch.correct(wanted, (0.0, 0.0, 0.001), velocity, TICK), wanted)
     assert np.linalg.norm(change) <= damping * hypot(*velocity) + 1e-12
     assert np.dot(change, velocity) <= 0.0
@@ -41,10 +41,10 @@ def test_it_only_ever_brakes(wanted: Vector3, velocity: Vector3, damping: float)
 
 def test_what_one_contact_dissipated_does_not_pay_for_the_next() -> None:
     watch = Passivity(4.0)
-    watch.applied((0.0, 0.0, 2.0))
+    watch.remember_force((0.0, 0.0, 2.0))
     watch.correct((0.0, 0.0, 2.0), (0.0, 0.0, -0.01), ZERO, TICK)
     assert watch.energy == pytest.approx(0.02)
-    watch.applied(ZERO)
+    watch.remember_force(ZERO)
     watch.correct(ZERO, (0.0, 0.0, -0.01), ZERO, TICK)
     assert watch.energy == 0.0
 
@@ -62,7 +62,7 @@ def _swing(watch: Passivity | None) -> float:
         force: Vector3 = (0.0, 0.0, held)
         if watch is not None:
             force = watch.correct(force, hand.position, hand.velocity, TICK)
-            watch.applied(force)
+            watch.remember_force(force)
         hand.move(force, (0.0, 0.0, -0.005), ZERO)
         heights.append(hand.position[2])
     return max(heights[-1000:]) - min(heights[-1000:])

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from devices.haptics.contact import ZERO, Plane, checked, planes_of
+from devices.haptics.contact import ZERO, Plane, check_planes, planes_of
 from devices.haptics.rendering import DEAD_RECKONING, Renderer
 from devices.vendor_axes import Vector3
 from schemas.ros import Vector3 as Vector3Message
@@ -176,13 +176,13 @@ GOOD = TABLE._asdict()
     ],
 )
 def test_what_is_no_plane(change: dict[str, float]) -> None:
-    assert checked([TABLE, Plane(**{**GOOD, **change})]) is None
+    assert check_planes([TABLE, Plane(**{**GOOD, **change})]) is None
 
 
 def test_at_most_four_planes_of_unit_normals() -> None:
-    assert checked([TABLE] * 4) == (TABLE,) * 4
-    assert checked([TABLE] * 5) is None
-    assert checked([TABLE._replace(nz=1.0 + 1e-6)]) == (TABLE,)
+    assert check_planes([TABLE] * 4) == (TABLE,) * 4
+    assert check_planes([TABLE] * 5) is None
+    assert check_planes([TABLE._replace(nz=1.0 + 1e-6)]) == (TABLE,)
 
 
 def test_planes_of_a_message() -> None:

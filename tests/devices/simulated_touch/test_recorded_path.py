@@ -6,7 +6,7 @@ from mcap.writer import Writer
 from pydantic import ValidationError
 
 from devices.simulated_touch.params import SimulatedTouchParams
-from devices.simulated_touch.path import recorded
+from devices.simulated_touch.path import recorded_path
 from schemas.codec import encode, ros2msg_definition
 from schemas.errors import RecordingError
 from schemas.message import Message
@@ -49,7 +49,7 @@ BUTTONS = [
 
 
 def test_the_hand_goes_evenly_from_one_recorded_pose_to_the_next(tmp_path: Path) -> None:
-    path = recorded(_write(tmp_path / "hand.mcap", [*RIGHT, *LEFT, *BUTTONS]), "right", 0)
+    path = recorded_path(_write(tmp_path / "hand.mcap", [*RIGHT, *LEFT, *BUTTONS]), "right", 0)
     assert path.position(0.004) == (pytest.approx((0.004, 0.0, 0.0)), pytest.approx((1.0, 0.0, 0.0)))
     assert path.position(1.0) == ((0.02, 0.0, 0.0), (0.0, 0.0, 0.0))
     assert [path.buttons(ms / 1000) for ms in (0, 5, 6, 11, 12)] == [
@@ -62,7 +62,7 @@ def test_the_hand_goes_evenly_from_one_recorded_pose_to_the_next(tmp_path: Path)
 
 
 def test_without_recorded_buttons_the_hand_holds_the_dead_man(tmp_path: Path) -> None:
-    path = recorded(_write(tmp_path / "hand.mcap", [("/pose", 0, _pose(0.3))]), "right", 1)
+    path = recorded_path(_write(tmp_path / "hand.mcap", [("/pose", 0, _pose(0.3))]), "right", 1)
     assert path.buttons(0.0) == (False, True)
     assert path.position(5.0)[0] == (0.3, 0.0, 0.0)
     assert path.orientation(5.0) == ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
@@ -70,7 +70,7 @@ def test_without_recorded_buttons_the_hand_holds_the_dead_man(tmp_path: Path) ->
 
 def test_a_recording_without_this_hand(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="'middle/pose'"):
-        recorded(_write(tmp_path / "hand.mcap", [*RIGHT, *LEFT]), "middle", 0)
+        recorded_path(_write(tmp_path / "hand.mcap", [*RIGHT, *LEFT]), "middle", 0)
 
 
 def test_a_recording_is_found_beside_the_scenario(tmp_path: Path) -> None:
