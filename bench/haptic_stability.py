@@ -196,7 +196,7 @@ def run(trial: Trial, builder: ContactModelBuilder | Naive) -> np.ndarray:
         t = i * TICK
         up.send(t, hand.position)
         if i % round(PERIOD / TICK) == 0:
-            for number, position in up.arrived(t):
+            for number, position in up.pop_arrivals(t):
                 newest, heard = max((newest, heard), (number, position))
             command = trial.scale * np.array(heard)
             touched = tip.follow(command)
@@ -212,7 +212,7 @@ def run(trial: Trial, builder: ContactModelBuilder | Naive) -> np.ndarray:
                 elapsed=PERIOD,
             )
             down.send(t + PERIOD, planes_of(ContactModel(header=Header(), planes=planes)))
-        for number, planes in down.arrived(t):
+        for number, planes in down.pop_arrivals(t):
             loop.receive(planes, number, t)
         force = loop.tick(t, hand.position, hand.velocity, permitted=True)
         row[:] = *hand.position, *force, *touched

@@ -203,7 +203,7 @@ def _sink(name: str, directory: Path) -> Sink:
         return LibraryProcess(directory)
     recorder = Recorder(directory / "run", attachments={})
     for channel in range(CHANNELS + 1):
-        recorder.channel(f"/{channel}", TYPE)
+        recorder.add_channel(f"/{channel}", TYPE)
     return recorder
 
 

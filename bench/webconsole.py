@@ -362,9 +362,9 @@ def _record(directory: Path, minutes: float) -> int:
     }
     nodes = np.random.default_rng(0).normal(size=750).astype(np.float32)
     with Recorder(directory, attachments=attachments) as recorder:
-        robot = recorder.channel(topic(keys.output("engine", "robot", "qpos")), qpos.port.type)
-        force = recorder.channel(topic(keys.output("engine", "tissue", "probe/wrench")), wrench.port.type)
-        organ = recorder.channel(
+        robot = recorder.add_channel(topic(keys.output("engine", "robot", "qpos")), qpos.port.type)
+        force = recorder.add_channel(topic(keys.output("engine", "tissue", "probe/wrench")), wrench.port.type)
+        organ = recorder.add_channel(
             topic(keys.output("engine", "tissue", "block/nodes")), SoftBodyState.ros_type
         )
         for step in range(steps):

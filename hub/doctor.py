@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import distribution, entry_points
 from importlib.util import find_spec
 
-from hub.import_names import NAMES, collisions
+from hub.import_names import NAMES, import_collisions
 from hub.planning import registry
 from hub.security import credentials
 from hub.transport.loopback_port import LoopbackPort
@@ -50,19 +50,19 @@ def examine() -> list[Finding]:
     Starts no device.
     """
     sections: tuple[Callable[[], Iterator[Finding]], ...] = (
-        _python,
-        _import_names,
-        _zenoh,
-        _certificates,
-        _extras,
-        _kinds,
-        _checks,
-        _ros,
+        _check_python,
+        _check_import_names,
+        _check_zenoh,
+        _check_certificates,
+        _check_extras,
+        _check_kinds,
+        _run_package_checks,
+        _check_ros,
     )
     return [finding for section in sections for finding in section()]
 
 
-def _python() -> Iterator[Finding]:
+def _check_python() -> Iterator[Finding]:
     version = platform.python_version()
     yield Finding(
         "base",
@@ -74,9 +74,9 @@ def _python() -> Iterator[Finding]:
     )
 
 
-def _import_names() -> Iterator[Finding]:
+def _check_import_names() -> Iterator[Finding]:
     """Check for foreign distributions with modules of our names, hiding or overwriting ours."""
-    found = collisions()
+    found = import_collisions()
     if not found:
         yield Finding("base", "import names", True, f"{', '.join(NAMES)} are Trocar's alone", needed=True)
     for one in found:
@@ -94,7 +94,7 @@ def _import_names() -> Iterator[Finding]:
         )
 
 
-def _zenoh() -> Iterator[Finding]:
+def _check_zenoh() -> Iterator[Finding]:
     """Open and join a router on loopback, as a session does."""
     try:
         port = LoopbackPort("tcp/127.0.0.1:0")
@@ -122,7 +122,7 @@ def _zenoh() -> Iterator[Finding]:
         )
 
 
-def _certificates() -> Iterator[Finding]:
+def _check_certificates() -> Iterator[Finding]:
     """Check the certificates of this user for remote machines."""
     directory = credentials.default_directory()
     files = [file for file in sorted(directory.glob("*.pem")) if file.name != "ca.pem"]
@@ -158,7 +158,7 @@ def _certificates() -> Iterator[Finding]:
             )
 
 
-def _extras() -> Iterator[Finding]:
+def _check_extras() -> Iterator[Finding]:
     trocar = distribution("trocar")
     for extra in sorted(trocar.metadata.get_all("Provides-Extra") or []):
         missing = registry.missing_packages(trocar, extra)
@@ -170,8 +170,8 @@ def _extras() -> Iterator[Finding]:
         yield Finding("extra", extra, not missing, detail, f"pip install 'trocar[{extra}]'")
 
 
-def _kinds() -> Iterator[Finding]:
-    broken = registry.broken()
+def _check_kinds() -> Iterator[Finding]:
+    broken = registry.broken_kinds()
     for name, kind in sorted(registry.kinds().items()):
         yield Finding(
             kind.role,
@@ -182,7 +182,7 @@ def _kinds() -> Iterator[Finding]:
         )
 
 
-def _checks() -> Iterator[Finding]:
+def _run_package_checks() -> Iterator[Finding]:
     """Run the checks of packages in the entry-point group `trocar.checks`."""
     for entry in sorted(entry_points(group="trocar.checks"), key=lambda e: e.name):
         try:
@@ -197,7 +197,7 @@ def _checks() -> Iterator[Finding]:
             )
 
 
-def _ros() -> Iterator[Finding]:
+def _check_ros() -> Iterator[Finding]:
     for name, module, remedy in _ROS:
         found = find_spec(module)
         yield Finding(

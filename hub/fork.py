@@ -11,7 +11,7 @@ from hub.hash_comparison import HashComparison
 from hub.observation.summary import Progress, Summary
 from hub.planning.plan import Plan, PlannedConnection, PlannedParticipant
 from hub.planning.renewal import Renewal
-from hub.planning.scenario_file import ScenarioFile, validated
+from hub.planning.scenario_file import ScenarioFile, validate_source
 from hub.planning.scenario_source import Source
 from hub.planning.session_parameters import SessionParameters
 from hub.recording.fork_origin import ForkOrigin
@@ -76,15 +76,15 @@ class Fork:
         step = at_ns // parent.step_ns
         past = parameters.at(step)
         before = _with_parameters(recorded, past)
-        file = _changed(before, directory, overrides)
+        file = _change_scenario(before, directory, overrides)
         scenario = in_one_host(file.scenario) if one_host else file.scenario
-        plan = _going_on(parent, plan_of(scenario, file.params)[0])
+        plan = _fork_plan(parent, plan_of(scenario, file.params)[0])
         if scenario.duration is not None and scenario.duration <= step * plan.step_ns:
             raise ScenarioError(
                 f"the session ends at {scenario.duration / 1e9:g} s, before it is forked at"
                 f" {step * plan.step_ns / 1e9:g} s: set a longer one with --set duration=..."
             )
-        renewals = *past.renewals, *_renewals(before, scenario, plan, step)
+        renewals = *past.renewals, *_parameter_renewals(before, scenario, plan, step)
         grants = _Grants(recording, parent, plan, step)
         self.origin = ForkOrigin(
             parent=str(recording.file),
@@ -111,7 +111,7 @@ class Fork:
                     _new_devices(before, scenario, plan),
                 ),
                 self.origin,
-                self._comparison.take,
+                self._comparison.compare_ack,
             ),
         )
         self._comparison.stop = self.session.state.shutdown
@@ -140,14 +140,14 @@ def _with_parameters(scenario: Scenario, parameters: SessionParameters) -> Scena
     return scenario.model_copy(update={"participants": specs})
 
 
-def _changed(before: Scenario, directory: Path, overrides: Sequence[str]) -> ScenarioFile:
+def _change_scenario(before: Scenario, directory: Path, overrides: Sequence[str]) -> ScenarioFile:
     """Return a recorded scenario with changes."""
     tree: dict[str, Any] = before.model_dump(mode="json")
     source = Source(directory / "scenario.json", tree, {}, before.model_dump_json(indent=2))
-    return validated(source, overrides)
+    return validate_source(source, overrides)
 
 
-def _going_on(parent: Plan, plan: Plan) -> Plan:
+def _fork_plan(parent: Plan, plan: Plan) -> Plan:
     """Return the plan of a fork, with the start values of the parent.
 
     Raises ScenarioError where the stepped part differs from the recorded plan. Participants that only look,
@@ -163,12 +163,14 @@ def _going_on(parent: Plan, plan: Plan) -> Plan:
         raise ScenarioError(f"a fork keeps the order of its parent: {', '.join(names)}")
     for name in names:
         one, other = parent.participants[name], plan.participants[name]
-        if differing := _differing(one, other):
+        if differing := _changed_property(one, other):
             raise ScenarioError(
                 f"participant '{name}' would have other {differing}: in a fork it goes on with its state, so"
                 " only parameters may change that leave these as they are"
             )
-        if parent.connected(name) != plan.connected(name) or _feeding(parent, name) != _feeding(plan, name):
+        if parent.connected_inputs(name) != plan.connected_inputs(name) or _feeding(parent, name) != _feeding(
+            plan, name
+        ):
             raise ScenarioError(
                 f"the inputs of participant '{name}' would be connected in another way; in a fork a device"
                 " may take the place of another one, nothing else"
@@ -180,7 +182,7 @@ def _going_on(parent: Plan, plan: Plan) -> Plan:
     return plan.model_copy(update={"participants": {**plan.participants, **started}})
 
 
-def _differing(one: PlannedParticipant, other: PlannedParticipant) -> str:
+def _changed_property(one: PlannedParticipant, other: PlannedParticipant) -> str:
     """Return the first changed property of a participant that may not change in a fork."""
     parts = {
         "kind": (one.kind, other.kind),
@@ -200,7 +202,7 @@ def _feeding(plan: Plan, name: str) -> list[PlannedConnection]:
     )
 
 
-def _renewals(before: Scenario, scenario: Scenario, plan: Plan, step: int) -> Iterator[Renewal]:
+def _parameter_renewals(before: Scenario, scenario: Scenario, plan: Plan, step: int) -> Iterator[Renewal]:
     """Yield the changes at `step`, if any."""
     changed = {
         name: before.participants[name].params
@@ -242,13 +244,15 @@ class _Grants:
                 f" {last_ns / 1e9:g} s"
             )
         self.run = f"{first.run:x}"
-        self._targets = _targets(parent)
-        self._kept = {key for key, targets in _targets(plan).items() if self._targets.get(key) == targets}
-        self._periods = plan.stops()
+        self._targets = _targets_by_output(parent)
+        self._kept = {
+            key for key, targets in _targets_by_output(plan).items() if self._targets.get(key) == targets
+        }
+        self._periods = plan.grant_stop_periods()
 
     def __iter__(self) -> Iterator[GrantMessage]:
         for grant in takewhile(lambda grant: grant.step < self._end, self._recording.grants()):
-            inlets = [sample for one in grant.inlets for sample in self._entering(one)]
+            inlets = [sample for one in grant.inlets for sample in self._entering_samples(one)]
             begin, end = grant.step, min(grant.horizon_ns // self._step_ns, self._end)
             while begin < end:
                 count = min([end - begin, *(period - begin % period for period in self._periods)])
@@ -262,7 +266,7 @@ class _Grants:
                 )
                 begin, inlets = begin + count, []
 
-    def _entering(self, sample: InletSample) -> Iterator[InletSample]:
+    def _entering_samples(self, sample: InletSample) -> Iterator[InletSample]:
         """Yield a sample by its device, or by the entered inputs if the inputs have another device now."""
         key = sample.participant, sample.port
         if key in self._kept or key not in self._targets:
@@ -272,7 +276,7 @@ class _Grants:
             yield sample.model_copy(update={"participant": participant, "port": port})
 
 
-def _targets(plan: Plan) -> dict[_Key, set[_Key]]:
+def _targets_by_output(plan: Plan) -> dict[_Key, set[_Key]]:
     """Return the inputs fed by each output of a device."""
     targets: dict[_Key, set[_Key]] = {}
     for one in plan.from_devices:

@@ -22,7 +22,7 @@ class HashComparison:
 
     def __init__(self, recording: Recording, plan: Plan, until: int | None = None) -> None:
         self._recorded = {
-            name: _hashes(recording, plan.participants[name])
+            name: _recorded_hashes(recording, plan.participants[name])
             for name in plan.order
             if name in recording.plan().participants
         }
@@ -41,12 +41,12 @@ class HashComparison:
         step, place = min(self._differences)
         return step, self._order[place]
 
-    def take(self, planned: PlannedParticipant, ack: Ack) -> None:
+    def compare_ack(self, planned: PlannedParticipant, ack: Ack) -> None:
         """Compare an ack."""
         recorded = self._recorded.get(planned.name)
         if recorded is None:
             return
-        for found in _steps(planned, ack):
+        for found in _step_hashes(planned, ack):
             if self._until is not None and found[0] >= self._until:
                 return
             expected = next(recorded, None)
@@ -59,12 +59,12 @@ class HashComparison:
                 return
 
 
-def _hashes(recording: Recording, planned: PlannedParticipant) -> Iterator[tuple[int, int]]:
+def _recorded_hashes(recording: Recording, planned: PlannedParticipant) -> Iterator[tuple[int, int]]:
     for ack in recording.acks(planned.name):
-        yield from _steps(planned, Ack(ack.run, ack.epoch, ack.step, ack.state_hash.tolist(), (), ()))
+        yield from _step_hashes(planned, Ack(ack.run, ack.epoch, ack.step, ack.state_hash.tolist(), (), ()))
 
 
-def _steps(planned: PlannedParticipant, ack: Ack) -> Iterator[tuple[int, int]]:
+def _step_hashes(planned: PlannedParticipant, ack: Ack) -> Iterator[tuple[int, int]]:
     """Yield the number and the hash of each step of an ack; steps count from the first of the grant."""
     first = -(-ack.step // planned.period) * planned.period
     return ((first + i * planned.period, value) for i, value in enumerate(ack.state_hash))

@@ -9,7 +9,7 @@ from importlib.metadata import PackagePath, distributions
 from importlib.util import find_spec
 from pathlib import Path
 
-__all__ = ["NAMES", "Collision", "collisions"]
+__all__ = ["NAMES", "Collision", "import_collisions"]
 
 NAMES = (
     "trocar",
@@ -42,7 +42,7 @@ class Collision:
     """The distribution of this file; empty if none."""
 
 
-def collisions() -> list[Collision]:
+def import_collisions() -> list[Collision]:
     """Return the import names not owned by Trocar alone."""
     owners = _owners()
     found: list[Collision] = []

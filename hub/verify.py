@@ -71,9 +71,9 @@ def verify(
         {name: first for name, (first, _) in here.items()},
         directory,
         endpoint=endpoint,
-        past=Past(_grants(recording, plan, most_steps(plan, scenario.window)), parameters),
+        past=Past(_recorded_grants(recording, plan, most_steps(plan, scenario.window)), parameters),
         successors={name: later for name, (_, later) in here.items()},
-        on_ack=comparison.take,
+        on_ack=comparison.compare_ack,
     )
     comparison.stop = session.state.shutdown
     ran = session.run(progress)
@@ -88,7 +88,7 @@ def verify(
     )
 
 
-def _grants(recording: Recording, plan: Plan, most: int) -> Iterator[GrantMessage]:
+def _recorded_grants(recording: Recording, plan: Plan, most: int) -> Iterator[GrantMessage]:
     """Yield the recorded grants, of at most `most` steps.
 
     Raises RecordingError at a grant that does not follow the grant before, or covers more steps: a longer

@@ -22,7 +22,7 @@ if "numpy" not in sys.modules:
 
 from hub.fork import Fork  # noqa: E402
 from hub.observation.summary import Progress, Summary  # noqa: E402
-from hub.planning.scenario_file import ScenarioFile, load, located  # noqa: E402
+from hub.planning.scenario_file import ScenarioFile, load, locate_error  # noqa: E402
 from hub.recording.recording import Recording  # noqa: E402
 from hub.session.launch import launch  # noqa: E402
 from hub.verify import VerifySummary  # noqa: E402
@@ -97,7 +97,7 @@ def run(
         session = launch(file, record=to, one_host=one_host, profile=profile)
         return session.run(progress)
     except ScenarioError as error:
-        raise located(error, file.source) from error
+        raise locate_error(error, file.source) from error
 
 
 def verify(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hub.planning.limits import shown
+from hub.planning.limits import safe_text
 from schemas.errors import MessageError, ScenarioError, did_you_mean
 from schemas.scenario import Scenario
 from webconsole.fields import Scalar, participant_fields, session_fields
@@ -28,8 +28,8 @@ def overrides(scenario: Scenario, changes: Mapping[str, Scalar]) -> list[str]:
     for path, value in changes.items():
         if path not in fields:
             raise MessageError(
-                f"'{shown(path)}' cannot be changed from a page, which changes numbers, switches and choices"
-                f" of kinds that allow it; use the command line.{did_you_mean(path, fields)}"
+                f"'{safe_text(path)}' cannot be changed from a page, which changes numbers, switches and"
+                f" choices of kinds that allow it; use the command line.{did_you_mean(path, fields)}"
             )
         try:
             made.append(fields[path].override(value))

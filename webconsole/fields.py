@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from hub.planning import registry
-from hub.planning.limits import shown
+from hub.planning.limits import safe_text
 from schemas.errors import ScenarioError
 from schemas.scenario import Scenario
 
@@ -51,7 +51,7 @@ class Field(NamedTuple):
             "switch": "true or false",
             "choice": f"one of {', '.join(map(str, self.choices))}",
         }
-        raise ScenarioError(f"--set {shown(text)}: {self.path}: expected {expected[self.control]}")
+        raise ScenarioError(f"--set {safe_text(text)}: {self.path}: expected {expected[self.control]}")
 
     def _allows(self, value: bool | float | str) -> bool:
         match self.control:

@@ -11,7 +11,7 @@ from typing import Any
 
 from hub.planning import registry
 from hub.planning.plan import Plan
-from hub.recording.family import family
+from hub.recording.family import recording_family
 from hub.recording.recording import Recording
 from schemas.errors import ScenarioError
 from schemas.quantity import to_si
@@ -101,5 +101,5 @@ def tree_of(recording: Recording) -> list[dict[str, Any]]:
             "changes": [] if one.origin is None else list(one.origin.changes),
             "shown": one.file == file,
         }
-        for one in family({*files, file})
+        for one in recording_family({*files, file})
     ]

@@ -19,7 +19,7 @@ import zenoh
 from pydantic import BaseModel
 from zenoh.handlers import Callback
 
-from hub.devices.network_link import in_words
+from hub.devices.network_link import describe_link
 from hub.devices.network_link_control import NetworkLinkReply, NetworkLinkRequest
 from hub.participant import Params
 from hub.planning.plan import Plan
@@ -138,7 +138,7 @@ class Live:
                     "delay": link.delay_ns / 1e9,
                     "jitter": link.jitter / 1e9,
                     "loss": link.loss,
-                    "text": in_words(link),
+                    "text": describe_link(link),
                 }
                 for name, link in self._links.items()
             ],
@@ -250,7 +250,7 @@ class Live:
         """Return the validated parameters of a participant. Raises ScenarioError if invalid here."""
         if self.scenario is None:
             raise ScenarioError("there is no session")
-        return SessionParameters.of_scenario(self.scenario, Files(Path.cwd())).validated(participant)
+        return SessionParameters.of_scenario(self.scenario, Files(Path.cwd())).validate_last(participant)
 
     def _find_session(self) -> tuple[str, str]:
         for endpoint in self._endpoints():

@@ -96,7 +96,7 @@ class Recorded:
 
     def params(self, participant: str) -> Params:
         """Return the validated parameters of a participant; raises as `trusted_parameters` does."""
-        return trusted_parameters(self.recording, [participant]).validated(participant)
+        return trusted_parameters(self.recording, [participant]).validate_last(participant)
 
     @cached_property
     def _read_statuses(self) -> tuple[list[tuple[int, SessionStatus]], list[str]]:

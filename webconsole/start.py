@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from hub.planning import registry
-from hub.planning.limits import shown
+from hub.planning.limits import safe_text
 from hub.planning.scenario_file import installed_scenarios, load
 from schemas.errors import MessageError
 from webconsole.changes import overrides
@@ -69,7 +69,7 @@ def start_arguments(order: Start, directory: Path) -> list[str]:
 
 def _require_installed(name: str) -> None:
     if name not in installed_scenarios():
-        raise MessageError(f"there is no installed scenario '{shown(name)}': a page starts no other")
+        raise MessageError(f"there is no installed scenario '{safe_text(name)}': a page starts no other")
 
 
 def _describe_field(field: Field, value: Any) -> dict[str, Any]:

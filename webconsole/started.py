@@ -15,7 +15,7 @@ from typing import Any
 
 import zenoh
 
-from hub.remote.hub_connection import listens, reach
+from hub.remote.hub_connection import is_listening, reach
 from hub.security.credentials import OBSERVER
 from hub.transport.hub_files import running_hubs
 from schemas.codec import decode
@@ -128,7 +128,7 @@ class StartedSession:
             client: zenoh.Session | None = None
             while not self.ended:
                 hub = next((one for one in running_hubs() if one.pid == self._hub.pid), None)
-                if hub is not None and client is None and listens(hub.endpoint):
+                if hub is not None and client is None and is_listening(hub.endpoint):
                     with suppress(ConnectError, MessageError, zenoh.ZError):  # it has only begun to listen
                         client = stack.enter_context(reach(hub.endpoint, OBSERVER))
                         self._viewer = self._ready.page.run(("view", "--connect", hub.endpoint, "--no-open"))

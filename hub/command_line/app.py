@@ -20,7 +20,7 @@ from hub.command_line.hosts import device, engine
 from hub.command_line.link import link
 from hub.command_line.ls import ls
 from hub.command_line.run import run
-from hub.planning.limits import shown
+from hub.planning.limits import safe_text
 from schemas.errors import ScenarioError, TrocarError
 
 __all__ = ["app", "main"]
@@ -60,7 +60,7 @@ for command in (
 ):
     app.command()(command)
 app.add_typer(certs.app, name="certs")
-plugins.mount(app)
+plugins.mount_plugins(app)
 
 
 def _print_version(given: bool) -> None:
@@ -93,7 +93,7 @@ class _Printable(logging.Formatter):
     """A message may quote a stranger's file: nothing in it is a command to the terminal."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return shown(super().format(record), _LONGEST)
+        return safe_text(super().format(record), _LONGEST)
 
 
 def main() -> None:
@@ -102,6 +102,6 @@ def main() -> None:
         app()
     except TrocarError as error:
         log.debug("traceback", exc_info=error)  # shown with --debug
-        message = shown(str(error), _LONGEST)  # it may quote a stranger's file
+        message = safe_text(str(error), _LONGEST)  # it may quote a stranger's file
         console.print(Text("error: ", "bold red"), Text(message), sep="", soft_wrap=True)
         sys.exit(2 if isinstance(error, ScenarioError) else 1)

@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hub.observation.summary import Progress
-from hub.planning.limits import shown
+from hub.planning.limits import safe_text
 from hub.recording.profiles import profile_tables
 from hub.recording.scores import score_tables
 from schemas.scenario import Scenario
@@ -37,7 +37,7 @@ def table(rows: Iterable[Iterable[object]], *columns: str) -> Table:
         made.add_column(name, overflow="fold")  # a narrow terminal cuts nothing off
     for row in rows:
         # a name may be a stranger's: it is neither markup of rich nor a command to the terminal
-        made.add_row(*(Text(shown(str(cell), _LONGEST)) for cell in row))
+        made.add_row(*(Text(safe_text(str(cell), _LONGEST)) for cell in row))
     return made
 
 

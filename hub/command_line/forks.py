@@ -13,7 +13,7 @@ from rich.console import Console
 from hub.command_line.display import RunProgress, show, table
 from hub.command_line.options import Certificates, Directory, Json, Overrides, RecordingPath, Trust
 from hub.command_line.run import Listening, OneHost, RecordTo, require_complete
-from hub.recording.family import family
+from hub.recording.family import recording_family
 from hub.recording.recording import Recording
 from hub.transport.loopback_port import listening_ports
 from schemas.quantity import Duration
@@ -21,7 +21,7 @@ from schemas.quantity import Duration
 __all__ = ["fork", "forks"]
 
 
-def _instant(text: str) -> int:
+def _parse_instant(text: str) -> int:
     try:
         at_ns: int = TypeAdapter[int](Duration).validate_python(text)
     except ValidationError as error:
@@ -56,7 +56,7 @@ def fork(
     inside, outside = listening_ports(listen or ())
     made = Fork(
         Recording(recording, unfinished=True),
-        _instant(at),
+        _parse_instant(at),
         [*(overrides or ()), *([f"pace={pace}"] if pace else ())],
         record=record,
         trust=trust,
@@ -81,7 +81,7 @@ def forks(
     as_json: Json = False,
 ) -> None:
     """Show recordings as a tree: below each recording its forks, with instant and changes."""
-    members = list(family(places or [Path()]))
+    members = list(recording_family(places or [Path()]))
     if as_json:
         rows: list[dict[str, Any]] = [
             {

@@ -26,7 +26,7 @@ _PROFILE_COLUMNS = ("session", "core-seconds per simulated second", "most of it"
 
 def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Json = False) -> None:
     """List the running sessions: endpoints, participants, devices, latencies, and users of processor time."""
-    found = _found(connect, certs)
+    found = _find_sessions(connect, certs)
     if as_json:
         typer.echo(json.dumps([_session_row(session) for session in found], indent=2))
         return
@@ -72,7 +72,7 @@ class _Found(NamedTuple):
     """Profile of a profiled session (`hub/recording/profiles.py`)."""
 
 
-def _found(connect: Sequence[str] | None, certificates: Path | None) -> list[_Found]:
+def _find_sessions(connect: Sequence[str] | None, certificates: Path | None) -> list[_Found]:
     """Return the sessions at the endpoints `connect`, by default all of this machine, sorted by name."""
     from hub.remote.live_sessions import live_profiles, live_sessions
     from hub.transport.hub_files import running_hubs

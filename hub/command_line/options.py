@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hub.planning.scenario_file import installed_scenarios, located
+from hub.planning.scenario_file import installed_scenarios, locate_error
 from hub.planning.scenario_source import Source
 from schemas.errors import ScenarioError
 
@@ -92,4 +92,4 @@ def with_places(source: Source) -> Generator[None]:
     try:
         yield
     except ScenarioError as error:
-        raise located(error, source) from error
+        raise locate_error(error, source) from error

@@ -12,7 +12,7 @@ import typer
 import typer.main
 from typer.core import TyperGroup
 
-__all__ = ["GROUP", "mount"]
+__all__ = ["GROUP", "mount_plugins"]
 
 log = logging.getLogger(__name__)
 
@@ -23,7 +23,7 @@ Modules of the group are imported at every start of `trocar`, so further imports
 """
 
 
-def mount(app: typer.Typer) -> None:
+def mount_plugins(app: typer.Typer) -> None:
     """Add every installed command to `app`; log a warning about a broken command."""
     taken = {
         (info.name or getattr(info.callback, "__name__", "")).replace("_", "-")

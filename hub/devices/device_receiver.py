@@ -64,26 +64,26 @@ class DeviceReceiver:
         self._thread.start()
         self._subscribers = [
             session.declare_subscriber(one.key, Callback(partial(self._put, one), indirect=False))
-            for one in self._subscriptions(session)
+            for one in self._create_subscriptions(session)
         ]
 
-    def _subscriptions(self, session: zenoh.Session) -> Iterator[_Subscription]:
+    def _create_subscriptions(self, session: zenoh.Session) -> Iterator[_Subscription]:
         """Yield the keys to receive: the bundle of each participant's signals, and each event port."""
         plan, keys, name = self._run.plan, self._run.keys, self._name
         outlets = [outlet for outlet in plan.to_devices if outlet.target == name]
         for source in dict.fromkeys(outlet.source for outlet in outlets):
             signals = bundled_connections(plan, source, name)
             if signals:
-                inputs = [self._input(outlet) for outlet in signals]
+                inputs = [self._create_input(outlet) for outlet in signals]
                 uses = session.declare_publisher(keys.uses(name, source), express=True)
                 self._uses.append(([outlet.target_port for outlet in signals], uses))
                 yield _Subscription(keys.signals(source, name), inputs, whole=False)
             for outlet in outlets:
                 if outlet.source == source and outlet not in signals:
                     key = keys.feed(source, outlet.source_port)
-                    yield _Subscription(key, [self._input(outlet)], whole=True)
+                    yield _Subscription(key, [self._create_input(outlet)], whole=True)
 
-    def _input(self, outlet: ConnectionToDevice) -> _Input:
+    def _create_input(self, outlet: ConnectionToDevice) -> _Input:
         made = _Input(
             outlet, self._run, self._link, self._device, self._refusals, self.latencies, self._offset
         )
@@ -183,16 +183,16 @@ class _Input:
 
     def receive(self, tag: Tag, payload: bytes) -> None:
         """Write a value (CDR), or send it over the link; raises MessageError for an invalid value."""
-        self._take(tag, self._codec.decode(payload))
+        self._accept_value(tag, self._codec.decode(payload))
 
     def receive_packed(self, tag: Tag, packed: bytes) -> None:
         """Write a value of a bundle, or send it over the link; raises MessageError for an invalid value."""
         value = self._codec.unpack(packed)
         if self._as_messages and self._codec.vector is not None:
             value = self._codec.vector.to_message(value, tag.time_ns)
-        self._take(tag, value)
+        self._accept_value(tag, value)
 
-    def _take(self, tag: Tag, value: Value) -> None:
+    def _accept_value(self, tag: Tag, value: Value) -> None:
         if self._link.idle:
             self._write(tag, value)
         else:
@@ -200,7 +200,7 @@ class _Input:
 
     def write_arrived(self, t: int) -> None:
         """Write the values past the link by `t` (ns since the start of the device's thread)."""
-        for _, (tag, value) in self._line.arrived(t):
+        for _, (tag, value) in self._line.pop_arrivals(t):
             self._write(tag, value)
 
     def _write(self, tag: Tag, value: Value) -> None:

@@ -74,7 +74,7 @@ class DeviceThread:
             if uplink is not None and self._current:
                 uplink.exchange(self.now_ns, list(self._current.values()))
 
-    def unused(self) -> Collection[str]:
+    def unused_signals(self) -> Collection[str]:
         """Return the signals not used by the device now."""
         return self._device.unused()
 

@@ -160,7 +160,7 @@ class Inlets:
                     inlet.arrived_ns, inlet.stale = None, True
                     self._offered.discard(inlet.number)
                     if not inlet.codec.is_event:
-                        entering.append(_staleness(inlet, stale=True))
+                        entering.append(_staleness_change(inlet, stale=True))
         return entering
 
     def sample(self, time_ns: int, wall_ns: int) -> list[Entering]:
@@ -184,12 +184,12 @@ class Inlets:
                     if sent_ns is not None and offset_ns is not None:
                         self.latencies.add("device to grant", inlet.name, now_ns - sent_ns - offset_ns)
                 if stale != inlet.stale and not inlet.queue:
-                    entering.append(_staleness(inlet, stale=stale))
+                    entering.append(_staleness_change(inlet, stale=stale))
                 inlet.queue.clear()
                 inlet.stale = stale
             self._offered.clear()
         return entering
 
 
-def _staleness(inlet: _Inlet, *, stale: bool) -> Entering:
+def _staleness_change(inlet: _Inlet, *, stale: bool) -> Entering:
     return Entering(inlet.source, inlet.port, stale, np.zeros(0, np.uint8), 0)

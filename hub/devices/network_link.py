@@ -23,7 +23,7 @@ from pydantic import BaseModel, ConfigDict
 from schemas.network_link import NetworkLinkSpec, Outage
 from schemas.ports import Port
 
-__all__ = ["Line", "NetworkLink", "NetworkLinkOrder", "in_words"]
+__all__ = ["Line", "NetworkLink", "NetworkLinkOrder", "describe_link"]
 
 
 class NetworkLinkOrder(BaseModel):
@@ -51,7 +51,7 @@ class Line:
     _last_ns: int = 0
 
     @property
-    def empty(self) -> bool:
+    def is_empty(self) -> bool:
         """Whether no message is on the way."""
         return not self._waiting
 
@@ -71,7 +71,7 @@ class Line:
         self._count += 1
         heappush(self._waiting, (arrival_ns, self._count, message))
 
-    def arrived(self, now_ns: int) -> Iterator[tuple[int, Any]]:
+    def pop_arrivals(self, now_ns: int) -> Iterator[tuple[int, Any]]:
         """Yield time of arrival and message of all new arrivals, in the order of arrival."""
         while self._waiting and self._waiting[0][0] <= now_ns:
             arrival_ns, _, message = heappop(self._waiting)
@@ -101,14 +101,14 @@ class NetworkLink:
     @property
     def idle(self) -> bool:
         """Whether the link is clear and no message is on the way: messages may pass beside the link."""
-        return self.clear and (not self.used or all(line.empty for line in self._lines.values()))
+        return self.clear and (not self.used or all(line.is_empty for line in self._lines.values()))
 
     def line(self, port: Port) -> Line:
         """Return the line of a port of the device: outputs go to the hub, inputs come from the hub."""
         line = self._lines.get((port.causality, port.name))
         if line is None:
             line = self._lines[port.causality, port.name] = Line(
-                self, port.variability == "event", self._chance(port.causality, port.name)
+                self, port.variability == "event", self._random_numbers(port.causality, port.name)
             )
         return line
 
@@ -126,7 +126,7 @@ class NetworkLink:
                 *([Outage.model_construct(at=now_ns, duration=order.outage_ns)] if order.outage_ns else ()),
             ]
             for (causality, name), line in self._lines.items() if reseeded else ():
-                line.chance = self._chance(causality, name)
+                line.chance = self._random_numbers(causality, name)
 
     def cut_until(self, now_ns: int) -> int:
         """Return when the outages around `now_ns` are over; `now_ns` if there is none."""
@@ -136,11 +136,11 @@ class NetworkLink:
                 until_ns = outage.at + outage.duration
         return until_ns
 
-    def _chance(self, causality: str, port: str) -> random.Random:
+    def _random_numbers(self, causality: str, port: str) -> random.Random:
         return random.Random(f"{self.spec.seed} {causality} {port}")
 
 
-def in_words(spec: NetworkLinkSpec, outage_ns: int = 0) -> str:
+def describe_link(spec: NetworkLinkSpec, outage_ns: int = 0) -> str:
     """Describe a network link; empty without delay and loss."""
     parts = (
         f"{spec.delay_ns / 1e6:g} ms each way" if spec.delay_ns else "",

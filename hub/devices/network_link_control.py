@@ -8,7 +8,7 @@ from typing import Any
 import zenoh
 from pydantic import BaseModel, ConfigDict, Field
 
-from hub.devices.network_link import NetworkLink, NetworkLinkOrder, in_words
+from hub.devices.network_link import NetworkLink, NetworkLinkOrder, describe_link
 from hub.planning.plan import Plan
 from schemas.codec import encode
 from schemas.errors import MessageError, did_you_mean
@@ -71,7 +71,7 @@ class NetworkLinkControl:
         }
         self._changed: set[str] = set()
 
-    def change(self, request: NetworkLinkRequest) -> NetworkLinkReply:
+    def change_link(self, request: NetworkLinkRequest) -> NetworkLinkReply:
         """Change a link.
 
         Raises MessageError if the device does not exist, ValueError if the link would be invalid.
@@ -90,7 +90,7 @@ class NetworkLinkControl:
         return NetworkLinkReply(
             device=name,
             link=self._specs[name],
-            description=in_words(self._specs[name], outage_ns=request.outage),
+            description=describe_link(self._specs[name], outage_ns=request.outage),
         )
 
     def repeat(self, device: str) -> None:

@@ -84,10 +84,10 @@ class SessionDevices:
         self._statuses = DeviceStatuses(plan, keys, session, self.inlets, refusals)
         self._subscribers = [
             session.declare_subscriber(keys.output("device", *source), self._listener(*source))
-            for source in self._received()
+            for source in self._used_outputs()
         ]
 
-    def _received(self) -> list[tuple[str, str]]:
+    def _used_outputs(self) -> list[tuple[str, str]]:
         """Return device and port of every connected or watched output of a wall-time device."""
         outputs = [
             (planned.name, port.name)
@@ -107,10 +107,10 @@ class SessionDevices:
         for thread in self._threads.values():
             thread.start(directory)
 
-    def enter(self, time_ns: int, step: int) -> list[Entering]:
+    def enter_samples(self, time_ns: int, step: int) -> list[Entering]:
         """Return the entries into the simulation at a communication point."""
         self._time_ns = time_ns
-        self._simulated.exchange(time_ns, step, self._take)
+        self._simulated.exchange(time_ns, step, self._enter_sample)
         return self.inlets.sample(time_ns, monotonic_ns())
 
     def forget(self, device: str) -> None:
@@ -128,7 +128,7 @@ class SessionDevices:
         own = *self.inlets.latencies.messages(), *self._simulated.latencies.messages()
         return [*own, *self._statuses.latencies]
 
-    def _take(self, device: str, sample: Sample, arrival_ns: int, stamp: Stamp) -> None:
+    def _enter_sample(self, device: str, sample: Sample, arrival_ns: int, stamp: Stamp) -> None:
         source = device, sample.port
         enters = source in self._connected
         if not enters and not self._monitor.watches(*source):
@@ -151,7 +151,7 @@ class SessionDevices:
     def _listener(self, device: str, port: str) -> Callback[zenoh.Sample]:
         limit = TokenBucket(self._plan.participants[device].rate_limit)
 
-        def take(sample: zenoh.Sample) -> None:
+        def receive(sample: zenoh.Sample) -> None:
             now_ns = monotonic_ns()
             try:
                 if not limit.spend(now_ns):
@@ -163,7 +163,7 @@ class SessionDevices:
             except MessageError as error:
                 self._refusals.refuse_sample(sample, error)
 
-        return Callback(take, indirect=False)
+        return Callback(receive, indirect=False)
 
     def close(self) -> None:
         """Close the devices of this process, and receive no more."""

@@ -36,7 +36,7 @@ class SimulatedDevices:
         inputs: Mapping[str, DeviceInputs],
         refusals: Refusals,
     ) -> None:
-        periodic = {planned.name for planned in plan.meetings()}
+        periodic = {planned.name for planned in plan.exchanging_devices()}
         self._devices = [
             _SimulatedDevice(plan.participants[name], device, inputs[name], name in periodic, refusals)
             for name, device in devices.items()
@@ -91,11 +91,11 @@ class _SimulatedDevice:
     def write(self, time_ns: int, step: int, latencies: Latencies) -> None:
         """Write the arrivals from the simulation."""
         self.link.settle(time_ns)
-        for port, valid_ns, value in self._arrived(time_ns, step):
+        for port, valid_ns, value in self._pop_arrivals(time_ns, step):
             self._write_one(port, valid_ns, value)
             latencies.add("state to force", self._streams[port], time_ns - valid_ns)
 
-    def _arrived(self, time_ns: int, step: int) -> Iterator[tuple[str, int, Value]]:
+    def _pop_arrivals(self, time_ns: int, step: int) -> Iterator[tuple[str, int, Value]]:
         """Yield port, time of validity (ns) and value of all values past the link by `time_ns`."""
         due = self._inputs.due(step)
         if self.link.idle:
@@ -105,7 +105,7 @@ class _SimulatedDevice:
             self.link.line(self._ports[port]).send(valid_ns, (valid_ns, value))
         for port in self._ports.values():
             if port.causality == "input":
-                for _, (valid_ns, value) in self.link.line(port).arrived(time_ns):
+                for _, (valid_ns, value) in self.link.line(port).pop_arrivals(time_ns):
                     yield port.name, valid_ns, value
 
     def _write_one(self, port: str, valid_ns: int, value: Value) -> None:
@@ -131,7 +131,7 @@ class _SimulatedDevice:
                 self.link.line(self._ports[sample.port]).send(time_ns, (sample, stamp))
         for port in () if idle else self._ports.values():
             if port.causality == "output":
-                for arrival_ns, (sample, stamp) in self.link.line(port).arrived(time_ns):
+                for arrival_ns, (sample, stamp) in self.link.line(port).pop_arrivals(time_ns):
                     yield sample, arrival_ns, stamp
 
 

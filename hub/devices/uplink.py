@@ -11,7 +11,7 @@ from zenoh.handlers import Callback
 from hub.devices.clock_offset import ClockOffset
 from hub.devices.device_receiver import DeviceReceiver
 from hub.devices.device_thread import DeviceThread
-from hub.devices.network_link import NetworkLink, NetworkLinkOrder, in_words
+from hub.devices.network_link import NetworkLink, NetworkLinkOrder, describe_link
 from hub.devices.run_info import RunInfo
 from hub.participant import Sample
 from hub.planning.plan import PlannedParticipant
@@ -57,7 +57,8 @@ class DeviceUplink:
         self._sequence = {port.name: 0 for port in planned.ports}
         outputs = [port for port in planned.ports if port.causality == "output"]
         self._publishers = {
-            port.name: _publisher(session, keys.output("device", name, port.name), port) for port in outputs
+            port.name: _create_publisher(session, keys.output("device", name, port.name), port)
+            for port in outputs
         }
         self._lines = {port.name: self._link.line(port) for port in outputs}
         self._status = session.declare_publisher(
@@ -84,15 +85,17 @@ class DeviceUplink:
                 self._lines[sample.port].send(t, stamped)
         if not idle:
             for name, line in self._lines.items():
-                for _, stamped in line.arrived(t):
+                for _, stamped in line.pop_arrivals(t):
                     self._publish(name, *stamped)
             self._receiver.write_arrived(t)
         if now_ns - self._reported_ns >= _STATUS_NS:
             self._reported_ns = now_ns
             self._report_status()
-            self._receiver.want_all_but(self._thread.unused(), again=True)  # a source may have come later
+            self._receiver.want_all_but(
+                self._thread.unused_signals(), again=True
+            )  # a source may have come later
         else:
-            self._receiver.want_all_but(self._thread.unused())
+            self._receiver.want_all_but(self._thread.unused_signals())
         return not idle
 
     def _publish(self, port: str, payload: bytes, stamp: bytes) -> None:
@@ -105,7 +108,7 @@ class DeviceUplink:
             device=self._name,
             offset_ns=offset_ns,
             round_trip_ns=round_trip_ns,
-            link=in_words(self._link.spec),
+            link=describe_link(self._link.spec),
             latencies=self._receiver.latencies.messages(),
         )
         self._status.put(encode(status))
@@ -126,7 +129,7 @@ class DeviceUplink:
             publisher.undeclare()
 
 
-def _publisher(session: zenoh.Session, key: str, port: Port) -> zenoh.Publisher:
+def _create_publisher(session: zenoh.Session, key: str, port: Port) -> zenoh.Publisher:
     """Return the publisher of an output.
 
     Signals go first, and are dropped where the network is congested; events wait in a queue of their own.

@@ -110,7 +110,7 @@ class Host:
         """
         bonds: dict[str, tuple[BondSide, ...]] = {}
         for one in self._hosted:
-            setup = Setup(one.h_ns, directory, one.planned.bond_plans, self.plan.connected(one.name))
+            setup = Setup(one.h_ns, directory, one.planned.bond_plans, self.plan.connected_inputs(one.name))
             last = one.participant
             try:
                 self._publish(one, INITIAL, 0, one.participant.configure(setup))
@@ -193,7 +193,7 @@ class Host:
         except TrocarError as error:
             raise ParticipantError(one.name, step, f"cannot take other parameters: {error}") from error
         starts = {port.name: port.start for port in one.participant.ports}
-        connected = self.plan.connected(one.name)
+        connected = self.plan.connected_inputs(one.name)
         for port in new.ports:
             if port.start not in (None, starts[port.name]) and port.name not in connected:
                 one.values[port.name] = np.array(port.start, np.float64)

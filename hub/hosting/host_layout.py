@@ -95,7 +95,7 @@ class HostLayout:
             if port.causality == "input":
                 continue
             codec, listeners = PortCodec(port), self._listeners
-            stride = plan.stride(planned.name, port.name)
+            stride = plan.output_stride(planned.name, port.name)
             depth = self._depth(planned.name, port.name, here=True)
             is_read = self._is_read_elsewhere(planned.name, port.name)
             to_devices = port.variability == "event" and any(
@@ -149,7 +149,7 @@ class HostLayout:
             if here and (target.host != self._name or self._is_direct(connection)):
                 continue
             is_event = target.port(connection.target_port).variability == "event"
-            back = max(target.period // self._plan.stride(source, port), 1) if is_event else 0
+            back = max(target.period // self._plan.output_stride(source, port), 1) if is_event else 0
             depth = max(depth, (1 if connection.fresh else 2) + connection.linear + back)
         return depth
 
@@ -207,7 +207,7 @@ class HostLayout:
 
     def _reader(self, connection: PlannedConnection) -> Reader:
         source, target = self._ports(connection)
-        stride = self._plan.stride(connection.source, source.name)
+        stride = self._plan.output_stride(connection.source, source.name)
         return Reader(
             target.name,
             self._cell(connection.source, source.name),
@@ -226,7 +226,7 @@ class HostLayout:
                 raise ValueError(f"'{source}' is in another process, and this host has no wire")
             planned = self._plan.participants[source]
             self.remote_cells[source, port] = self._wire.cell(
-                planned, planned.port(port), self._plan.stride(source, port), self._depth(source, port)
+                planned, planned.port(port), self._plan.output_stride(source, port), self._depth(source, port)
             )
         return self.remote_cells[source, port]
 

@@ -42,7 +42,7 @@ class EnergyBooks:
             self._rows.setdefault(bond.motion.participant, []).append((book, "motion_work_j"))
             self._rows.setdefault(bond.force.participant, []).append((book, "force_work_j"))
 
-    def take(self, participant: str, ack: Ack) -> None:
+    def book_work(self, participant: str, ack: Ack) -> None:
         """Book the work (J since the start) in the last step of a participant's ack."""
         rows = self._rows.get(participant)
         if rows and len(ack.work_j) >= len(rows):
@@ -54,7 +54,7 @@ class EnergyBooks:
         """Work received by the force sides minus work done by the motion sides, summed over all bonds (J)."""
         return plain_sum(book.residual_j for book in self._books)
 
-    def encoded(self, time_ns: int) -> dict[str, bytes]:
+    def encode_books(self, time_ns: int) -> dict[str, bytes]:
         """Return the book of each bond, a `CouplingEnergy` in CDR."""
         header = Header(stamp=Time.from_ns(time_ns))
         for book in self._books:

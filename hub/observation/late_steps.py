@@ -40,12 +40,12 @@ class LateSteps:
         self._counts[self._cause] += steps
 
     @property
-    def causes(self) -> list[LateCause]:
+    def cause_counts(self) -> list[LateCause]:
         """The numbers of late steps by cause, the most frequent first."""
         return [LateCause(cause=cause, steps=steps) for cause, steps in self._counts.most_common()]
 
     @property
-    def worst(self) -> list[LateStep]:
+    def worst_steps(self) -> list[LateStep]:
         """The longest steps, the longest first."""
         return [
             LateStep(time_ns=time_ns, took_s=took_ns / 1e9, cause=cause)

@@ -41,7 +41,7 @@ class _Meter:
         self._sum = 0.0
         self._count = 0
 
-    def take(self, value: Vector, time_ns: int) -> None:
+    def add(self, value: Vector, time_ns: int) -> None:
         part = value[self._part]
         # what np.linalg.norm does for a vector, at a fifth of its cost
         self.now = now = sqrt(part.dot(part)) if self._is_norm else float(part[0])
@@ -94,7 +94,7 @@ class Measures:
         for name, measure in scenario.measure.items():
             planned = plan.participants[measure.of.participant]
             port, part = measured_port(planned, measure.of.port)
-            period = 1e-9 * (planned.read_ns or plan.step_ns * plan.stride(planned.name, port.name))
+            period = 1e-9 * (planned.read_ns or plan.step_ns * plan.output_stride(planned.name, port.name))
             meter = self._meters[name] = _Meter(measure, part, period)
             self.by_port.setdefault((measure.of.participant, port.name), []).append(meter)
 
@@ -104,11 +104,11 @@ class Measures:
         return list(self.by_port)
 
     @property
-    def cards(self) -> dict[str, ScoreCard]:
+    def score_cards(self) -> dict[str, ScoreCard]:
         """The newest score card of each participant with published cards."""
         return dict(self._cards)
 
-    def take(self, participant: str, port: str, value: Any, time_ns: int) -> None:
+    def add(self, participant: str, port: str, value: Any, time_ns: int) -> None:
         """Add the value of a signal port, or a message of an event port, at a time."""
         if isinstance(value, ScoreCard):
             self._cards[participant] = value
@@ -117,7 +117,7 @@ class Measures:
             value = np.array([value.data])
         for meter in self.by_port.get((participant, port), ()):
             with self._lock:
-                meter.take(value, time_ns)
+                meter.add(value, time_ns)
 
     def live(self) -> Mapping[str, tuple[float, str]]:
         """Return the current value and unit of each measure of the progress line with a value."""

@@ -80,18 +80,18 @@ class Monitor:
             for port in planned.ports:
                 if port.causality == "output":
                     key = keys.output(planned.key_role, planned.name, port.name)
-                    watched = _Watched(planned, port, PortCodec(port), self._channel(key, port.type))
+                    watched = _Watched(planned, port, PortCodec(port), self._channel_number(key, port.type))
                     self._watched[key] = self._by_port[planned.name, port.name] = watched
 
-    def _channel(self, key: str, type_name: str) -> int:
+    def _channel_number(self, key: str, type_name: str) -> int:
         if self._recorder is None:
             return 0
         if key not in self._channels:
-            self._channels[key] = self._recorder.channel(topic(key), type_name)
+            self._channels[key] = self._recorder.add_channel(topic(key), type_name)
         return self._channels[key]
 
     @property
-    def away(self) -> dict[str, tuple[str, str]]:
+    def remote_outputs(self) -> dict[str, tuple[str, str]]:
         """Participant and port of every recorded or measured output of another process, by key."""
         return {
             key: (w.planned.name, w.port.name)
@@ -101,14 +101,14 @@ class Monitor:
             and self.watches(w.planned.name, w.port.name)
         }
 
-    def linked(self) -> bool:
+    def has_start_values(self) -> bool:
         """Return whether the value at time 0 of every watched output of another process was received.
 
         Values of participants that only look may come later.
         """
         return all(
             self._watched[key].newest >= (INITIAL, 0)
-            for key in self.away
+            for key in self.remote_outputs
             if self._watched[key].planned.in_step
         )
 
@@ -122,7 +122,7 @@ class Monitor:
         """
         watched = [self._output(planned, port) for port in ports]
         vectors = [(one.channel, one.codec.vector) for one in watched if one.codec.vector is not None]
-        block = None if self._recorder is None else self._recorder.block(vectors)
+        block = None if self._recorder is None else self._recorder.add_block(vectors)
         ends = list(accumulate(8 * codec.size for _, codec in vectors))
         measured = [
             (port.name, slice(end - 8 * codec.size, end))
@@ -136,7 +136,7 @@ class Monitor:
             if block is not None:
                 self._unrecorded.append((block, time_ns, data))
             for port, part in measured if step > INITIAL else ():
-                self.measures.take(planned.name, port, np.frombuffer(data[part]), time_ns)
+                self.measures.add(planned.name, port, np.frombuffer(data[part]), time_ns)
 
         return receive
 
@@ -157,7 +157,7 @@ class Monitor:
         def receive(step: int, time_ns: int, value: Any) -> None:
             for message in value if codec.is_event else (value,):
                 if is_measured and step > INITIAL:
-                    self.measures.take(planned.name, port.name, message, time_ns)
+                    self.measures.add(planned.name, port.name, message, time_ns)
                 if is_recorded:
                     self._unrecorded.append((channel, time_ns, codec.encode(message, time_ns)))
 
@@ -166,18 +166,18 @@ class Monitor:
     def _output(self, planned: PlannedParticipant, port: Port) -> _Watched:
         return self._by_port[planned.name, port.name]
 
-    def received(self, end: int) -> bool:
+    def has_received(self, end: int) -> bool:
         """Return whether all values of the steps before `end` have arrived from other processes.
 
         A host with a link may acknowledge a step before Zenoh has delivered the step's values.
         """
-        watched = (self._watched[key] for key in self.away)
+        watched = (self._watched[key] for key in self.remote_outputs)
         return all(one.complete >= self._last_due(one, end) for one in watched if one.planned.in_step)
 
     def _last_due(self, watched: _Watched, end: int) -> int:
         """Return the last step before `end` with a publication of a watched output."""
         period = watched.planned.period
-        stride = self._plan.stride(watched.planned.name, watched.port.name)
+        stride = self._plan.output_stride(watched.planned.name, watched.port.name)
         steps = range((end - 1) // period * period, -1, -period)
         return next((step for step in steps if (step + period) % stride == 0), INITIAL)
 
@@ -202,7 +202,7 @@ class Monitor:
         if tag.index + 1 == tag.count:
             watched.complete = tag.step
         if tag.step > INITIAL:
-            self.measures.take(watched.planned.name, watched.port.name, value, tag.time_ns)
+            self.measures.add(watched.planned.name, watched.port.name, value, tag.time_ns)
         if self._recorder is not None:
             self._recorder.write(watched.channel, tag.time_ns, payload)
 
@@ -238,7 +238,7 @@ class Monitor:
         if measured or not checked:
             value = watched.codec.accept(payload)
             if measured:
-                self.measures.take(device, port, value, time_ns)
+                self.measures.add(device, port, value, time_ns)
         return watched
 
     def grant(self, grant: Grant, payload: bytes) -> None:
@@ -246,7 +246,9 @@ class Monitor:
         if self._recorder is None:
             return
         time_ns = grant.start_ns
-        self._unrecorded.append((self._channel(self._keys.grant, GrantMessage.ros_type), time_ns, payload))
+        self._unrecorded.append(
+            (self._channel_number(self._keys.grant, GrantMessage.ros_type), time_ns, payload)
+        )
         for one in grant.inlets:
             watched, held = self._by_port.get((one.participant, one.port)), one.payload
             if watched is not None and held.size:
@@ -254,11 +256,11 @@ class Monitor:
 
     def ack(self, planned: PlannedParticipant, ack: Ack, time_ns: int, payload: bytes | None) -> None:
         """Receive an ack; `payload` holds the bytes of an ack from the wire."""
-        self.energy.take(planned.name, ack)
+        self.energy.book_work(planned.name, ack)
         if self._recorder is not None:
             channel = self._ack_channels.get(planned.name)
             if channel is None:  # declared by the first ack: channels have the order of their first message
-                channel = self._channel(self._keys.ack(planned.name), AckMessage.ros_type)
+                channel = self._channel_number(self._keys.ack(planned.name), AckMessage.ros_type)
                 self._ack_channels[planned.name] = channel
             self._unrecorded.append((channel, time_ns, pack_ack(ack) if payload is None else payload))
 
@@ -268,22 +270,22 @@ class Monitor:
             self._recorder.write_all(self._unrecorded)
             self._unrecorded.clear()
 
-    def books(self, time_ns: int) -> dict[str, bytes]:
+    def due_energy_books(self, time_ns: int) -> dict[str, bytes]:
         """Return the energy book of each bond, in CDR, for the recorder; empty unless due."""
         if time_ns < self._next_energy_ns:
             return {}
         self._next_energy_ns = time_ns + _ENERGY_PERIOD_NS
-        books = self.energy.encoded(time_ns)
+        books = self.energy.encode_books(time_ns)
         if self._recorder is not None:
             for bond, payload in books.items():
-                channel = self._channel(self._keys.energy(bond), CouplingEnergy.ros_type)
+                channel = self._channel_number(self._keys.energy(bond), CouplingEnergy.ros_type)
                 self._unrecorded.append((channel, time_ns, payload))
         return books
 
     def status(self, status: SessionStatus) -> None:
         """Record a status of the session, and all earlier messages."""
         if self._recorder is not None:
-            channel = self._channel(self._keys.status, status.ros_type)
+            channel = self._channel_number(self._keys.status, status.ros_type)
             self._unrecorded.append((channel, status.sim_time_ns, encode(status)))
             self.record()
 
@@ -291,5 +293,7 @@ class Monitor:
         """Record a profile of the session."""
         if self._recorder is not None:
             self._recorder.write(
-                self._channel(self._keys.profile, profile.ros_type), profile.sim_time_ns, encode(profile)
+                self._channel_number(self._keys.profile, profile.ros_type),
+                profile.sim_time_ns,
+                encode(profile),
             )

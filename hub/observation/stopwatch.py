@@ -57,7 +57,7 @@ class Stopwatch:
 
     def time(self, method: Callable[..., Any], phase: Phase, *, then: Phase | None = None) -> None:
         """Time a bound method: calls belong to `phase`; the time after, to `then`, by default as before."""
-        self._replace(method, self._timed(method, phase, then))
+        self._replace_method(method, self._timing_wrapper(method, phase, then))
 
     def time_by_result(self, method: Callable[..., Any], phase: Phase, named: Callable[[Any], Phase]) -> None:
         """Time a bound method like `time`, with a phase chosen by the result of the call.
@@ -65,26 +65,28 @@ class Stopwatch:
         Timed methods called inside have phases of their own.
         """
 
-        def naming(*arguments: Any) -> Any:
+        def call_and_name(*arguments: Any) -> Any:
             result = method(*arguments)
             ended = named(result)
             if self._now is phase:
                 self._now = ended
             return result
 
-        self._replace(method, self._timed(naming, phase, None))
+        self._replace_method(method, self._timing_wrapper(call_and_name, phase, None))
 
     def time_returned(self, method: Callable[..., Callable[..., Any] | None], phase: Phase) -> None:
         """Time the functions returned by a bound method: their calls belong to `phase`."""
 
-        def returning(*arguments: Any) -> Callable[..., Any] | None:
+        def call_and_wrap(*arguments: Any) -> Callable[..., Any] | None:
             call = method(*arguments)
-            return None if call is None else self._timed(call, phase, None)
+            return None if call is None else self._timing_wrapper(call, phase, None)
 
-        self._replace(method, returning)
+        self._replace_method(method, call_and_wrap)
 
-    def _timed(self, method: Callable[..., Any], phase: Phase, then: Phase | None) -> Callable[..., Any]:
-        def timed(*arguments: Any) -> Any:
+    def _timing_wrapper(
+        self, method: Callable[..., Any], phase: Phase, then: Phase | None
+    ) -> Callable[..., Any]:
+        def call_timed(*arguments: Any) -> Any:
             outer = self._now
             self._count(outer)
             self._now = phase
@@ -94,10 +96,10 @@ class Stopwatch:
                 self._count(self._now)
                 self._now = then or outer
 
-        return timed
+        return call_timed
 
     @staticmethod
-    def _replace(method: Callable[..., Any], timed: Callable[..., Any]) -> None:
+    def _replace_method(method: Callable[..., Any], timed: Callable[..., Any]) -> None:
         if not isinstance(method, MethodType):
             raise TypeError(f"{method!r} is not a method of an object")
         setattr(method.__self__, method.__name__, timed)

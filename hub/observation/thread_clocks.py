@@ -38,7 +38,7 @@ class ThreadClocks:
 
     def restart(self) -> None:
         """Count from now."""
-        self._from = self._totals()
+        self._from = self._taker_totals()
         self._process_from_ns = process_time_ns()
         self._main_from_ns = _core_ns(self._main) or 0
 
@@ -54,13 +54,13 @@ class ThreadClocks:
         `other threads`.
         """
         times: dict[str, float] = {
-            taker: total - self._from.get(taker, 0) for taker, total in self._totals().items()
+            taker: total - self._from.get(taker, 0) for taker, total in self._taker_totals().items()
         }
         rest = process_time_ns() - self._process_from_ns - main_ns - sum(times.values())
         times["other threads"] = times.get("other threads", 0.0) + max(rest, 0.0)
         return {taker: time_ns for taker, time_ns in times.items() if time_ns > 0.0}
 
-    def _totals(self) -> dict[str, int]:
+    def _taker_totals(self) -> dict[str, int]:
         """Return the processor time of every taker so far, including ended threads."""
         names = {thread.native_id: thread.name for thread in threading.enumerate()}
         with self._lock:

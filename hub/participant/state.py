@@ -134,9 +134,9 @@ class _Array(_Field):
 
     def accessor(self, name: str, index: int) -> property:  # noqa: ARG002
         def write(record: Record, value: Vector) -> None:
-            getattr(record, _view(name))[...] = value
+            getattr(record, _view_name(name))[...] = value
 
-        return property(attrgetter(_view(name)), write)
+        return property(attrgetter(_view_name(name)), write)
 
 
 class _Number(_Field):
@@ -209,7 +209,7 @@ class _Choice(_Number):
         return property(read, write)
 
 
-def _view(name: str) -> str:
+def _view_name(name: str) -> str:
     return f"view_of_{name}"
 
 
@@ -243,7 +243,7 @@ class Record:
         for (name, shape), offset, length in zip(shapes.items(), self.offsets, lengths, strict=True):
             field, part = self.fields[name], self.values[offset : offset + length]
             if isinstance(field, _Array):
-                setattr(self, _view(name), part.reshape(shape))
+                setattr(self, _view_name(name), part.reshape(shape))
             else:
                 part[:] = field.start
 

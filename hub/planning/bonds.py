@@ -23,8 +23,8 @@ def plan_bond(scenario: Scenario, participants: Mapping[str, Stepped | Device], 
     Raises ScenarioError if a side is missing, the sides do not fit, or the algorithm needs more.
     """
     bond, path = scenario.bonds[index], ("bonds", index)
-    motion = _side(participants, bond.motion, "motion", (*path, "motion"))
-    force = _side(participants, bond.force, "force", (*path, "force"))
+    motion = _bond_side(participants, bond.motion, "motion", (*path, "motion"))
+    force = _bond_side(participants, bond.force, "force", (*path, "force"))
     if motion.dof != force.dof:
         problem = f"'{bond.motion}' has {motion.dof} degrees of freedom, '{bond.force}' has {force.dof}"
         raise ScenarioError(problem, path=path)
@@ -39,7 +39,7 @@ def plan_bond(scenario: Scenario, participants: Mapping[str, Stepped | Device], 
     return PlannedBond(bond=bond, motion=motion, force=force)
 
 
-def _side(
+def _bond_side(
     participants: Mapping[str, Stepped | Device], end: PortReference, side: str, path: tuple[str | int, ...]
 ) -> BondSide:
     participant = participants.get(end.participant)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hub.planning.coupling import is_fresh
-from hub.planning.fit import misfit
+from hub.planning.fit import describe_misfit
 from hub.planning.plan import (
     ConnectionFromDevice,
     ConnectionToDevice,
@@ -45,7 +45,7 @@ class Connections:
         """Add a connection without a wildcard, at `path` in the scenario."""
         one, other = connection.source, connection.target
         source, target = self._port(one, "output", path), self._port(other, "input", path)
-        if problem := misfit(one, source, other, target):
+        if problem := describe_misfit(one, source, other, target):
             raise ScenarioError(problem, path=path)
         # a queue of events may have several sources
         self._feed(other, str(one), path, shared=target.variability == "event")
@@ -68,7 +68,7 @@ class Connections:
             linear = connection.extrapolation == "linear"
             self.stepped.append(PlannedConnection(**ends, fresh=fresh, linear=linear))
 
-    def couple(self, index: int, planned: PlannedBond) -> None:
+    def connect_bond(self, index: int, planned: PlannedBond) -> None:
         """Add the connections of the bond at `index`: motion in one direction, force in the other."""
         bond = planned.bond
         *motion, force = zip(bond_ports(planned.motion), bond_ports(planned.force), strict=True)

@@ -97,7 +97,7 @@ def stable_step_problem(bond: Bond, motion: BondSide, force: BondSide, step_s: f
             f"the rule m >= 0.5 m_proxy of 'impulse-linearised' is broken ({known} in SI units). "
             "Use a lighter proxy, which a shorter sub-step of the force side allows, or a heavier tool."
         )
-    broken = {rule: limit for rule, limit in _limits(bond, force, mass).items() if step_s > limit}
+    broken = {rule: limit for rule, limit in _step_limits(bond, force, mass).items() if step_s > limit}
     if not broken:
         return None
     rule, limit = min(broken.items(), key=lambda item: item[1])
@@ -108,7 +108,7 @@ def stable_step_problem(bond: Bond, motion: BondSide, force: BondSide, step_s: f
     )
 
 
-def _limits(bond: Bond, force: BondSide, mass: float) -> dict[str, float]:
+def _step_limits(bond: Bond, force: BondSide, mass: float) -> dict[str, float]:
     """Return the longest step (s) allowed by each rule of the bond's algorithm for a tool of `mass` (kg)."""
     stiffness, damping, contact = force.stiffness, force.damping, force.contact_stiffness
     limits: dict[str, float] = {}

@@ -7,10 +7,10 @@ from schemas.quantity import same_unit
 from schemas.scenario import PortReference
 from schemas.vectors import VectorCodec, has_vector
 
-__all__ = ["misfit"]
+__all__ = ["describe_misfit"]
 
 
-def misfit(one: PortReference, source: Port, other: PortReference, target: Port) -> str | None:
+def describe_misfit(one: PortReference, source: Port, other: PortReference, target: Port) -> str | None:
     """Return why output `source` at `one` does not fit input `target` at `other`; None if both fit."""
     if source.type != target.type:
         return f"'{one}' gives {source.type}, '{other}' takes {target.type}"

@@ -17,7 +17,7 @@ __all__ = [
     "MAX_SCENE_VALUES",
     "MAX_TEXT",
     "MAX_VALUES",
-    "shown",
+    "safe_text",
 ]
 
 MAX_BYTES = 512 * 1024
@@ -51,7 +51,7 @@ MAX_PROBLEMS = 20
 """Problems reported at once: each takes a search for similar names, and the first often cause the rest."""
 
 
-def shown(text: str, length: int = 200) -> str:
+def safe_text(text: str, length: int = 200) -> str:
     """Return `text` for a message: shortened to about `length` characters, and printable on any terminal."""
     if len(text) > length:
         half = length // 2

@@ -27,7 +27,7 @@ def with_observers(
     result = dict(planned)
     for name, made in participants.items():
         if isinstance(made, Stepped) and made.observer:
-            reason = next(_reasons(scenario, planned, connections, planned[name]), "")
+            reason = next(_lock_step_reasons(scenario, planned, connections, planned[name]), "")
             update = {"lock_step": reason} if reason else {"observer": True}
             result[name] = planned[name].model_copy(update=update)
     hosts = {one.host for one in planned.values()}
@@ -42,7 +42,7 @@ def with_observers(
     return result
 
 
-def _reasons(
+def _lock_step_reasons(
     scenario: Scenario,
     planned: Mapping[str, PlannedParticipant],
     connections: Sequence[Connection],

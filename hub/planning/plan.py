@@ -136,7 +136,7 @@ class Plan(_Part):
         except (AttributeError, KeyError, TypeError) as error:
             raise ValueError(f"not a plan ({type(error).__name__}: {error})") from error
 
-    def contradiction(self) -> str:
+    def find_contradiction(self) -> str:
         """Return the first reference of a plan of unknown origin to a missing part; empty if nothing."""
         if any(name != planned.name for name, planned in self.participants.items()):
             return "a participant has two names"
@@ -157,17 +157,17 @@ class Plan(_Part):
         """Return the participants that only look, in their own time."""
         return tuple(planned for planned in self.participants.values() if planned.observer)
 
-    def connected(self, participant: str) -> frozenset[str]:
+    def connected_inputs(self, participant: str) -> frozenset[str]:
         """Return the inputs of a participant with a source."""
         every = (*self.connections, *self.from_devices, *self.to_devices)
         return frozenset(one.target_port for one in every if one.target == participant)
 
-    def stride(self, participant: str, port: str) -> int:
+    def output_stride(self, participant: str, port: str) -> int:
         """Return how many steps lie between two values of an output port."""
         planned = self.participants[participant]
         return max(planned.period, planned.port(port).period_ns // self.step_ns)
 
-    def meetings(self) -> tuple[PlannedParticipant, ...]:
+    def exchanging_devices(self) -> tuple[PlannedParticipant, ...]:
         """Return the devices in simulated time with a forced end of a grant in each of their periods.
 
         These are the devices with inputs, and the devices behind a network link.
@@ -179,14 +179,14 @@ class Plan(_Part):
             if planned.simulated_time and (planned.name in written or planned.network_link is not None)
         )
 
-    def stops(self) -> list[int]:
+    def grant_stop_periods(self) -> list[int]:
         """Return the periods, in steps, with a forced end of a grant at every multiple, in ascending order.
 
         Inside a grant, no reader of a device may start a step, or the reader would miss the newest samples;
         and no device may be due with inputs from participants of the same grant.
         """
         reading = {self.participants[inlet.target].period for inlet in self.from_devices}
-        return sorted(reading | {device.period for device in self.meetings()})
+        return sorted(reading | {device.period for device in self.exchanging_devices()})
 
     def seen_from(self, host: str) -> Plan:
         """Return the part of the plan needed by another machine to run host `host`.

@@ -16,7 +16,7 @@ from typing import Any, Literal
 from packaging.requirements import Requirement
 
 from hub.participant import Device, Params, Stepped
-from hub.planning.limits import MAX_KIND, shown
+from hub.planning.limits import MAX_KIND, safe_text
 from schemas.errors import MissingExtraError, ScenarioError, did_you_mean
 
 __all__ = [
@@ -25,7 +25,7 @@ __all__ = [
     "Kind",
     "Participant",
     "Role",
-    "broken",
+    "broken_kinds",
     "extra_packages",
     "find",
     "installed_packages",
@@ -100,10 +100,10 @@ def find(name: str) -> Kind:
                 " that defines the class"
             )
         kind = Kind(name, "engine", UNPACKAGED, EntryPoint(name, name, "trocar.engines"))
-        loaded = _import(kind)  # without an entry point, only the class says which role it has
+        loaded = _import_kind(kind)  # without an entry point, only the class says which role it has
         is_device = isinstance(loaded, type) and issubclass(loaded, Device)
         return replace(kind, role="device") if is_device else kind
-    raise ScenarioError(f"unknown kind '{shown(name)}'.{did_you_mean(name, kinds())}")
+    raise ScenarioError(f"unknown kind '{safe_text(name)}'.{did_you_mean(name, kinds())}")
 
 
 @cache
@@ -113,7 +113,7 @@ def load(name: str) -> Participant:
     Raises ScenarioError if there is no such kind or the package cannot be imported.
     """
     kind = find(name)
-    loaded = _import(kind)
+    loaded = _import_kind(kind)
     base = Device if kind.role == "device" else Stepped
     if not (isinstance(loaded, type) and issubclass(loaded, base)):
         raise ScenarioError(
@@ -130,7 +130,7 @@ def load(name: str) -> Participant:
     return loaded
 
 
-def _import(kind: Kind) -> Any:
+def _import_kind(kind: Kind) -> Any:
     try:
         return kind.entry.load()
     except (Exception, SystemExit) as error:  # a module may raise anything on import
@@ -140,7 +140,7 @@ def _import(kind: Kind) -> Any:
         ) from error
 
 
-def broken() -> dict[str, str]:
+def broken_kinds() -> dict[str, str]:
     """Return the kinds that cannot be loaded, each with the reason."""
     reasons: dict[str, str] = {}
     for name in kinds():
@@ -160,43 +160,47 @@ def require_extra(name: str) -> None:
 
 def extra_packages(name: str) -> list[str]:
     """Return the names of the packages in the extra of kind `name`; empty without an extra."""
-    return sorted({requirement.name for requirement in _requirements(find(name).entry.dist, name)})
+    return sorted({requirement.name for requirement in _extra_requirements(find(name).entry.dist, name)})
 
 
 def missing_packages(dist: Distribution | None, extra: str) -> list[str]:
     """Return the packages of `extra` of a distribution not installed here."""
-    return [f"{r.name}{r.specifier}" for r in _requirements(dist, extra) if not _installed(r)]
+    return [f"{r.name}{r.specifier}" for r in _extra_requirements(dist, extra) if not _is_installed(r)]
 
 
 def installed_packages(dist: Distribution, extra: str) -> list[str]:
     """Return the packages of `extra` of a distribution installed here, with their versions."""
-    return [f"{r.name} {distribution(r.name).version}" for r in _requirements(dist, extra) if _installed(r)]
+    return [
+        f"{r.name} {distribution(r.name).version}"
+        for r in _extra_requirements(dist, extra)
+        if _is_installed(r)
+    ]
 
 
-def _requirements(dist: Distribution | None, extra: str) -> Iterator[Requirement]:
+def _extra_requirements(dist: Distribution | None, extra: str) -> Iterator[Requirement]:
     for requirement in _all_requirements(dist) if dist else ():
         marker = requirement.marker
         if not marker or marker.evaluate({"extra": ""}) or not marker.evaluate({"extra": extra}):
             continue
         if dist and requirement.name == _name(dist):  # an extra that consists of others
             for part in sorted(requirement.extras):
-                yield from _requirements(dist, part)
+                yield from _extra_requirements(dist, part)
         else:
             yield requirement
 
 
 @cache
 def _all_requirements(dist: Distribution) -> tuple[Requirement, ...]:
-    return _parsed(tuple(dist.requires or ()))
+    return _parse_requirements(tuple(dist.requires or ()))
 
 
 @cache
-def _parsed(texts: tuple[str, ...]) -> tuple[Requirement, ...]:
+def _parse_requirements(texts: tuple[str, ...]) -> tuple[Requirement, ...]:
     """Return parsed requirements; each group of entry points has a separate object for a distribution."""
     return tuple(Requirement(text) for text in texts)
 
 
-def _installed(requirement: Requirement) -> bool:
+def _is_installed(requirement: Requirement) -> bool:
     try:
         version = distribution(requirement.name).version
     except PackageNotFoundError:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any, cast, get_args
 
 from hub.planning import registry
-from hub.planning.scenario_source import Location, Source, merged
+from hub.planning.scenario_source import Location, Source, merge_missing
 from schemas.errors import ScenarioError
 
 __all__ = ["SCENARIOS", "current_names", "current_plan", "replace_old_names"]
@@ -44,7 +44,7 @@ def _replace_in(source: Source, name: str, spec: dict[str, Any], warned: set[str
         if old in spec and (new not in spec or (*path, old) in source.overrides):
             _warn(source, (*path, old), f"'{old}' is now '{new}'", warned, key=True)
             value = spec.pop(old)
-            spec[new] = merged(spec[new], value) if new in spec else value
+            spec[new] = merge_missing(spec[new], value) if new in spec else value
             source.stands_also_at((*path, old), (*path, new))
     kind = spec.get("kind")
     if isinstance(kind, str) and kind in _KINDS:

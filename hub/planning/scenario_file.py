@@ -16,16 +16,16 @@ from pydantic import ValidationError
 from hub.participant import Params
 from hub.planning import registry
 from hub.planning.foreign_code import foreign_code
-from hub.planning.limits import MAX_PARTICIPANTS, MAX_PROBLEMS, shown
+from hub.planning.limits import MAX_PARTICIPANTS, MAX_PROBLEMS, safe_text
 from hub.planning.renamed import SCENARIOS, replace_old_names
 from hub.planning.scenario_source import Location, Source, read
 from hub.planning.scene import spread_scene
-from hub.planning.validation_errors import problems
+from hub.planning.validation_errors import describe_errors
 from schemas.errors import ScenarioError, did_you_mean
 from schemas.files import Files
 from schemas.scenario import ParticipantSpec, Scenario
 
-__all__ = ["ScenarioFile", "installed_scenarios", "load", "located", "validated"]
+__all__ = ["ScenarioFile", "installed_scenarios", "load", "locate_error", "validate_source"]
 
 log = logging.getLogger(__name__)
 
@@ -49,10 +49,10 @@ def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
 
     Raises ScenarioError with a line for each problem.
     """
-    return validated(read(_find(name_or_path)), overrides)
+    return validate_source(read(_find(name_or_path)), overrides)
 
 
-def validated(source: Source, overrides: Sequence[str] = ()) -> ScenarioFile:
+def validate_source(source: Source, overrides: Sequence[str] = ()) -> ScenarioFile:
     """Return the scenario in `source`, with overrides `a.b.c=value` applied.
 
     Raises ScenarioError with a line for each problem.
@@ -63,7 +63,8 @@ def validated(source: Source, overrides: Sequence[str] = ()) -> ScenarioFile:
     replace_old_names(source)
     _log_code(source)
     found = [
-        str(located(error, source)) for error in islice(spread_scene(source, _models(source)), MAX_PROBLEMS)
+        str(locate_error(error, source))
+        for error in islice(spread_scene(source, _parameter_models(source)), MAX_PROBLEMS)
     ]
     if len(found) == MAX_PROBLEMS:  # the scene is not spread to its end: what would be said of it is wrong
         raise ScenarioError("\n".join(found))
@@ -71,13 +72,13 @@ def validated(source: Source, overrides: Sequence[str] = ()) -> ScenarioFile:
     try:
         scenario = Scenario.model_validate(source.tree)
     except ValidationError as error:
-        raise ScenarioError("\n".join([*problems(error, Scenario, (), source), *found])) from error
+        raise ScenarioError("\n".join([*describe_errors(error, Scenario, (), source), *found])) from error
     if found:
         raise ScenarioError("\n".join(found))
     return ScenarioFile(scenario, params, source)
 
 
-def located(error: ScenarioError, source: Source) -> ScenarioError:
+def locate_error(error: ScenarioError, source: Source) -> ScenarioError:
     """Return `error` with the place of the value in front of the message, if the error names a value."""
     return ScenarioError(source.line(error.path, str(error))) if error.path else error
 
@@ -88,9 +89,11 @@ def _find(name_or_path: str) -> Path:
         try:
             is_file = path.is_file()
         except (OSError, ValueError) as error:  # too long, or with a character that no path has
-            raise ScenarioError(f"'{shown(str(path))}' is not a path: {shown(str(error))}") from error
+            raise ScenarioError(f"'{safe_text(str(path))}' is not a path: {safe_text(str(error))}") from error
         if not is_file:
-            raise ScenarioError(f"there is no scenario file '{shown(str(path))}' (looked in {Path.cwd()})")
+            raise ScenarioError(
+                f"there is no scenario file '{safe_text(str(path))}' (looked in {Path.cwd()})"
+            )
         return path
     known = installed_scenarios()
     if name_or_path in SCENARIOS:
@@ -99,8 +102,8 @@ def _find(name_or_path: str) -> Path:
         return known[new]
     if name_or_path not in known:
         raise ScenarioError(
-            f"there is no scenario '{shown(name_or_path)}'.{did_you_mean(name_or_path, known)} For a file of"
-            " your own, give its path with .yaml."
+            f"there is no scenario '{safe_text(name_or_path)}'.{did_you_mean(name_or_path, known)} For a file"
+            " of your own, give its path with .yaml."
         )
     return known[name_or_path]
 
@@ -111,19 +114,19 @@ def _check_number(source: Source) -> None:
     number = len(cast("dict[str, Any]", participants)) if isinstance(participants, dict) else 0
     if number > MAX_PARTICIPANTS:
         problem = f"a session of {number} participants; at most {MAX_PARTICIPANTS} are allowed"
-        raise located(ScenarioError(problem, path=("participants",)), source)
+        raise locate_error(ScenarioError(problem, path=("participants",)), source)
 
 
 def _log_code(source: Source) -> None:
     """Log the code about to be imported or loaded beyond installed kinds."""
-    code = foreign_code(_specs(source).values(), source.tree.get("scene"))
+    code = foreign_code(_participant_specs(source).values(), source.tree.get("scene"))
     if code:
         more = f" and {len(code) - MAX_PROBLEMS} more" if len(code) > MAX_PROBLEMS else ""
-        named = ", ".join(map(shown, code[:MAX_PROBLEMS]))
+        named = ", ".join(map(safe_text, code[:MAX_PROBLEMS]))
         log.info("this scenario runs code that is not installed as a kind: %s%s", named, more)
 
 
-def _specs(source: Source) -> dict[str, dict[str, Any]]:
+def _participant_specs(source: Source) -> dict[str, dict[str, Any]]:
     """Return the participants with a kind; the validation of the scenario reports the rest."""
     participants = source.tree.get("participants")
     given = cast("dict[str, Any]", participants if isinstance(participants, dict) else {})
@@ -131,10 +134,10 @@ def _specs(source: Source) -> dict[str, dict[str, Any]]:
     return {name: spec for name, spec in specs.items() if isinstance(spec.get("kind"), str)}
 
 
-def _models(source: Source) -> dict[str, type[Params]]:
+def _parameter_models(source: Source) -> dict[str, type[Params]]:
     """Return the model of the parameters of every participant with a loadable kind."""
     models: dict[str, type[Params]] = {}
-    for name, spec in _specs(source).items():
+    for name, spec in _participant_specs(source).items():
         with suppress(ScenarioError):  # `_all_params` reports it
             models[name] = registry.load(spec["kind"]).params_model
     return models
@@ -144,18 +147,18 @@ def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
     """Return the parameters of every participant, and append the problems to `found`."""
     params: dict[str, Params] = {}
     present: set[str] = set()
-    for name, spec in _specs(source).items():
+    for name, spec in _participant_specs(source).items():
         try:
-            params[name] = _params(("participants", name), spec, source, present)
+            params[name] = _participant_params(("participants", name), spec, source, present)
         except ScenarioError as error:
-            found += str(located(error, source)).splitlines()
+            found += str(locate_error(error, source)).splitlines()
             if len(found) >= MAX_PROBLEMS:
                 del found[MAX_PROBLEMS:]
                 break
     return params
 
 
-def _params(at: Location, spec: dict[str, Any], source: Source, present: set[str]) -> Params:
+def _participant_params(at: Location, spec: dict[str, Any], source: Source, present: set[str]) -> Params:
     """Return the validated parameters of a participant.
 
     `present` collects the kinds with installed packages: the check takes 10 ms. Raises ScenarioError if the
@@ -173,7 +176,7 @@ def _params(at: Location, spec: dict[str, Any], source: Source, present: set[str
     try:
         return model.model_validate(given, context=Files(source.directory).context)
     except ValidationError as error:
-        found = problems(error, model, at, source, other_keys=ParticipantSpec.RESERVED)
+        found = describe_errors(error, model, at, source, other_keys=ParticipantSpec.RESERVED)
         raise ScenarioError("\n".join(found)) from error
     except OSError as error:  # a path that is too long or that leads through a loop of links
-        raise ScenarioError(f"a file cannot be read: {shown(str(error))}", path=at) from error
+        raise ScenarioError(f"a file cannot be read: {safe_text(str(error))}", path=at) from error

@@ -22,23 +22,23 @@ def scenario_schema() -> str:
     for name, pattern in _TEXT_FORMS.items():
         definitions[name] = {"anyOf": [{"type": "string", "pattern": pattern}, definitions[name]]}
     common = definitions["ParticipantSpec"]["properties"]
-    definitions["ParticipantSpec"] = _participant(common, definitions)
+    definitions["ParticipantSpec"] = _participant_schema(common, definitions)
     parts = {"$schema": "http://json-schema.org/draft-07/schema#", **schema, "$defs": "@"}
-    rows = (f'"{name}":{_compact(definition)}' for name, definition in definitions.items())
-    return _compact(parts).replace('"@"', "{\n" + ",\n".join(rows) + "\n}") + "\n"
+    rows = (f'"{name}":{_compact_json(definition)}' for name, definition in definitions.items())
+    return _compact_json(parts).replace('"@"', "{\n" + ",\n".join(rows) + "\n}") + "\n"
 
 
-def _compact(value: Any) -> str:
+def _compact_json(value: Any) -> str:
     return json.dumps(value, separators=(",", ":"))
 
 
-def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
+def _participant_schema(common: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of a participant: a branch for each kind, so that an editor reports against the kind.
 
     Parameters may be missing or null: the scene may set a parameter, or null may keep it out. `trocar check`
     reports parameters still missing in the end.
     """
-    broken = registry.broken()
+    broken = registry.broken_kinds()
     kinds = [kind for name, kind in sorted(registry.kinds().items()) if name not in broken]
     branches: list[dict[str, Any]] = []
     for kind in kinds:

@@ -9,12 +9,12 @@ from typing import Any, cast
 
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from hub.planning.limits import MAX_BYTES, MAX_DEPTH, MAX_TEXT, shown
-from hub.planning.yaml_text import MERGE, LimitError, compose, construct
+from hub.planning.limits import MAX_BYTES, MAX_DEPTH, MAX_TEXT, safe_text
+from hub.planning.yaml_text import MERGE, LimitError, compose_yaml, construct_yaml
 from schemas.errors import ScenarioError
 from schemas.scenario import Scenario
 
-__all__ = ["Location", "Source", "merged", "read"]
+__all__ = ["Location", "Source", "merge_missing", "read"]
 
 Location = tuple[str | int, ...]
 """Keys and list indices from the root of the scenario."""
@@ -44,8 +44,8 @@ class Source:
 
     def line(self, path: Location, message: str, *, key: bool = False) -> str:
         """Return `FILE:LINE:COL: path: message` about the value at `path`, or about the key."""
-        where = shown(".".join(map(str, path))) or "scenario"
-        return f"{self.place(path, key=key)}: {where}: {shown(message, 2000)}"
+        where = safe_text(".".join(map(str, path))) or "scenario"
+        return f"{self.place(path, key=key)}: {where}: {safe_text(message, 2000)}"
 
     def place(self, path: Location, *, key: bool = False) -> str:
         """Return `FILE:LINE:COL`, or the override, of the value at `path`, or of the key.
@@ -53,20 +53,20 @@ class Source:
         The place of a missing value is the place of the enclosing mapping or list.
         """
         for length in range(len(path), -1, -1):
-            for known in self._copies(path[:length]):
+            for known in self._copy_sources(path[:length]):
                 if known in self.overrides:
-                    return f"--set {shown(self.overrides[known])}"
+                    return f"--set {safe_text(self.overrides[known])}"
                 if known in self.marks:
                     line, column = self.marks[known][0 if key and length == len(path) else 1]
                     return f"{self.file}:{line}:{column}"
         return str(self.file)
 
-    def _copies(self, path: Location) -> Iterator[Location]:
+    def _copy_sources(self, path: Location) -> Iterator[Location]:
         """Yield `path`, then the possible sources of a copied value at `path`."""
         yield path
         for length in range(len(path), 0, -1):
             if (written := self._written.get(path[:length])) is not None:
-                yield from self._copies((*written, *path[length:]))
+                yield from self._copy_sources((*written, *path[length:]))
 
     def override(self, text: str) -> None:
         """Apply `a.b.c=value`. Missing mappings on the way are created; validated later.
@@ -78,20 +78,22 @@ class Source:
         dotted, equals, value_text = text.partition("=")
         if len(dotted) > MAX_TEXT or dotted.count(".") >= MAX_DEPTH:
             raise ScenarioError(
-                f"--set {shown(text)}: at most {MAX_TEXT} characters and {MAX_DEPTH} parts are allowed"
+                f"--set {safe_text(text)}: at most {MAX_TEXT} characters and {MAX_DEPTH} parts are allowed"
                 " before the '='"
             )
         if not equals or not all(dotted.split(".")):
-            raise ScenarioError(f"--set {shown(text)}: expected a.b.c=value")
+            raise ScenarioError(f"--set {safe_text(text)}: expected a.b.c=value")
         if not dotted.isprintable():
-            raise ScenarioError(f"--set {shown(text)}: only printable characters are allowed before the '='")
+            raise ScenarioError(
+                f"--set {safe_text(text)}: only printable characters are allowed before the '='"
+            )
         try:
-            value = construct(compose(value_text))
+            value = construct_yaml(compose_yaml(value_text))
         except LimitError as error:
             detail: Any = error
-            raise ScenarioError(f"--set {shown(text)}: {detail.problem}") from error
+            raise ScenarioError(f"--set {safe_text(text)}: {detail.problem}") from error
         except YAMLError as error:
-            raise ScenarioError(f"--set {shown(text)}: the value is not valid YAML") from error
+            raise ScenarioError(f"--set {safe_text(text)}: the value is not valid YAML") from error
         path: Location = tuple(_key_or_index(part) for part in dotted.split("."))
         names = self.tree.get("participants")
         if path[0] not in Scenario.model_fields and isinstance(names, dict) and path[0] in names:
@@ -100,7 +102,7 @@ class Source:
         for depth, part in enumerate(path):
             if problem := _no_such_part(parent, part):
                 raise ScenarioError(
-                    f"--set {shown(text)}: {'.'.join(map(str, path[:depth])) or 'the scenario'} {problem}"
+                    f"--set {safe_text(text)}: {'.'.join(map(str, path[:depth])) or 'the scenario'} {problem}"
                 )
             last = depth == len(path) - 1
             if last or (isinstance(parent, dict) and part not in parent):
@@ -120,18 +122,20 @@ def read(file: Path) -> Source:
     """
     try:
         text = _text(file)
-        root = compose(text)
+        root = compose_yaml(text)
         marks = {} if root is None else dict(_marks(root, root, ()))
-        tree: Any = _copied(construct(root))
+        tree: Any = _copy_unshared(construct_yaml(root))
     except MarkedYAMLError as error:
         detail: Any = error
         mark = detail.problem_mark
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         invalid = "" if isinstance(error, LimitError) else "not valid YAML: "
         context = f" ({detail.context})" if detail.context else ""
-        raise ScenarioError(f"{file}{where}: {invalid}{shown(f'{detail.problem}{context}', 500)}") from error
+        raise ScenarioError(
+            f"{file}{where}: {invalid}{safe_text(f'{detail.problem}{context}', 500)}"
+        ) from error
     except (OSError, UnicodeDecodeError, YAMLError) as error:
-        raise ScenarioError(f"{file}: cannot be read: {shown(str(error), 500)}") from error
+        raise ScenarioError(f"{file}: cannot be read: {safe_text(str(error), 500)}") from error
     if not isinstance(tree, dict):
         raise ScenarioError(
             f"{file}:1:1: a scenario is a mapping with at least the keys name, step and participants"
@@ -178,19 +182,21 @@ def _merged_nodes(mapping: Any) -> Iterator[Any]:
             yield from reversed(child.value) if child.id == "sequence" else (child,)
 
 
-def _copied(value: Any) -> Any:
+def _copy_unshared(value: Any) -> Any:
     """Return a YAML tree without shared parts, so that an override changes a single place."""
     if isinstance(value, dict):
-        return {key: _copied(part) for key, part in cast("dict[Any, Any]", value).items()}
-    return [_copied(part) for part in cast("list[Any]", value)] if isinstance(value, list) else value
+        return {key: _copy_unshared(part) for key, part in cast("dict[Any, Any]", value).items()}
+    return [_copy_unshared(part) for part in cast("list[Any]", value)] if isinstance(value, list) else value
 
 
-def merged(value: Any, over: Any) -> Any:
+def merge_missing(value: Any, over: Any) -> Any:
     """Return `over`, and if both are mappings, also the entries missing in `over`, at any depth."""
     if not (isinstance(value, dict) and isinstance(over, dict)):
         return over
     below, above = cast("dict[str, Any]", value), cast("dict[str, Any]", over)
-    return below | {key: merged(below[key], part) if key in below else part for key, part in above.items()}
+    return below | {
+        key: merge_missing(below[key], part) if key in below else part for key, part in above.items()
+    }
 
 
 def _mark(node: Any) -> _Mark:
@@ -202,4 +208,4 @@ def _no_such_part(parent: Any, part: str | int) -> str:
         length = len(cast("list[Any]", parent))
         known = isinstance(part, int) and part < length
         return "" if known else f"is a list of {length}, counted from 0; there is no '{part}' in it"
-    return "" if isinstance(parent, dict) else f"is '{shown(str(parent))}', which has no parts"
+    return "" if isinstance(parent, dict) else f"is '{safe_text(str(parent))}', which has no parts"

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 from hub.participant import Params
-from hub.planning.limits import MAX_SCENE_VALUES, shown
-from hub.planning.scenario_source import Source, merged
+from hub.planning.limits import MAX_SCENE_VALUES, safe_text
+from hub.planning.scenario_source import Source, merge_missing
 from schemas.errors import ScenarioError, did_you_mean
 
 __all__ = ["spread_scene"]
@@ -27,7 +27,9 @@ def spread_scene(source: Source, models: Mapping[str, type[Params]]) -> Iterator
     if scene is None:
         return
     if not isinstance(scene, dict):
-        yield ScenarioError(f"expected a mapping of parameters, got {shown(repr(scene))}", path=("scene",))
+        yield ScenarioError(
+            f"expected a mapping of parameters, got {safe_text(repr(scene))}", path=("scene",)
+        )
         return
     given = source.tree.get("participants")
     participants = cast("dict[str, dict[str, Any]]", given if isinstance(given, dict) else {})
@@ -39,7 +41,7 @@ def spread_scene(source: Source, models: Mapping[str, type[Params]]) -> Iterator
             known = {field for model in models.values() for field in model.model_fields}
             problem = f"no participant has a parameter '{part}'.{did_you_mean(str(part), known)}"
             yield ScenarioError(problem, path=("scene", part))
-        spread += len(takers) * _values(value)
+        spread += len(takers) * _count_values(value)
         if spread > MAX_SCENE_VALUES:
             problem = (
                 f"{len(takers)} participants take this part of the scene, which makes {spread} values with"
@@ -52,12 +54,12 @@ def spread_scene(source: Source, models: Mapping[str, type[Params]]) -> Iterator
             if part in own and own[part] is None:
                 del own[part]
             else:
-                own[part] = merged(value, own[part]) if part in own else value
+                own[part] = merge_missing(value, own[part]) if part in own else value
                 source.stands_also_at(("scene", part), ("participants", name, part))
 
 
-def _values(value: Any) -> int:
+def _count_values(value: Any) -> int:
     """Return the number of keys and values in a value, itself included."""
     if isinstance(value, dict):
-        return 1 + sum(1 + _values(part) for part in cast("dict[Any, Any]", value).values())
-    return 1 + sum(_values(part) for part in cast("list[Any]", value)) if isinstance(value, list) else 1
+        return 1 + sum(1 + _count_values(part) for part in cast("dict[Any, Any]", value).values())
+    return 1 + sum(_count_values(part) for part in cast("list[Any]", value)) if isinstance(value, list) else 1

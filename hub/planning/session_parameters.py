@@ -55,21 +55,21 @@ class SessionParameters:
         Raises ScenarioError if the kind cannot be loaded or parameters are invalid.
         """
         kind = registry.load(self.kinds[name])
-        made = [kind(name, self._validated(name, params)) for params in self.stages(name)]
+        made = [kind(name, self._validate_parameters(name, params)) for params in self.parameter_stages(name)]
         steps = [one.step for one in self._renewals_of(name)]
         later = zip(steps, made[1:], strict=True)
         return made[0], [(step, one) for step, one in later if isinstance(one, Stepped)]
 
-    def validated(self, name: str, changes: Mapping[str, Any] | None = None) -> Params:
+    def validate_last(self, name: str, changes: Mapping[str, Any] | None = None) -> Params:
         """Return the parameters at the end, with `changes`. Raises ScenarioError as `make` does."""
-        return self._validated(name, {**self.last[name], **(changes or {})})
+        return self._validate_parameters(name, {**self.last[name], **(changes or {})})
 
     def of(self, names: Iterable[str]) -> tuple[dict[str, dict[str, Any]], list[Renewal]]:
         """Return the parameters at the end of the participants `names`, and their part of the renewals."""
         names = list(names)
         return {name: dict(self.last[name]) for name in names}, [one.of(names) for one in self.renewals]
 
-    def stages(self, name: str) -> list[Mapping[str, Any]]:
+    def parameter_stages(self, name: str) -> list[Mapping[str, Any]]:
         """Return the parameters of a participant over the session, the last parameters at the end."""
         return [*(one.before[name] for one in self._renewals_of(name)), self.last[name]]
 
@@ -83,7 +83,7 @@ class SessionParameters:
     def _renewals_of(self, name: str) -> list[Renewal]:
         return sorted((one for one in self.renewals if name in one.before), key=lambda one: one.step)
 
-    def _validated(self, name: str, params: Mapping[str, Any]) -> Params:
+    def _validate_parameters(self, name: str, params: Mapping[str, Any]) -> Params:
         kind = self.kinds[name]
         try:
             return registry.load(kind).params_model.model_validate(params, context=self.files.context)

@@ -10,14 +10,14 @@ from typing import Any, cast
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from hub.planning.limits import MAX_PROBLEMS, shown
+from hub.planning.limits import MAX_PROBLEMS, safe_text
 from hub.planning.scenario_source import Location, Source
 from schemas.errors import did_you_mean
 
-__all__ = ["problems"]
+__all__ = ["describe_errors"]
 
 
-def problems(
+def describe_errors(
     error: ValidationError,
     model: type[BaseModel],
     prefix: Location,
@@ -43,16 +43,16 @@ def _message(detail: ErrorDetails, model: type[BaseModel], other_keys: Iterable[
         case "extra_forbidden":
             *parents, name = detail["loc"]
             known = [*_known_keys(model, parents), *(() if parents else other_keys)]
-            return f"there is no '{shown(str(name))}' here.{did_you_mean(shown(str(name)), known)}"
+            return f"there is no '{safe_text(str(name))}' here.{did_you_mean(safe_text(str(name)), known)}"
         case "literal_error":
             expected = str(detail.get("ctx", {}).get("expected", "")).replace(" or ", ", ")
             allowed = (word.strip("'") for word in expected.split(", "))
-            text = shown(str(cast("object", given)))
+            text = safe_text(str(cast("object", given)))
             return f"'{text}' is not allowed.{did_you_mean(text, allowed)}"
         case "missing":
             return "is required but not given"
         case "model_type" | "dict_type":
-            return f"expected a mapping, got {shown(repr(given))}"
+            return f"expected a mapping, got {safe_text(repr(given))}"
         case _:
             message, value = detail["msg"].removeprefix("Value error, "), repr(given)
             return message if value in message or len(value) > 60 else f"{message} (got {value})"
@@ -69,15 +69,15 @@ def _known_keys(model: type[BaseModel], loc: Iterable[str | int]) -> set[str]:
     The source is the model's JSON schema, where unions and nested models look alike.
     """
     root = _json_schema(model)
-    here = list(_branches(root, root))
+    here = list(_schema_branches(root, root))
     for part in loc:
-        children = [child for branch in here for child in _children(branch, part)]
+        children = [child for branch in here for child in _child_schemas(branch, part)]
         # no children: `part` names a branch of a union
-        here = [branch for child in children for branch in _branches(child, root)] or here
+        here = [branch for child in children for branch in _schema_branches(child, root)] or here
     return {key for branch in here for key in branch.get("properties", {})}
 
 
-def _children(branch: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
+def _child_schemas(branch: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
     """Yield the schemas of the value at `part` of a mapping or a list."""
     properties: dict[str, Any] = branch.get("properties", {})
     patterns: dict[str, Any] = branch.get("patternProperties", {})
@@ -89,12 +89,12 @@ def _children(branch: dict[str, Any], part: str | int) -> Iterator[dict[str, Any
     return (cast("dict[str, Any]", schema) for schema in candidates if isinstance(schema, dict))
 
 
-def _branches(schema: dict[str, Any], root: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _schema_branches(schema: dict[str, Any], root: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the alternatives of `schema`, with references followed."""
     if "$ref" in schema:
-        yield from _branches(root["$defs"][schema["$ref"].rpartition("/")[2]], root)
+        yield from _schema_branches(root["$defs"][schema["$ref"].rpartition("/")[2]], root)
     elif alternatives := schema.get("anyOf") or schema.get("oneOf"):
         for alternative in alternatives:
-            yield from _branches(alternative, root)
+            yield from _schema_branches(alternative, root)
     else:
         yield schema

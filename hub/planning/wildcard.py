@@ -8,10 +8,10 @@ from schemas.errors import ScenarioError, did_you_mean
 from schemas.ports import Port
 from schemas.scenario import Connection
 
-__all__ = ["expand"]
+__all__ = ["expand_wildcard"]
 
 
-def expand(
+def expand_wildcard(
     connection: Connection, ports: Mapping[str, Sequence[Port]], path: tuple[str | int, ...]
 ) -> tuple[Connection, ...]:
     """Return the single connections of `connection`, a connection with wildcards at `path` in the scenario.

@@ -14,7 +14,7 @@ from hub.planning.participants import plan_participant
 from hub.planning.plan import Plan, PlannedBond
 from hub.planning.registry import Role
 from hub.planning.step_order import check_order, step_order
-from hub.planning.wildcard import expand
+from hub.planning.wildcard import expand_wildcard
 from schemas.scenario import Scenario
 
 __all__ = ["make_plan"]
@@ -41,14 +41,14 @@ def make_plan(
     singles = [
         (single, ("connections", index))
         for index, connection in enumerate(scenario.connections)
-        for single in expand(connection, ports, ("connections", index))
+        for single in expand_wildcard(connection, ports, ("connections", index))
     ]
     planned = with_observers(scenario, participants, planned, [single for single, _ in singles])
     connections = Connections(scenario, planned)
     for single, path in singles:
         connections.connect(single, path)
     for index, bond in enumerate(bonds):
-        connections.couple(index, bond)
+        connections.connect_bond(index, bond)
     connections.check_inputs()
     check_measures(scenario, planned)
     return Plan(

@@ -20,7 +20,7 @@ from ruamel.yaml.parser import Parser
 
 from hub.planning.limits import MAX_BYTES, MAX_DEPTH, MAX_ITEMS, MAX_NUMBER, MAX_TEXT, MAX_VALUES
 
-__all__ = ["MERGE", "LimitError", "compose", "construct"]
+__all__ = ["MERGE", "LimitError", "compose_yaml", "construct_yaml"]
 
 MERGE = "tag:yaml.org,2002:merge"
 _STRING, _NUMBERS = "tag:yaml.org,2002:str", ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
@@ -38,12 +38,12 @@ class LimitError(MarkedYAMLError):
         parent.__init__(problem=problem, problem_mark=mark)
 
 
-def compose(text: str) -> Any:
+def compose_yaml(text: str) -> Any:
     """Return the root node of a YAML text, or None if empty. Raises YAMLError, including LimitError."""
     size = len(text.encode(errors="replace"))
     if size > MAX_BYTES:
         raise LimitError(f"the text has {size} bytes; at most {MAX_BYTES} are allowed", None)
-    yaml = _yaml()
+    yaml = _create_parser()
     yaml.composer.warn_double_anchors = False
     try:
         root = yaml.compose(text)
@@ -54,12 +54,12 @@ def compose(text: str) -> Any:
     return root
 
 
-def construct(root: Any) -> Any:
+def construct_yaml(root: Any) -> Any:
     """Return the value of a node from `compose`. Raises YAMLError."""
-    return None if root is None else _yaml().constructor.construct_document(root)
+    return None if root is None else _create_parser().constructor.construct_document(root)
 
 
-def _yaml() -> Any:
+def _create_parser() -> Any:
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.Parser, yaml.Constructor = _BoundedParser, _Constructor
     return yaml
@@ -157,7 +157,7 @@ def _measure(node: Any, known: dict[int, _Extent | None]) -> _Extent:
         return extent
     known[id(node)] = None
     if node.id == "scalar":
-        extent = _scalar(node)
+        extent = _scalar_extent(node)
     else:
         children: list[_Extent] = []
         for part in node.value:
@@ -182,7 +182,7 @@ def _measure(node: Any, known: dict[int, _Extent | None]) -> _Extent:
     return extent
 
 
-def _scalar(node: Any) -> _Extent:
+def _scalar_extent(node: Any) -> _Extent:
     length = len(node.value)
     if str(node.tag) in _NUMBERS and length > MAX_NUMBER:
         raise LimitError(

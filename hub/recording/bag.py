@@ -36,13 +36,13 @@ __all__ = [
     "Bag",
     "BagMessage",
     "bag_file",
+    "chunk_declarations",
     "chunk_records",
-    "declarations",
     "default_output",
     "located_messages",
-    "locating",
+    "message_errors",
     "output_port",
-    "reading",
+    "reading_errors",
 ]
 
 MAX_RECORD_BYTES = 64 * 2**20
@@ -110,7 +110,7 @@ def default_output(path: Path) -> Path:
 
 
 @contextmanager
-def reading(file: Path) -> Generator[None]:
+def reading_errors(file: Path) -> Generator[None]:
     """Turn the parsers' errors at damaged bytes into a RecordingError with the name of `file`."""
     try:
         yield
@@ -126,7 +126,7 @@ def reading(file: Path) -> Generator[None]:
 
 
 @contextmanager
-def locating(bag: Bag, topic: str, time_ns: int) -> Generator[None]:
+def message_errors(bag: Bag, topic: str, time_ns: int) -> Generator[None]:
     """Turn a MessageError into a RecordingError with the place of the message."""
     try:
         yield
@@ -157,7 +157,7 @@ class Bag:
         self._unpacked: tuple[int, bytes] = (-1, b"")
         """Place and records of the chunk read last: many topics begin in the same chunk."""
         try:
-            with reading(self.file):
+            with reading_errors(self.file):
                 self._summary = self._read_summary()
         except CutShortError:
             if not unfinished:
@@ -190,7 +190,7 @@ class Bag:
         """
         if self._unfinished is None:
             return False
-        with reading(self.file):
+        with reading_errors(self.file):
             more = self._unfinished.grow()
         if more:
             self.grown += 1
@@ -225,7 +225,7 @@ class Bag:
     def attachments(self) -> dict[str, bytes]:
         """The attachments by name."""
         found: dict[str, bytes] = {}
-        with reading(self.file), self.file.open("rb") as stream:
+        with reading_errors(self.file), self.file.open("rb") as stream:
             for index in self._summary.attachment_indexes:
                 stream.seek(index.offset)
                 record = next(
@@ -246,8 +246,8 @@ class Bag:
                 raise RecordingError(
                     f"'{self.file}' has no topic '{topic}'.{did_you_mean(topic, self.topics)}"
                 )
-        wanted = {channel: topic for topic in topics or self.topics for channel in self._ids(topic)}
-        for records, found in self._located(set(wanted)):
+        wanted = {channel: topic for topic in topics or self.topics for channel in self._channel_ids(topic)}
+        for records, found in self._chunks_with_messages(set(wanted)):
             for m in found:
                 topic = wanted[m.channel]
                 yield BagMessage(
@@ -259,7 +259,7 @@ class Bag:
         times: list[int] = []
         payloads: list[bytes] = []
         left = max(_FREE_TOPIC_BYTES, _MAX_TOPIC_RATIO * self.file.stat().st_size)
-        for records, found in self._located(self._ids(topic)):
+        for records, found in self._chunks_with_messages(self._channel_ids(topic)):
             left -= sum(m.end - m.offset for m in found)
             if left < 0:
                 raise RecordingError(
@@ -277,7 +277,7 @@ class Bag:
 
     def chunks_with(self, topic: str) -> list[ChunkIndex]:
         """Return the chunks that may hold messages of `topic`, in the order of the file."""
-        ids = self._ids(topic)
+        ids = self._channel_ids(topic)
         return [
             index
             for index in self.chunks
@@ -286,7 +286,7 @@ class Bag:
 
     def chunk(self, index: ChunkIndex) -> bytes:
         """Return the uncompressed records of a chunk; raises RecordingError for damaged bytes."""
-        with reading(self.file), self.file.open("rb") as stream:
+        with reading_errors(self.file), self.file.open("rb") as stream:
             return self._records_of(index, stream)
 
     def _records_of(self, index: ChunkIndex, stream: BinaryIO) -> bytes:
@@ -302,25 +302,25 @@ class Bag:
 
         Raises RecordingError if the index is damaged.
         """
-        ids, places = self._ids(topic), index.message_index_offsets
+        ids, places = self._channel_ids(topic), index.message_index_offsets
         if not places:  # another writer's: the chunk itself says it
-            with reading(self.file):
+            with reading_errors(self.file):
                 found = [one for one in located_messages(self.chunk(index)) if one.channel in ids]
             return np.array([m.time_ns for m in found], np.int64), np.array(
                 [m.offset for m in found], np.int64
             )
-        with reading(self.file), self.file.open("rb") as stream:
+        with reading_errors(self.file), self.file.open("rb") as stream:
             entries = [_entries(stream, places[channel], channel) for channel in sorted(ids & places.keys())]
         all_ = np.concatenate(entries) if entries else np.zeros(0, _INDEX_ENTRY)
         return all_["time"].astype(np.int64), all_["offset"].astype(np.int64)
 
     def payload(self, records: bytes, offset: int) -> bytes:
         """Return the message at a place in the records of a chunk; raises RecordingError if there is none."""
-        with reading(self.file):
+        with reading_errors(self.file):
             found = _message_at(records, offset, set(self._summary.channels))
             return records[found.offset + MESSAGE_HEADER_BYTES : found.end]
 
-    def _ids(self, topic: str) -> set[int]:
+    def _channel_ids(self, topic: str) -> set[int]:
         """Return the channels of a topic; a search for each of 20 000 topics would take minutes."""
         channels = self._summary.channels
         if self._known != len(channels):
@@ -349,7 +349,7 @@ class Bag:
             raise RecordingError(f"'{self.file}' has no chunk index; `trocar recover {self.file}` writes one")
         return summary
 
-    def _located(self, wanted: set[int]) -> Iterator[tuple[bytes, list[LocatedMessage]]]:
+    def _chunks_with_messages(self, wanted: set[int]) -> Iterator[tuple[bytes, list[LocatedMessage]]]:
         """Yield, in file order, the records of each chunk with `wanted` channels, and the places."""
         indexes = sorted(self._summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
         with self.file.open("rb") as stream:
@@ -357,12 +357,14 @@ class Bag:
                 places = index.message_index_offsets
                 if places and wanted.isdisjoint(places):
                     continue
-                with reading(self.file):
+                with reading_errors(self.file):
                     records = self._records_of(index, stream)
                     if wanted.issuperset(places):
                         found = [m for m in located_messages(records) if m.channel in wanted]
                     else:
-                        offsets = [o for c in wanted & places.keys() for o in _offsets(stream, places[c], c)]
+                        offsets = [
+                            o for c in wanted & places.keys() for o in _message_offsets(stream, places[c], c)
+                        ]
                         found = [_message_at(records, offset, wanted) for offset in sorted({*offsets})]
                 yield records, found
 
@@ -377,7 +379,7 @@ class LocatedMessage(NamedTuple):
     end: int
 
 
-def _offsets(stream: BinaryIO, place: int, channel: int) -> list[int]:
+def _message_offsets(stream: BinaryIO, place: int, channel: int) -> list[int]:
     """Return where the messages of `channel` start in their chunk, from the message index at `place`."""
     return _entries(stream, place, channel)["offset"].tolist()
 
@@ -420,21 +422,21 @@ def located_messages(records: bytes) -> Iterator[LocatedMessage]:
 
     Raises ValueError or struct.error if records do not end at their stated length, or if there are too many.
     """
-    for opcode, at, end in _heads(records):
+    for opcode, at, end in _record_heads(records):
         if opcode == Opcode.MESSAGE:
             _, _, channel, _, time_ns, _ = _MESSAGE.unpack_from(records, at)
             yield LocatedMessage(channel, time_ns, at, end)
 
 
-def declarations(records: bytes) -> Iterator[Schema | Channel]:
+def chunk_declarations(records: bytes) -> Iterator[Schema | Channel]:
     """Yield the schemas and channels in the records of a chunk; raises the errors of `located_messages`."""
-    for opcode, at, end in _heads(records):
+    for opcode, at, end in _record_heads(records):
         if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             stream = ReadDataStream(BytesIO(records[at + _RECORD.size : end]))
             yield Schema.read(stream) if opcode == Opcode.SCHEMA else Channel.read(stream)
 
 
-def _heads(records: bytes) -> Iterator[tuple[int, int, int]]:
+def _record_heads(records: bytes) -> Iterator[tuple[int, int, int]]:
     """Yield opcode, start and end of each record of a chunk."""
     at = count = 0
     while at < len(records):

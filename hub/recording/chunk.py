@@ -77,7 +77,7 @@ def _by_numpy(queued: Sequence[Queued], blocks: Sequence[VectorBlock]) -> ChunkD
         places = np.flatnonzero(kinds == kind)
         at = places.tolist()
         if kind == _ALONE:
-            made, sizes[places] = _headers([queued[place] for place in at])
+            made, sizes[places] = _message_headers([queued[place] for place in at])
             channels, offsets, first = np.array([numbers[place] for place in at])[:, None], _AT_START, 0
         else:
             block = blocks[kind - FIRST_BLOCK]
@@ -86,10 +86,10 @@ def _by_numpy(queued: Sequence[Queued], blocks: Sequence[VectorBlock]) -> ChunkD
         for place, one in zip(at, made, strict=True):
             pieces[2 * place + first] = one
         parts.append((places, channels, offsets))
-    return _located(b"".join(pieces), sizes, times_ns, parts)
+    return _locate_messages(b"".join(pieces), sizes, times_ns, parts)
 
 
-def _located(
+def _locate_messages(
     records: bytes, sizes: NDArray[np.int64], times_ns: NDArray[np.int64], parts: Sequence[_Part]
 ) -> ChunkData:
     """Return the chunk of `records`, of entries with their sizes, shape (entries,), and times, the same."""
@@ -104,7 +104,7 @@ def _located(
     return ChunkData(records, *found[:, found[2].argsort()])
 
 
-def _headers(queued: Sequence[Queued]) -> tuple[list[bytes], NDArray[np.int64]]:
+def _message_headers(queued: Sequence[Queued]) -> tuple[list[bytes], NDArray[np.int64]]:
     """Return the bytes in front of the payload of each single message, and the bytes of both."""
     channels, times, payloads = zip(*queued, strict=True)
     sizes = np.fromiter(map(len, payloads), np.int64, len(payloads)) + MESSAGE.itemsize

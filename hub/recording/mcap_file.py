@@ -69,19 +69,19 @@ class McapFile:
         self._index_size = 0
         self._indexes_in_memory: list[bytes] = []
         """Indexes not yet in the file of indexes."""
-        self._append(MCAP0_MAGIC + _bytes_of(Header("ros2", "trocar")))
+        self._append_bytes(MCAP0_MAGIC + _bytes_of(Header("ros2", "trocar")))
 
     def attach(self, name: str, data: bytes) -> None:
         """Add an attachment."""
         media_type = f"application/{Path(name).suffix[1:] or 'octet-stream'}"
         record = _bytes_of(Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data))
-        index = AttachmentIndex(self._append(record), len(record), 0, 0, len(data), name, media_type)
+        index = AttachmentIndex(self._append_bytes(record), len(record), 0, 0, len(data), name, media_type)
         self._attachments.append(index)
 
     def declare(self, schema: Schema, channel: Channel) -> None:
         """Add a channel and, if new, the schema, before the first of the messages."""
         new = schema not in self.schemas
-        self._append(_bytes_of(schema, channel) if new else _bytes_of(channel))
+        self._append_bytes(_bytes_of(schema, channel) if new else _bytes_of(channel))
         self.schemas += [schema] if new else []
         self.channels.append(channel)
 
@@ -96,7 +96,7 @@ class McapFile:
         record = chunk_index(data, index, self.size, len(head) + len(compressed), len(compressed))
         if sum(map(len, self._indexes_in_memory)) > _INDEX_BYTES:
             self._put_indexes_aside()
-        self._append(b"".join((head, compressed, index.records)))
+        self._append_bytes(b"".join((head, compressed, index.records)))
         self._indexes_in_memory.append(record)
         self._start_ns = min(self._start_ns, start) if self._chunks else start
         self._end_ns = max(self._end_ns, end)
@@ -130,7 +130,7 @@ class McapFile:
         """Append summary and footer. Raises OSError with nothing appended."""
         size = self.size
         try:
-            self._append(_bytes_of(DataEnd(0)))
+            self._append_bytes(_bytes_of(DataEnd(0)))
             self._append_summary()
         except OSError:
             self._cut(size)
@@ -142,7 +142,7 @@ class McapFile:
         for opcode, parts in self._summary_parts():
             start = self.size
             for part in parts:
-                self._append(part)
+                self._append_bytes(part)
                 checksum = zlib.crc32(part, checksum)
             if self.size > start:
                 places.append(SummaryOffset(opcode, start, self.size - start))
@@ -150,7 +150,7 @@ class McapFile:
         footer_start = struct.pack("<BQQQ", Opcode.FOOTER, 20, summary_start, offset_start)
         checksum = zlib.crc32(footer_start, zlib.crc32(offsets, checksum))
         footer = _bytes_of(Footer(summary_start, offset_start, checksum))
-        self._append(offsets + footer + MCAP0_MAGIC)
+        self._append_bytes(offsets + footer + MCAP0_MAGIC)
 
     def _summary_parts(self) -> Iterator[tuple[Opcode, Iterable[bytes]]]:
         yield Opcode.SCHEMA, [_bytes_of(*self.schemas)]
@@ -175,7 +175,7 @@ class McapFile:
         self._file.close()
         self._index.close()
 
-    def _append(self, data: bytes) -> int:
+    def _append_bytes(self, data: bytes) -> int:
         """Write `data` at the end and return the offset."""
         try:
             _write(self._file, data)

@@ -65,14 +65,14 @@ class Moments:
                 f"'{self._bag.file}' has no topic '{topic}'.{did_you_mean(topic, self._bag.topics)}"
             )
         with self._lock:
-            chunks = self._of(topic)
+            chunks = self._chunks_of(topic)
             best: tuple[int, int, int] | None = None
             """Time, place of the chunk in the file, place of the message in the chunk."""
             found: ChunkIndex | None = None
             at = int(np.searchsorted(chunks.starts_ns, time_ns, side="right")) - 1
             while at >= 0 and (best is None or chunks.ends_ns[at] >= best[0]):
                 index = chunks.indexes[at]
-                times, offsets = self._index(index, topic)
+                times, offsets = self._sorted_index(index, topic)
                 earlier = int(np.searchsorted(times, time_ns, side="right")) - 1
                 if earlier >= 0:
                     place = int(times[earlier]), index.chunk_start_offset, int(offsets[earlier])
@@ -81,10 +81,10 @@ class Moments:
                 at -= 1
             if best is None or found is None:
                 return None
-            payload = self._bag.payload(self._uncompressed(found), best[2])
+            payload = self._bag.payload(self._unpack_chunk(found), best[2])
             return BagMessage(topic, self._bag.topics[topic], best[0], payload)
 
-    def _of(self, topic: str) -> _Chunks:
+    def _chunks_of(self, topic: str) -> _Chunks:
         if self._grown != self._bag.grown:
             self._grown, self._chunks = self._bag.grown, {}
         if topic not in self._chunks:
@@ -99,7 +99,7 @@ class Moments:
             )
         return self._chunks[topic]
 
-    def _index(self, chunk: ChunkIndex, topic: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _sorted_index(self, chunk: ChunkIndex, topic: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return times (ns) and offsets of the messages of `topic` in a chunk, by time, then by place."""
         key = chunk.chunk_start_offset, topic
         if key not in self._times:
@@ -111,7 +111,7 @@ class Moments:
         self._times.move_to_end(key)
         return self._times[key]
 
-    def _uncompressed(self, chunk: ChunkIndex) -> bytes:
+    def _unpack_chunk(self, chunk: ChunkIndex) -> bytes:
         key = chunk.chunk_start_offset
         if key not in self._records:
             self._records[key] = self._bag.chunk(chunk)

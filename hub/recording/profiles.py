@@ -62,7 +62,13 @@ def profile_tables(numbers: Mapping[str, Any]) -> Iterator[_Table]:
     yield (
         ("mean step of host", "phase", "takes", "share", "of a core"),
         [
-            (host, phase, _ms(row["wall_s"]), f"{row['share']:.1%}", _ms(row["core_s"]))
+            (
+                host,
+                phase,
+                _in_milliseconds(row["wall_s"]),
+                f"{row['share']:.1%}",
+                _in_milliseconds(row["core_s"]),
+            )
             for host, phases in numbers["step"].items()
             for phase, row in phases.items()
             if row["share"] >= _LEAST
@@ -74,11 +80,11 @@ def profile_tables(numbers: Mapping[str, Any]) -> Iterator[_Table]:
         yield (
             ("longest steps end at", "take", "most of it"),
             [
-                (f"{row['sim_time_s']:.3f} s", _ms(row["took_s"]), row["cause"])
+                (f"{row['sim_time_s']:.3f} s", _in_milliseconds(row["took_s"]), row["cause"])
                 for row in numbers["worst_steps"]
             ],
         )
 
 
-def _ms(time_s: float) -> str:
+def _in_milliseconds(time_s: float) -> str:
     return f"{1e3 * time_s:.3f} ms"

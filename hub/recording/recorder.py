@@ -96,7 +96,7 @@ class Recorder:
         self._thread = Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
-    def channel(self, topic: str, type_name: str) -> int:
+    def add_channel(self, topic: str, type_name: str) -> int:
         """Return the number of the messages of `topic` for `write`.
 
         Raises RecordingError for an unknown type.
@@ -111,7 +111,7 @@ class Recorder:
                 self._channels.append((topic, type_name))
             return self._channels.index((topic, type_name)) + 1
 
-    def block(self, vectors: Sequence[tuple[int, VectorCodec]]) -> int:
+    def add_block(self, vectors: Sequence[tuple[int, VectorCodec]]) -> int:
         """Return the number for `write` of vectors written together as bytes; each vector has its channel."""
         with self._lock:
             self._blocks.append(VectorBlock(vectors))
@@ -126,7 +126,7 @@ class Recorder:
 
     def write_all(self, queued: Sequence[Queued]) -> None:
         """Queue messages and vectors, all or none of them, like `write`."""
-        size = sum(self._sizes(queued))
+        size = sum(self._record_sizes(queued))
         with self._lock:
             before = self._queued_bytes
             if self._refusing or before > MAX_QUEUED_BYTES or len(self._queue) >= MAX_QUEUED_MESSAGES:
@@ -137,7 +137,7 @@ class Recorder:
         if before < CHUNK_BYTES <= after:
             self._wake.set()
 
-    def _sizes(self, queued: Iterable[Queued]) -> list[int]:
+    def _record_sizes(self, queued: Iterable[Queued]) -> list[int]:
         """Return the size of each queued message or block as records, bytes."""
         blocks = self._blocks
         return [
@@ -196,20 +196,20 @@ class Recorder:
             written = 0
             try:
                 self._declare(channels)
-                for part in self._chunks(queue, size):
+                for part in self._split_queue(queue, size):
                     self._file.add_chunk(chunk_data(part, self._blocks))
                     written += len(part)
             except Exception as error:  # noqa: BLE001 - whatever it is, the session goes on and the recording is marked
                 self._fail(error)
                 self._dropped += self._messages(queue[written:])
 
-    def _chunks(self, queue: list[Queued], queued_bytes: int) -> Iterator[list[Queued]]:
+    def _split_queue(self, queue: list[Queued], queued_bytes: int) -> Iterator[list[Queued]]:
         """Cut `queue` into parts of at most `MOST_CHUNK_BYTES`, each with at least a message."""
         if 0 < queued_bytes <= MOST_CHUNK_BYTES:
             yield queue
             return
         start, size = 0, 0
-        for place, more in enumerate(self._sizes(queue)):
+        for place, more in enumerate(self._record_sizes(queue)):
             if size and size + more > MOST_CHUNK_BYTES:
                 yield queue[start:place]
                 start, size = place, 0

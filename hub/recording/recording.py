@@ -20,7 +20,7 @@ from pydantic_core import from_json
 
 from hub.planning.plan import Plan
 from hub.planning.renamed import current_names
-from hub.recording.bag import Bag, locating
+from hub.recording.bag import Bag, message_errors
 from hub.recording.moments import Moments
 from hub.recording.series import Series
 from schemas.codec import decode
@@ -77,7 +77,7 @@ class Recording(Bag):
         if topic_name not in self.topics:
             known = self.topics if port.startswith("/") else self._ports
             raise RecordingError(f"'{self.file}' has no port '{port}'.{did_you_mean(port, known)}")
-        return Series(self, topic_name, port, self._declared.get(port))
+        return Series(self, topic_name, port, self._declared_ports.get(port))
 
     def __contains__(self, port: str) -> bool:
         return port in self.topics if port.startswith("/") else port in self._ports
@@ -87,7 +87,7 @@ class Recording(Bag):
 
     def __repr__(self) -> str:
         return (
-            f"<Recording {self._title}: {self.duration_ns * 1e-9:g} s; participants"
+            f"<Recording {self._display_title}: {self.duration_ns * 1e-9:g} s; participants"
             f" {', '.join(self.participants) or 'none'}; {len(self._ports)} ports;"
             f" {sum(self.counts.values()):,} messages; {self.file}>"
         )
@@ -100,7 +100,7 @@ class Recording(Bag):
             for name, kind in self.ports.items()
         )
         return (
-            f"<p><b>{escape(self._title)}</b>, {self.duration_ns * 1e-9:g} s, participants"
+            f"<p><b>{escape(self._display_title)}</b>, {self.duration_ns * 1e-9:g} s, participants"
             f" {escape(', '.join(self.participants) or 'none')}</p><table><thead><tr><th>port</th>"
             f"<th>type</th><th>messages</th></tr></thead><tbody>{rows}</tbody></table>"
         )
@@ -120,7 +120,7 @@ class Recording(Bag):
         return found
 
     @cached_property
-    def _declared(self) -> dict[str, Port]:
+    def _declared_ports(self) -> dict[str, Port]:
         """The ports as the participants declared them; empty if not recorded."""
         if "plan.json" not in self.attachments:
             return {}
@@ -128,7 +128,7 @@ class Recording(Bag):
         return {f"{name}.{port.name}": port for name, one in participants.items() for port in one.ports}
 
     @property
-    def _title(self) -> str:
+    def _display_title(self) -> str:
         with suppress(RecordingError):
             return self.scenario().name
         return self.file.stem
@@ -189,7 +189,7 @@ class Recording(Bag):
                 f"'{self.file}': this version cannot read the plan in it{self.made_by_newer()}:"
                 f" {error.errors(include_url=False)[0]['msg']}"
             ) from error
-        if problem := plan.contradiction():
+        if problem := plan.find_contradiction():
             raise RecordingError(f"'{self.file}': its plan contradicts itself: {problem}")
         return plan
 
@@ -219,12 +219,12 @@ class Recording(Bag):
 
     def session(self) -> str:
         """Return the name of the session."""
-        status = next(self._decoded(STATUS_TOPIC, SessionStatus), None)
+        status = next(self._decode_messages(STATUS_TOPIC, SessionStatus), None)
         return self.scenario().name if status is None else status[1].session
 
     def grants(self) -> Iterator[GrantMessage]:
         """Yield the grants in their order."""
-        return (grant for _, grant in self._decoded(GRANT_TOPIC, GrantMessage))
+        return (grant for _, grant in self._decode_messages(GRANT_TOPIC, GrantMessage))
 
     def last_grant(self) -> GrantMessage | None:
         """Return the grant given last, found by the index; None if there is none."""
@@ -234,30 +234,30 @@ class Recording(Bag):
         found = moments.newest(GRANT_TOPIC, moments.span_ns[1])
         if found is None:
             return None
-        with locating(self, GRANT_TOPIC, found.time_ns):
+        with message_errors(self, GRANT_TOPIC, found.time_ns):
             return decode(GrantMessage, found.payload)
 
     def acks(self, participant: str) -> Iterator[AckMessage]:
         """Yield the acks of `participant` in the order of their steps."""
-        return (ack for _, ack in self._decoded(topic(_KEYS.ack(participant)), AckMessage))
+        return (ack for _, ack in self._decode_messages(topic(_KEYS.ack(participant)), AckMessage))
 
     def energy(self, bond: str) -> Iterator[tuple[int, CouplingEnergy]]:
         """Yield the energy book of `bond`, with the simulated time (ns) of each entry."""
-        return self._decoded(ENERGY_PREFIX + bond, CouplingEnergy)
+        return self._decode_messages(ENERGY_PREFIX + bond, CouplingEnergy)
 
     def statuses(self) -> Iterator[tuple[int, SessionStatus]]:
         """Yield the session's published statuses, with the simulated time (ns)."""
-        return self._decoded(STATUS_TOPIC, SessionStatus)
+        return self._decode_messages(STATUS_TOPIC, SessionStatus)
 
     def profile(self) -> Profile | None:
         """Return where the time of the whole run went; None if not measured."""
-        profiles = [profile for _, profile in self._decoded(_PROFILE_TOPIC, Profile)]
+        profiles = [profile for _, profile in self._decode_messages(_PROFILE_TOPIC, Profile)]
         return profiles[-1] if profiles else None
 
-    def _decoded(self, topic_name: str, model: type[M]) -> Iterator[tuple[int, M]]:
+    def _decode_messages(self, topic_name: str, model: type[M]) -> Iterator[tuple[int, M]]:
         if topic_name not in self.topics:
             return
         for message in self.messages(topic_name):
-            with locating(self, topic_name, message.time_ns):
+            with message_errors(self, topic_name, message.time_ns):
                 content = decode(model, message.payload)
             yield message.time_ns, content

@@ -17,11 +17,11 @@ from mcap.writer import MCAP0_MAGIC
 from hub.recording.bag import (
     MAX_RECORD_BYTES,
     bag_file,
+    chunk_declarations,
     chunk_records,
-    declarations,
     default_output,
     located_messages,
-    reading,
+    reading_errors,
 )
 from hub.recording.chunk import ChunkData
 from hub.recording.mcap_file import McapFile, create_bag, write_rosbag2_metadata
@@ -54,7 +54,7 @@ def recover(path: Path, output: Path | None = None) -> RecoverSummary:
     not a recording, or if `output` is not empty or cannot be written.
     """
     source = bag_file(path)
-    with reading(source), source.open("rb") as stream:
+    with reading_errors(source), source.open("rb") as stream:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise RecordingError(f"'{source}' is not an MCAP file")
     named = path.resolve()
@@ -65,7 +65,7 @@ def recover(path: Path, output: Path | None = None) -> RecoverSummary:
         copy = _Copy(target)
         with source.open("rb") as stream:
             reader = StreamReader(stream, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES)
-            for record in _whole(reader):
+            for record in _whole_records(reader):
                 copy.add(record)
         target.finish()
         write_rosbag2_metadata(target)
@@ -85,7 +85,7 @@ def recover(path: Path, output: Path | None = None) -> RecoverSummary:
     )
 
 
-def _whole(reader: StreamReader) -> Iterator[McapRecord]:
+def _whole_records(reader: StreamReader) -> Iterator[McapRecord]:
     """Yield the records up to the first incomplete record; a record may state any length."""
     with suppress(McapError, struct.error, ValueError, OverflowError, MemoryError):
         yield from reader.records
@@ -128,7 +128,7 @@ class _Copy:
         try:
             records = chunk_records(chunk)
             table = np.array([m[:3] for m in located_messages(records)], np.int64).reshape(-1, 3)
-            others = list(declarations(records))
+            others = list(chunk_declarations(records))
         except Exception:  # noqa: BLE001 - wrong bytes make zstd, lz4, struct and mcap raise what they please; counted, and reported
             self.damaged += 1
             return

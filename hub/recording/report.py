@@ -22,8 +22,8 @@ from hub.recording.report_figures import (
     press_figure,
     step_time_figures,
 )
-from hub.recording.report_notes import noted
-from hub.recording.report_scores import score_figures, score_table, scored
+from hub.recording.report_notes import participant_notes
+from hub.recording.report_scores import last_score_cards, score_figures, score_table
 from hub.recording.report_tissue import tissue_figures
 from hub.recording.report_vision import vision_figures
 from hub.recording.series import Series
@@ -42,7 +42,7 @@ def report(recording: Recording, output: Path) -> None:
     `output` cannot be written.
     """
     scenario = recording.scenario()
-    traces = [trace for bond in scenario.bonds if (trace := _trace(recording, bond)) is not None]
+    traces = [trace for bond in scenario.bonds if (trace := _bond_trace(recording, bond)) is not None]
     books = {bond.name: _book(recording, bond) for bond in scenario.bonds}
     statuses = list(recording.statuses())
     page = Template((files("hub.recording") / "report_page.html").read_text(encoding="utf-8"))
@@ -50,13 +50,13 @@ def report(recording: Recording, output: Path) -> None:
         title=escape(scenario.name),
         description=escape(scenario.description),
         numbers=_numbers(recording, scenario, statuses[-1][1] if statuses else None, traces, books),
-        bonds=_section("Coupling", _bond_figures(traces, books)),
-        steps=_section("Timing", _step_figures(recording, scenario, statuses)),
-        scores=_scores(recording),
-        vision=_section("Vision", vision_figures(recording)),
-        tissue=_section("Tissue", tissue_figures(recording)),
+        bonds=_html_section("Coupling", _bond_figures(traces, books)),
+        steps=_html_section("Timing", _step_figures(recording, scenario, statuses)),
+        scores=_score_sections(recording),
+        vision=_html_section("Vision", vision_figures(recording)),
+        tissue=_html_section("Tissue", tissue_figures(recording)),
         profile=_profile(recording),
-        notes=_notes(scenario),
+        notes=_notes_section(scenario),
         ports=_table(("topic", "type", "messages", "per second"), _ports(recording)),
         scenario=escape(recording.attachments.get("scenario.yaml", b"").decode("utf-8", "replace")),
         versions=_table(("package", "version"), sorted(recording.versions().items())),
@@ -68,7 +68,7 @@ def report(recording: Recording, output: Path) -> None:
         raise RecordingError(f"cannot write the report to '{output}': {error.strerror}") from error
 
 
-def _trace(recording: Recording, bond: Bond) -> BondTrace | None:
+def _bond_trace(recording: Recording, bond: Bond) -> BondTrace | None:
     """Return both sides of `bond` at the times of the force; None if a side is not recorded."""
     motion = _first(recording, f"{bond.motion.participant}.{bond.motion.port}", ("pose", "position"))
     force = _first(recording, f"{bond.force.participant}.{bond.force.port}", ("wrench", "force"))
@@ -172,9 +172,9 @@ def _profile(recording: Recording) -> str:
     return f'<section aria-labelledby="h-profile"><h2 id="h-profile">Processor time</h2>{tables}</section>'
 
 
-def _notes(scenario: Scenario) -> str:
+def _notes_section(scenario: Scenario) -> str:
     """Return the section about the validity of the results; empty if no participant has notes."""
-    rows = list(noted(scenario))
+    rows = list(participant_notes(scenario))
     if not rows:
         return ""
     heading = '<h2 id="h-notes">Validity</h2>'
@@ -182,13 +182,13 @@ def _notes(scenario: Scenario) -> str:
     return f'<section id="notes" aria-labelledby="h-notes">{heading}{table}</section>'
 
 
-def _scores(recording: Recording) -> str:
+def _score_sections(recording: Recording) -> str:
     """Return the sections about training tasks; empty if there was none."""
     return "\n".join(
         f'<section class="score" aria-labelledby="h-{escape(name)}"><h2 id="h-{escape(name)}">Score:'
         f" {escape(name)}</h2>{score_table(name, card)}"
-        f'<div class="figures">{_sections(score_figures(recording, name))}</div></section>'
-        for name, card in scored(recording).items()
+        f'<div class="figures">{_html_sections(score_figures(recording, name))}</div></section>'
+        for name, card in last_score_cards(recording).items()
     )
 
 
@@ -198,16 +198,16 @@ def _ports(recording: Recording) -> Iterator[tuple[str, str, str, str]]:
         yield name, recording.topics[name], f"{count:,}", f"{count / seconds:.1f}" if seconds else ""
 
 
-def _section(title: str, figures: Iterable[Figure]) -> str:
+def _html_section(title: str, figures: Iterable[Figure]) -> str:
     """Return a section with figures; empty if there are none."""
-    found, key = _sections(figures), f"h-{title.lower()}"
+    found, key = _html_sections(figures), f"h-{title.lower()}"
     if not found:
         return ""
     heading = f'<h2 id="{key}">{title}</h2>'
     return f'<section aria-labelledby="{key}">{heading}<div class="figures">{found}</div></section>'
 
 
-def _sections(figures: Iterable[Figure]) -> str:
+def _html_sections(figures: Iterable[Figure]) -> str:
     return "\n".join(
         f"<figure><h3>{escape(f.title)}</h3>{f.svg}<figcaption>{escape(f.caption)}</figcaption></figure>"
         for f in figures

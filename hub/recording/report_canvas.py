@@ -15,7 +15,7 @@ import numpy as np
 from schemas.errors import MissingExtraError
 from schemas.vectors import Vector
 
-__all__ = ["INK", "SERIES", "Canvas", "Figure", "axes_of", "legend", "line_of", "thin"]
+__all__ = ["INK", "SERIES", "Canvas", "Figure", "axes_of", "draw_legend", "line_of", "thin"]
 
 _POINTS = 1200
 """Points of a line; at the width of a page more make no difference."""
@@ -104,7 +104,7 @@ def line_of(i: int) -> dict[str, str]:
     return {"color": SERIES[i % len(SERIES)], "linestyle": ("-", "--", ":")[i // len(SERIES) % 3]}
 
 
-def legend(axes: Any) -> None:
+def draw_legend(axes: Any) -> None:
     """Name the lines, above the plot."""
     axes.legend(
         frameon=False,

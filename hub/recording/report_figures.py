@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, legend, line_of, thin
+from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, draw_legend, line_of, thin
 from schemas.vectors import Vector
 
 __all__ = [
@@ -91,7 +91,7 @@ def press_figure(trace: BondTrace) -> Figure:
                 label=label if len(episodes) <= len(SERIES) else None,
             )
         if 1 <= len(episodes) <= len(SERIES):
-            legend(axes)
+            draw_legend(axes)
         axes.set_ylim(bottom=0)
     caption = (
         "Depth is the displacement of the motion side since first contact, against the mean direction of the"
@@ -110,7 +110,7 @@ def force_figure(trace: BondTrace) -> Figure:
         )
         for i, name in zip(range(trace.force.shape[1]), "xyz", strict=False):
             axes.plot(*thin(trace.times_s, trace.force[:, i]), color=SERIES[i], label=name)
-        legend(axes)
+        draw_legend(axes)
     caption = f"Force on the motion side, in the bond's frame. Peak {trace.magnitude.max(initial=0):.3g} N."
     return Figure(f"{trace.name}: force", result.svg(caption), caption)
 
@@ -121,7 +121,7 @@ def motion_figure(trace: BondTrace) -> Figure:
     with axes_of("time (s)", "displacement (mm)") as (axes, result):
         for i, name in zip(range(moved_mm.shape[1]), "xyz", strict=False):
             axes.plot(*thin(trace.times_s, moved_mm[:, i]), color=SERIES[i], label=name)
-        legend(axes)
+        draw_legend(axes)
     caption = (
         "Displacement of the motion side from its start, in the bond's frame. Largest"
         f" {np.abs(moved_mm).max(initial=0):.3g} mm."
@@ -137,7 +137,7 @@ def energy_figures(bond: str, times_s: Vector, motion_j: Vector, force_j: Vector
             (("motion side", motion_j, "-"), ("force side", force_j, "--"))
         ):
             axes.plot(*thin(times_s, values * 1e3), color=SERIES[i], linestyle=style, label=label)
-        legend(axes)
+        draw_legend(axes)
     with axes_of("time (s)", "residual (µJ)") as (axes, residual):
         axes.plot(*thin(times_s, residual_uj), color=SERIES[2])
         axes.axhline(0.0, color=INK, linestyle=":", linewidth=1)
@@ -175,7 +175,7 @@ def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) 
             axes.stairs(share, bins, label=name, linewidth=1.4, **line_of(i))
         axes.set_xscale("log")
         axes.axvline(step_s * 1e6, color=INK, linestyle=":", linewidth=1, label="communication step")
-        legend(axes)
+        draw_legend(axes)
     over = "Median (line) and 99th percentile (thin line) of the compute time, in intervals of the session."
     with axes_of("time (s)", "compute time per step (µs)") as (axes, over_time):
         for i, (name, (times, spent)) in enumerate(compute.items()):
@@ -191,7 +191,7 @@ def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) 
                     label=name if percentile == 50 else None,
                 )
         axes.set_yscale("log")
-        legend(axes)
+        draw_legend(axes)
     return [
         Figure("Compute time per step", spread.svg(caption), caption + "."),
         Figure("Compute time over the session", over_time.svg(over), over),

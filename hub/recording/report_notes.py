@@ -8,7 +8,7 @@ from typing import Any
 
 from schemas.scenario import Scenario
 
-__all__ = ["GROUP", "noted"]
+__all__ = ["GROUP", "participant_notes"]
 
 GROUP = "trocar.notes"
 """Entry points by kind: functions with the parameters (a mapping, as in the scenario) as argument. The result
@@ -16,7 +16,7 @@ is pairs of a subject and a text.
 """
 
 
-def noted(scenario: Scenario) -> Iterator[tuple[str, str, str]]:
+def participant_notes(scenario: Scenario) -> Iterator[tuple[str, str, str]]:
     """Yield participant, subject and text of the notes of installed kinds."""
     for name, spec in scenario.participants.items():
         for entry in entry_points(group=GROUP, name=spec.kind):

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from hub.recording.recording import Recording
-from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, legend
+from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, draw_legend
 from hub.recording.scores import score_numbers, score_tables
 from schemas.trocar_msgs import ScoreCard, TaskEvent
 
-__all__ = ["score_figures", "score_table", "scored"]
+__all__ = ["last_score_cards", "score_figures", "score_table"]
 
 _MM = 1e3
 
 
-def scored(recording: Recording) -> dict[str, ScoreCard]:
+def last_score_cards(recording: Recording) -> dict[str, ScoreCard]:
     """Return the last score card of each participant with a published card."""
     found: dict[str, ScoreCard] = {}
     for port, kind in recording.ports.items():
@@ -33,7 +33,7 @@ def scored(recording: Recording) -> dict[str, ScoreCard]:
 def score_table(name: str, card: ScoreCard) -> str:
     """Return the tables of a card as HTML, with bars beside comparable values."""
     numbers = score_numbers(card)
-    bars = _bars(numbers["metrics"])
+    bars = _comparison_bars(numbers["metrics"])
     tables: list[str] = []
     for heads, rows in score_tables(name, numbers):
         keys = [row[0].replace(" ", "_") for row in rows]
@@ -42,7 +42,7 @@ def score_table(name: str, card: ScoreCard) -> str:
         head += "<th></th>" if barred else ""
         lines: list[str] = []
         for key, row in zip(keys, rows, strict=True):
-            cells = "".join(f"<td>{_worded(cell)}</td>" for cell in row)
+            cells = "".join(f"<td>{_text_to_html(cell)}</td>" for cell in row)
             cells += f"<td>{bars.get(key, '')}</td>" if barred else ""
             lines.append(f"<tr>{cells}</tr>")
         body = "\n".join(lines)
@@ -51,7 +51,7 @@ def score_table(name: str, card: ScoreCard) -> str:
     return f'<div class="cards">{"".join(tables)}</div>'
 
 
-def _bars(metrics: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+def _comparison_bars(metrics: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """Return a bar for each metric with a value to compare.
 
     Times are relative to the longest, the time of the trial; values of an arm, to the larger of the arms.
@@ -69,7 +69,7 @@ def _bars(metrics: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     }
 
 
-def _worded(text: str) -> str:
+def _text_to_html(text: str) -> str:
     """Return a text as HTML, with parts between backticks as code."""
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
@@ -89,31 +89,37 @@ def score_figures(recording: Recording, name: str) -> Iterator[Figure]:
         source = f"{connection.source}.{connection.source_port}"
         arm, _, port = connection.target_port.partition("/")
         if connection.target == name and port == "measured_cp" and arm != "ECM" and source in recording:
-            yield _path(recording, source, arm, [(t, event) for t, event in events if event.arm == arm])
+            yield _tip_path_figure(
+                recording, source, arm, [(t, event) for t, event in events if event.arm == arm]
+            )
 
 
 def _time_line(name: str, events: list[tuple[float, TaskEvent]]) -> Figure:
     """All events, a row for each object or arm."""
-    subjects = sorted({_subject(event) for _, event in events})
+    subjects = sorted({_event_subject(event) for _, event in events})
     kinds = sorted({event.event for _, event in events})
     with axes_of("time (s)", "") as (axes, result):
         for i, kind in enumerate(kinds):
-            points = [(t, subjects.index(_subject(event))) for t, event in events if event.event == kind]
+            points = [
+                (t, subjects.index(_event_subject(event))) for t, event in events if event.event == kind
+            ]
             x, y = zip(*points, strict=True)
             marker = "osD^vPX*"[i % 8]
             axes.plot(x, y, linestyle="", marker=marker, color=SERIES[i % len(SERIES)], label=kind)
         axes.set_yticks(range(len(subjects)), subjects)
         axes.margins(y=0.2)
-        legend(axes)
+        draw_legend(axes)
     caption = "; ".join(f"{sum(e.event == kind for _, e in events)} {kind}" for kind in kinds) + "."
     return Figure(f"{name}: events", result.svg(caption), caption)
 
 
-def _subject(event: TaskEvent) -> str:
+def _event_subject(event: TaskEvent) -> str:
     return event.object or event.arm or "instruments"
 
 
-def _path(recording: Recording, source: str, arm: str, events: list[tuple[float, TaskEvent]]) -> Figure:
+def _tip_path_figure(
+    recording: Recording, source: str, arm: str, events: list[tuple[float, TaskEvent]]
+) -> Figure:
     """Path of a tip in the frame of the arm's base, from above and from the front, with the events on it."""
     series = recording[source]
     position = (series["position"] - series["position"][:1]) * _MM
@@ -124,7 +130,7 @@ def _path(recording: Recording, source: str, arm: str, events: list[tuple[float,
         for i in (1, 2):
             axes.plot(position[at, 0], position[at, i], linestyle="", marker=".", color=INK)
         axes.set_aspect("equal", adjustable="datalim")
-        legend(axes)
+        draw_legend(axes)
     way = float(np.linalg.norm(np.diff(position, axis=0), axis=1).sum()) / _MM
     caption = f"Path of the tip from where it started, in {series.frame}: {way:.3f} m. Dots: its events."
     return Figure(f"{arm}: path of the tip", result.svg(caption), caption)

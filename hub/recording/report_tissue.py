@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hub.recording.recording import Recording
-from hub.recording.report_canvas import Figure, axes_of, legend, line_of, thin
+from hub.recording.report_canvas import Figure, axes_of, draw_legend, line_of, thin
 
 __all__ = ["tissue_figures"]
 
@@ -25,7 +25,7 @@ def tissue_figures(recording: Recording) -> Iterator[Figure]:
         name, _, kind = port.partition(".")
         if kind == "trauma" and {f"{name}.insertion", f"{name}.tip_force"} <= set(recording.ports):
             yield from _force(recording, name)
-            yield from _trauma(recording, name)
+            yield from _trauma_figure(recording, name)
 
 
 def _force(recording: Recording, name: str) -> Iterator[Figure]:
@@ -43,7 +43,7 @@ def _force(recording: Recording, name: str) -> Iterator[Figure]:
             line = thin(np.arange(float(end - start)), pushed[start:end])
             at = line[0].astype(int)
             axes.plot(way[start:end][at] * 1e3, line[1], label=f"{i + 1}", **line_of(i))
-        legend(axes)
+        draw_legend(axes)
     caption = (
         f"Force of skin and tissue on the tip alone, {len(through)} times in: it breaks through the skin,"
         f" cuts, and breaks out again. At most {pushed.max():.3g} N."
@@ -51,7 +51,7 @@ def _force(recording: Recording, name: str) -> Iterator[Figure]:
     yield Figure(f"{name}: force on the tip", result.svg(caption), caption)
 
 
-def _trauma(recording: Recording, name: str) -> Iterator[Figure]:
+def _trauma_figure(recording: Recording, name: str) -> Iterator[Figure]:
     series = recording[f"{name}.trauma"]
     area = series.values.ravel() * 1e6
     if not area.any():

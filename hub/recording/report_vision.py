@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hub.recording.recording import Recording
-from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, legend, thin
+from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, draw_legend, thin
 from schemas.vectors import Vector
 
 __all__ = ["vision_figures"]
@@ -27,14 +27,14 @@ def vision_figures(recording: Recording) -> Iterator[Figure]:
     for port in recording.ports:
         name, _, kind = port.partition(".")
         if kind == "features" and f"{name}.features_goal" in recording:
-            yield from _features(recording, name)
+            yield from _feature_figures(recording, name)
         elif kind == "camera_velocity":
-            yield from _velocity(recording, name)
+            yield from _velocity_figure(recording, name)
         elif kind == "pose_error" and f"{name}.pose_deviation" in recording:
-            yield from _errors(recording, name)
+            yield from _error_figures(recording, name)
 
 
-def _features(recording: Recording, name: str) -> Iterator[Figure]:
+def _feature_figures(recording: Recording, name: str) -> Iterator[Figure]:
     measured, wanted = recording[f"{name}.features"], recording[f"{name}.features_goal"]
     count = min(len(measured.time), len(wanted.time))
     seen = measured.values[:count].any(axis=1)
@@ -50,7 +50,7 @@ def _features(recording: Recording, name: str) -> Iterator[Figure]:
             axes.plot(*goal[-1, i], color=INK, marker="+", markersize=9, linestyle="")
         axes.set_aspect("equal", adjustable="datalim")
         axes.invert_yaxis()
-        legend(axes)
+        draw_legend(axes)
     caption = "Paths of the features in the picture, from the dots; where they should be: crosses."
     yield Figure(f"{name}: features", result.svg(caption), caption)
     away = np.linalg.norm(path - goal, axis=2)
@@ -60,30 +60,30 @@ def _features(recording: Recording, name: str) -> Iterator[Figure]:
             axes.plot(*line, color=SERIES[i % len(SERIES)], label=f"point {i}")
         axes.set_yscale("log")
         axes.axhline(1.0, color=INK, linestyle=":", linewidth=1)
-        legend(axes)
+        draw_legend(axes)
     caption = f"Distance of each feature from its place. At the end {away[-1].max():.2g} px at most."
     yield Figure(f"{name}: feature error", result.svg(caption), caption)
 
 
-def _velocity(recording: Recording, name: str) -> Iterator[Figure]:
+def _velocity_figure(recording: Recording, name: str) -> Iterator[Figure]:
     series = recording[f"{name}.camera_velocity"]
     blocks = (("linear", "velocity (mm/s)", 1e3), ("angular", "angular velocity (rad/s)", 1.0))
     for block, label, scale in blocks:
         values = series[block] * scale
         with axes_of("time (s)", label) as (axes, result):
-            _components(axes, series.time, values)
+            _vector_components(axes, series.time, values)
         peak = float(np.linalg.norm(values, axis=1).max(initial=0.0))
         caption = f"In the camera's own frame ({series.frame}): x right, y down, z ahead. At most {peak:.3g}."
         yield Figure(f"{name}: camera, {label.partition(' (')[0]}", result.svg(caption), caption)
 
 
-def _components(axes: Any, time: Vector, values: Vector) -> None:
+def _vector_components(axes: Any, time: Vector, values: Vector) -> None:
     for i, axis in enumerate("xyz"):
         axes.plot(*thin(time, values[:, i]), color=SERIES[i], label=axis)
-    legend(axes)
+    draw_legend(axes)
 
 
-def _errors(recording: Recording, name: str) -> Iterator[Figure]:
+def _error_figures(recording: Recording, name: str) -> Iterator[Figure]:
     error, deviation = recording[f"{name}.pose_error"], recording[f"{name}.pose_deviation"]
     count = min(len(error.time), len(deviation.time))
     time = error.time[:count]
@@ -97,7 +97,7 @@ def _errors(recording: Recording, name: str) -> Iterator[Figure]:
                     axes.plot(*thin(time, side * bounds[:, i]), color=SERIES[i], linewidth=0.7, linestyle=":")
             limit = 1.5 * float(np.percentile(np.abs(np.hstack([values, bounds])), 99))
             axes.set_ylim(-limit, limit)
-            legend(axes)
+            draw_legend(axes)
         inside = float(np.mean(np.abs(values) <= bounds))
         caption = (
             "Error of the estimate along the axes of the object's own frame; dotted: three standard"

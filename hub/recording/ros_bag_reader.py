@@ -51,7 +51,7 @@ class RosBag:
     def __init__(self, path: Path) -> None:
         """Open a bag. Raises RecordingError if the bag cannot be read."""
         self.path = path
-        with _reading(path):
+        with _reading_errors(path):
             bound_rosbags()
             _require_bounded(path)
             self._reader = AnyReader([path], default_typestore=typestore())
@@ -75,11 +75,11 @@ class RosBag:
         connections: list[Connection] = [one for one in self._reader.connections if one.topic in topics]
         if not connections:
             return
-        with _reading(self.path):
+        with _reading_errors(self.path):
             for connection, time_ns, payload in self._reader.messages(connections, start=start_ns):
-                yield connection.topic, time_ns, self._decoded(payload, connection.msgtype)
+                yield connection.topic, time_ns, self._decode_message(payload, connection.msgtype)
 
-    def _decoded(self, payload: bytes, type_name: str) -> object:
+    def _decode_message(self, payload: bytes, type_name: str) -> object:
         try:
             return self._reader.deserialize(payload, type_name)
         # rosbags lets struct.error, IndexError, UnicodeDecodeError and more through
@@ -142,7 +142,7 @@ def _unpacked_size(file: Path, most: int) -> int:
 
 
 @contextmanager
-def _reading(path: Path) -> Generator[None]:
+def _reading_errors(path: Path) -> Generator[None]:
     """Turn every exception of the parsers at damaged bytes into a RecordingError."""
     try:
         yield

@@ -71,7 +71,10 @@ class BagWriter:
         connection = self._connections.get(topic)
         if connection is None:
             connection = self._connections[topic] = self._writer.add_connection(
-                topic, type_, typestore=typestore(), offered_qos_profiles=[_quality(latched=latched)]
+                topic,
+                type_,
+                typestore=typestore(),
+                offered_qos_profiles=[_quality_of_service(latched=latched)],
             )
         try:
             self._writer.write(connection, time_ns, payload)
@@ -124,7 +127,7 @@ def _new_writer(directory: Path) -> Writer:
     return writer
 
 
-def _quality(*, latched: bool) -> Qos:
+def _quality_of_service(*, latched: bool) -> Qos:
     """Return the QoS of a reliable publisher: transient local if latched, else the last ten messages."""
     durability, depth = (QosDurability.TRANSIENT_LOCAL, 1) if latched else (QosDurability.VOLATILE, 10)
     return Qos(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hub.recording.bag import Bag, locating, output_port
+from hub.recording.bag import Bag, message_errors, output_port
 from schemas.codec import decode, message_type
 from schemas.errors import MessageError, MissingExtraError, RecordingError, did_you_mean
 from schemas.message import Message
@@ -61,7 +61,7 @@ class Series:
     @property
     def fields(self) -> tuple[str, ...]:
         """Names of the parts of a value: `position`, `velocity`; `position`, `orientation`; `data`; ..."""
-        return tuple(self._blocks)
+        return tuple(self._field_slices)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -79,7 +79,7 @@ class Series:
 
         Raises RecordingError where the type has no vector form, or a message is not valid.
         """
-        codec, (times_ns, payloads) = self._codec, self._content
+        codec, (times_ns, payloads) = self._vector_codec, self._raw_messages
         if codec is None:
             return np.zeros((0, 0))
         try:
@@ -94,8 +94,8 @@ class Series:
         Raises RecordingError for an invalid message.
         """
         model = message_type(self.type)
-        for time_ns, payload in zip(self._times_ns.tolist(), self._content[1], strict=True):
-            with self._located(time_ns):
+        for time_ns, payload in zip(self._times_ns.tolist(), self._raw_messages[1], strict=True):
+            with self._message_errors(time_ns):
                 message = decode(model, payload)
             yield time_ns / 1e9, message
 
@@ -115,15 +115,14 @@ class Series:
 
         Raises RecordingError for a name in neither `fields` nor `columns`.
         """
-        if name in self._blocks:
-            part = self.values[:, self._blocks[name]]
+        if name in self._field_slices:
+            part = self.values[:, self._field_slices[name]]
             shape = () if self._declared is None else self._declared.shape
             return part.reshape(len(part), *shape) if shape else part
         if name in self._columns:
             return self.values[:, self._columns[name]]
-        raise RecordingError(
-            f"port '{self.name}' has no field '{name}'.{did_you_mean(name, [*self._blocks, *self._columns])}"
-        )
+        hint = did_you_mean(name, [*self._field_slices, *self._columns])
+        raise RecordingError(f"port '{self.name}' has no field '{name}'.{hint}")
 
     def __len__(self) -> int:
         """Return the number of messages."""
@@ -138,47 +137,47 @@ class Series:
         return f"<Series {self.name}: {'; '.join(about)}>"
 
     @cached_property
-    def _content(self) -> tuple[NDArray[np.int64], list[bytes]]:
+    def _raw_messages(self) -> tuple[NDArray[np.int64], list[bytes]]:
         return self._bag.column(self.topic)
 
     @property
     def _times_ns(self) -> NDArray[np.int64]:
-        return self._content[0]
+        return self._raw_messages[0]
 
     @cached_property
-    def _codec(self) -> VectorCodec | None:
+    def _vector_codec(self) -> VectorCodec | None:
         """The layout of the first message; None if there is no message."""
         if not has_vector(self.type):
             raise RecordingError(
                 f"'{self._bag.file}': '{self.name}' is of type {self.type}, which has no vector form: use its"
                 " messages()"
             )
-        times_ns, payloads = self._content
+        times_ns, payloads = self._raw_messages
         if not payloads:
             return None
-        with self._located(int(times_ns[0])):
+        with self._message_errors(int(times_ns[0])):
             return VectorCodec(output_port(self.name, self.type, payloads[0]))
 
     @cached_property
     def _port(self) -> Port:
         """The port as in the first message, else as declared."""
-        codec = self._codec if has_vector(self.type) else None
+        codec = self._vector_codec if has_vector(self.type) else None
         if codec is not None:
             return codec.port
         return self._declared or Port(name=self.name, causality="output", type=self.type)
 
     @cached_property
-    def _blocks(self) -> dict[str, slice]:
-        codec = self._codec
+    def _field_slices(self) -> dict[str, slice]:
+        codec = self._vector_codec
         return {} if codec is None else {name: at for name, at in codec.fields.items() if "." not in name}
 
     @cached_property
     def _columns(self) -> dict[str, int]:
-        codec = self._codec
+        codec = self._vector_codec
         if codec is None:
             return {}
         found: dict[str, int] = {}
-        for block, at in self._blocks.items():
+        for block, at in self._field_slices.items():
             width = at.stop - at.start
             known = [name for name in codec.fields if name.startswith(f"{block}.")]
             joints = [f"{block}.{joint}" for joint in self.names]
@@ -187,8 +186,8 @@ class Series:
         return found
 
     def _row(self, codec: VectorCodec, time_ns: int, payload: bytes) -> Vector:
-        with self._located(time_ns):
+        with self._message_errors(time_ns):
             return codec.from_message(decode(codec.model, payload))
 
-    def _located(self, time_ns: int) -> AbstractContextManager[None]:
-        return locating(self._bag, self.topic, time_ns)
+    def _message_errors(self, time_ns: int) -> AbstractContextManager[None]:
+        return message_errors(self._bag, self.topic, time_ns)

@@ -13,7 +13,7 @@ from typing import Any, cast
 
 from hub.planning import registry
 from hub.planning.foreign_code import names_class
-from hub.planning.limits import MAX_PROBLEMS, shown
+from hub.planning.limits import MAX_PROBLEMS, safe_text
 from hub.planning.parameter_paths import parameter_paths
 from hub.planning.plan import PlannedParticipant
 from hub.planning.session_parameters import SessionParameters
@@ -58,9 +58,11 @@ def trusted_parameters(
     for name in names:
         if name not in specs or name not in planned:
             lacks = "scenario" if name not in specs else "plan"
-            raise RecordingError(f"'{recording.file}': its {lacks} has no participant '{shown(name)}'")
-        kind, stages = specs[name].kind, list(parameters.stages(name))
-        if not trust and (found := [what for params in stages for what in _unseen(kind, params, directory)]):
+            raise RecordingError(f"'{recording.file}': its {lacks} has no participant '{safe_text(name)}'")
+        kind, stages = specs[name].kind, list(parameters.parameter_stages(name))
+        if not trust and (
+            found := [what for params in stages for what in _unseen_demands(kind, params, directory)]
+        ):
             asked += _of(name, found)
             continue
         _check_kind(recording, planned[name], kind)
@@ -68,7 +70,7 @@ def trusted_parameters(
             if trust:
                 _log_other_files(kind, params, directory, recorded)
             else:
-                asked += _of(name, _asked(kind, params, directory, recorded))
+                asked += _of(name, _installed_demands(kind, params, directory, recorded))
     if asked := list(dict.fromkeys(asked)):
         more = f"; and {len(asked) - MAX_PROBLEMS} more" if len(asked) > MAX_PROBLEMS else ""
         raise TrustError(
@@ -89,7 +91,7 @@ def recorded_files(recording: Recording, directory: Path | None = None, *, trust
 
 
 def _of(name: str, found: Iterable[str]) -> Iterator[str]:
-    return (f"{what} (participant '{shown(name)}')" for what in found)
+    return (f"{what} (participant '{safe_text(name)}')" for what in found)
 
 
 def _check_kind(recording: Recording, planned: PlannedParticipant, kind: str) -> None:
@@ -99,36 +101,38 @@ def _check_kind(recording: Recording, planned: PlannedParticipant, kind: str) ->
     """
     if planned.kind != kind:
         raise RecordingError(
-            f"'{recording.file}': participant '{shown(planned.name)}' is of kind '{shown(planned.kind)}' in"
-            f" its plan and of kind '{shown(kind)}' in its scenario"
+            f"'{recording.file}': participant '{safe_text(planned.name)}' is of kind"
+            f" '{safe_text(planned.kind)}' in its plan and of kind '{safe_text(kind)}' in its scenario"
         )
     role = registry.find(kind).role
     if role != planned.role:
         raise RecordingError(
-            f"'{recording.file}': its plan has participant '{shown(planned.name)}' as {planned.role}, but"
+            f"'{recording.file}': its plan has participant '{safe_text(planned.name)}' as {planned.role}, but"
             f" kind '{kind}' is one of a {role}"
         )
 
 
-def _unseen(kind: str, params: Mapping[str, Any], directory: Path) -> Iterator[str]:
+def _unseen_demands(kind: str, params: Mapping[str, Any], directory: Path) -> Iterator[str]:
     """Yield demands refused unseen: a look at a class imports it, a look at a network path signs on there."""
     if names_class(kind):
-        yield f"the class '{shown(kind)}', which no installed package has as a kind"
+        yield f"the class '{safe_text(kind)}', which no installed package has as a kind"
     for text in (str(directory), *_texts(params)):
         if text.startswith(("\\\\", "//")):
-            yield f"the network path '{shown(text)}'"
+            yield f"the network path '{safe_text(text)}'"
 
 
-def _asked(kind: str, params: Mapping[str, Any], directory: Path, recorded: set[str]) -> Iterator[str]:
+def _installed_demands(
+    kind: str, params: Mapping[str, Any], directory: Path, recorded: set[str]
+) -> Iterator[str]:
     """Yield the native code of a participant of an installed kind, and the files with changed contents."""
     model = registry.load(kind).params_model
     code = {str(params[name]) for name in model.native_code if params.get(name) is not None}
     for path in sorted(code | parameter_paths(model, params)):
         if path in code:
-            yield f"native code in '{shown(str(directory / path))}'"
+            yield f"native code in '{safe_text(str(directory / path))}'"
         elif not has_contents(directory / path, recorded):
             yield (
-                f"the file '{shown(str(directory / path))}', which is missing or has other contents than"
+                f"the file '{safe_text(str(directory / path))}', which is missing or has other contents than"
                 " those recorded"
             )
 

@@ -54,14 +54,14 @@ class Unfinished:
         """
         before, last = len(self.summary.chunk_indexes), None
         with self._file.open("rb") as stream:
-            for place in _whole(stream, self._next):
+            for place in _whole_records(stream, self._next):
                 if place.opcode == Opcode.MESSAGE_INDEX and last is not None:
-                    _index(stream, place, last)
+                    _add_message_index(stream, place, last)
                     continue
                 self._settle(stream, last)
                 last, self._next = None, place.start
                 if place.opcode == Opcode.CHUNK:
-                    last = _chunk(stream, place)
+                    last = _read_chunk_index(stream, place)
                 else:
                     self._add(stream, place)
                     self._next = place.end
@@ -69,7 +69,7 @@ class Unfinished:
             last.message_index_offsets.clear()
         chunks = self._chunks if last is None else [*self._chunks, last]
         self.summary.chunk_indexes = chunks
-        self.summary.statistics = _statistics(chunks, self._counts)
+        self.summary.statistics = _count_statistics(chunks, self._counts)
         return len(chunks) > before
 
     def _settle(self, stream: BinaryIO, chunk: ChunkIndex | None) -> None:
@@ -100,7 +100,7 @@ class Unfinished:
             )
 
 
-def _whole(stream: BinaryIO, at: int) -> Iterator[_Place]:
+def _whole_records(stream: BinaryIO, at: int) -> Iterator[_Place]:
     """Yield the records from a place on, up to the first incomplete record or the file's end section."""
     size = stream.seek(0, 2)
     while at + _RECORD.size <= size:
@@ -113,7 +113,7 @@ def _whole(stream: BinaryIO, at: int) -> Iterator[_Place]:
         at = end
 
 
-def _chunk(stream: BinaryIO, place: _Place) -> ChunkIndex:
+def _read_chunk_index(stream: BinaryIO, place: _Place) -> ChunkIndex:
     """Return the index of a chunk, without channels."""
     stream.seek(place.start + _RECORD.size)
     start_ns, end_ns, size, _ = _CHUNK.unpack(stream.read(_CHUNK.size))
@@ -132,13 +132,13 @@ def _chunk(stream: BinaryIO, place: _Place) -> ChunkIndex:
     )
 
 
-def _index(stream: BinaryIO, place: _Place, chunk: ChunkIndex) -> None:
+def _add_message_index(stream: BinaryIO, place: _Place, chunk: ChunkIndex) -> None:
     stream.seek(place.start + _RECORD.size)
     channel, _ = _INDEX.unpack(stream.read(_INDEX.size))
     chunk.message_index_offsets[channel] = place.start
 
 
-def _statistics(chunks: list[ChunkIndex], counts: dict[int, int]) -> Statistics:
+def _count_statistics(chunks: list[ChunkIndex], counts: dict[int, int]) -> Statistics:
     """Return times and counts; a last chunk without index is not counted."""
     return Statistics(
         attachment_count=0,

@@ -63,7 +63,7 @@ class VectorBlock:
         """Bytes of the records of a step."""
         self._template = b"".join(_header(channel, codec) + codec.template for channel, codec in vectors)
         self._vectors = slice(self.size, self.size + sum(8 * codec.size for _, codec in vectors))
-        times, stamps, spans = self._tables(vectors)
+        times, stamps, spans = self._place_tables(vectors)
         self._sources = self._places(times, stamps, spans)
         """For each byte of the records, the place in the concatenated template, vectors and time."""
         self._rows = self._new_rows(0)
@@ -80,7 +80,9 @@ class VectorBlock:
         )
         """The same for `_chunk.c`."""
 
-    def _tables(self, vectors: Sequence[tuple[int, VectorCodec]]) -> tuple[list[int], list[int], list[_Span]]:
+    def _place_tables(
+        self, vectors: Sequence[tuple[int, VectorCodec]]
+    ) -> tuple[list[int], list[int], list[_Span]]:
         """Return where times and stamps are in the records, and the parts of the vectors."""
         times: list[int] = []
         stamps: list[int] = []

@@ -16,7 +16,7 @@ from hub.transport.session_secret import secret_of
 from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError
 
-__all__ = ["listens", "obstacle", "reach"]
+__all__ = ["connection_obstacle", "is_listening", "reach"]
 
 _TIMEOUT_S = 3.0
 _STARTING_S = 5.0
@@ -49,10 +49,10 @@ def reach(
                 mode,
                 listen=["tcp/127.0.0.1:0"] if mode == "peer" else [],
                 connect=[endpoint],
-                security=_secret(endpoint),
+                security=_find_secret(endpoint),
             )
         except ConnectError as error:
-            if listens(endpoint):
+            if is_listening(endpoint):
                 raise
             raise ConnectError(
                 f"cannot reach the hub at {endpoint}: no process listens there. Is it running? trocar ls"
@@ -72,7 +72,7 @@ def reach(
         session = open_session("client", connect=[endpoint], security=credentials.connecting())
     except ConnectError as error:
         raise ConnectError(
-            f"cannot reach the hub at {endpoint}: {obstacle(host, port, credentials) or error}"
+            f"cannot reach the hub at {endpoint}: {connection_obstacle(host, port, credentials) or error}"
         ) from error
     names = {link.auth_identifier for link in session.info.links()}
     # Zenoh also trusts the authorities of the web, which issue no certificates for names without a domain
@@ -85,7 +85,7 @@ def reach(
     return session
 
 
-def _secret(endpoint: str) -> dict[str, Any]:
+def _find_secret(endpoint: str) -> dict[str, Any]:
     """Return the secret of the session at `endpoint`; its hub may be about to start, or to publish it."""
     deadline = monotonic() + _STARTING_S
     while True:
@@ -94,12 +94,12 @@ def _secret(endpoint: str) -> dict[str, Any]:
         except ConnectError:
             if monotonic() > deadline:
                 raise
-            if listens(endpoint):
+            if is_listening(endpoint):
                 deadline = min(deadline, monotonic() + _PUBLISHING_S)
             sleep(_POLL_S)
 
 
-def obstacle(host: str, port: int, credentials: Credentials) -> str:
+def connection_obstacle(host: str, port: int, credentials: Credentials) -> str:
     """Return why a connection fails, or an empty string; Python's TLS gives the reason, unlike Zenoh."""
     context = ssl.create_default_context(cadata=credentials.authority)
     context.load_cert_chain(credentials.file)
@@ -128,7 +128,7 @@ def obstacle(host: str, port: int, credentials: Credentials) -> str:
     except ConnectionRefusedError:
         return f"no process listens there. Is the hub running, with --listen tls/0.0.0.0:{port}?"
     except TimeoutError:
-        if _accepts(host, port):
+        if _accepts_connection(host, port):
             return ""
         return (
             "no answer. Is the address right, and does the firewall of the hub's machine allow TCP port"
@@ -153,12 +153,12 @@ def _problem_of_hub(host: str, error: ssl.SSLCertVerificationError, credentials:
     )
 
 
-def listens(endpoint: str) -> bool:
+def is_listening(endpoint: str) -> bool:
     """Return whether a process listens at `endpoint`."""
-    return _accepts(*address(endpoint))
+    return _accepts_connection(*address(endpoint))
 
 
-def _accepts(host: str, port: int) -> bool:
+def _accepts_connection(host: str, port: int) -> bool:
     try:
         with socket.create_connection((host, port), _TIMEOUT_S):
             return True

@@ -10,7 +10,7 @@ from typing import TypeVar
 import zenoh
 from pydantic import BaseModel
 
-from hub.remote.hub_connection import listens, reach
+from hub.remote.hub_connection import is_listening, reach
 from hub.security.credentials import OBSERVER
 from hub.transport.control_client import ask
 from hub.transport.endpoints import is_loopback
@@ -38,7 +38,7 @@ def live_sessions(endpoints: Iterable[str], certificates: Path | None = None) ->
     A hub on another machine needs the certificate `observer`, read from `certificates`; raises ConnectError
     if there is no such hub. On this machine, endpoints without a hub are ignored.
     """
-    statuses = _answers(endpoints, certificates, Keys("*").status, SessionStatus)
+    statuses = _query_sessions(endpoints, certificates, Keys("*").status, SessionStatus)
     found = {status.session: status for status in statuses}
     return [found[name] for name in sorted(found)]
 
@@ -48,15 +48,17 @@ def live_profiles(endpoints: Iterable[str], certificates: Path | None = None) ->
 
     Arguments and errors are the same as for `live_sessions`.
     """
-    profiles = _answers(endpoints, certificates, Keys("*").profile, Profile)
+    profiles = _query_sessions(endpoints, certificates, Keys("*").profile, Profile)
     return {profile.run: profile for profile in profiles}
 
 
-def _answers(endpoints: Iterable[str], certificates: Path | None, key: str, model: type[M]) -> list[M]:
+def _query_sessions(endpoints: Iterable[str], certificates: Path | None, key: str, model: type[M]) -> list[M]:
     """Return the answers of the sessions at `endpoints` on `key`."""
     found: list[M] = []
     for endpoint in endpoints:
-        if is_loopback(endpoint) and not listens(endpoint):  # a hub that is about to start has no session yet
+        if is_loopback(endpoint) and not is_listening(
+            endpoint
+        ):  # a hub that is about to start has no session yet
             continue
         with (
             suppress(*_NO_HUB) if is_loopback(endpoint) else nullcontext(),

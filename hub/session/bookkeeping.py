@@ -142,7 +142,9 @@ class Bookkeeping:
             latency=by_way(self._latencies),
             observers=self._observer_reports.observed_states(),
             measures=self._monitor.measures.results(),
-            scores={name: score_numbers(card) for name, card in sorted(self._monitor.measures.cards.items())},
+            scores={
+                name: score_numbers(card) for name, card in sorted(self._monitor.measures.score_cards.items())
+            },
             ending=self.detail or None,
             profile=None if profile is None else profile_numbers(profile),
         )

@@ -60,7 +60,7 @@ class Clock:
         """Whether steps follow the wall clock."""
         self._paced = realtime
         self.steps = steps
-        self._periods = plan.stops()
+        self._periods = plan.grant_stop_periods()
         self._follows = bool(plan.from_devices)
         self._wall_zero_ns = self._observed_from_ns = monotonic_ns()
         self._slipped_ns = self._next_report_ns = 0

@@ -106,7 +106,7 @@ class ControlServer:
                 lambda request: self._done(state.step(request.steps)),
             ),
             self._declare(session, keys.control("set"), SetRequest, self._set),
-            self._declare(session, keys.control("link"), NetworkLinkRequest, network_links.change),
+            self._declare(session, keys.control("link"), NetworkLinkRequest, network_links.change_link),
             self._declare(session, keys.control("clock"), Empty, self._clock),
             self._declare(session, keys.control("shutdown"), Empty, lambda _: self._done(state.shutdown())),
         ]

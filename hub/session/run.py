@@ -160,7 +160,7 @@ class Run:
             plan,
             spec.parameters,
             self.number,
-            list(self.monitor.away.values()),
+            list(self.monitor.remote_outputs.values()),
             self.fail,
             self.end,
             ack_keys=ack_keys,
@@ -270,7 +270,7 @@ class Run:
             self.refusals,
         )
         answering.callback(control.undeclare)
-        for key in self.monitor.away:
+        for key in self.monitor.remote_outputs:
             watch = session.declare_subscriber(key, Callback(self.monitor.sample, indirect=False))
             answering.callback(watch.undeclare)
 

@@ -87,7 +87,7 @@ class RunProfile:
         """Time the parts of a run used by the step loop."""
         watch = self.process.watch
         self.process.attach(host)
-        watch.time(devices.enter, watch.phase("devices", "devices"))
+        watch.time(devices.enter_samples, watch.phase("devices", "devices"))
         watch.time(state.wait, watch.phase("paused", "hub"))
         watch.time_by_result(self._clock.advance, self._wall_clock, self._judge_steps)
 
@@ -167,8 +167,8 @@ class RunProfile:
             wall_time_ns=monotonic_ns() - self._began_ns,
             steps=self._clock.step,
             rows=[*self.process.rows(), *self._rows_of_hosts()],
-            late=self._late.causes,
-            worst=self._late.worst,
+            late=self._late.cause_counts,
+            worst=self._late.worst_steps,
         )
 
     def _rows_of_hosts(self) -> list[ProfileRow]:

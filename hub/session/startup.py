@@ -66,7 +66,7 @@ def _wait_for_connections(run: Run) -> None:
     waiting = [name for name in plan.order if plan.participants[name].host != "hub"]
     waiting += [observer.name for observer in plan.observers()]
     run.watchdog.wait_for(waiting)
-    while waiting or not run.host.has_initial_values() or not run.monitor.linked():
+    while waiting or not run.host.has_initial_values() or not run.monitor.has_start_values():
         run.host.publish_initial()
         run.failure.check()
         for name in run.acks.ready(waiting):

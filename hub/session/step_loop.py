@@ -102,7 +102,7 @@ class StepLoop:
     def _wait_for_values(self) -> None:
         """Wait until the recorder and the measures have the values of the last steps."""
         patience = Patience(_VALUES_NS)
-        while not self._run.monitor.received(self._run.clock.step):
+        while not self._run.monitor.has_received(self._run.clock.step):
             self._run.failure.check()
             if patience.is_over(self._run.processes.numbers):
                 log.warning("values of the last steps have not arrived within %g s", _VALUES_NS / 1e9)
@@ -128,21 +128,21 @@ class StepLoop:
             then = next(self._past.grants, None)
             if then is not None:
                 if self._past.live_from is not None:
-                    run.devices.enter(then.start_ns, then.step)  # they are where they were at its end
+                    run.devices.enter_samples(then.start_ns, then.step)  # they are where they were at its end
                 return Grant(run.number, then.epoch, then.step, then.start_ns, then.horizon_ns, then.inlets)
             if run.clock.step != self._past.live_from:
                 return None
             return self._first_live(self._past.new_devices)
         step, time_ns = run.clock.step, run.clock.time_ns
         horizon_ns = time_ns + run.clock.horizon(budget) * self._step_ns
-        return Grant(run.number, 0, step, time_ns, horizon_ns, run.devices.enter(time_ns, step))
+        return Grant(run.number, 0, step, time_ns, horizon_ns, run.devices.enter_samples(time_ns, step))
 
     def _first_live(self, new_devices: Collection[str]) -> Grant:
         """Return the grant of a single step for the run to go on from the past."""
         run, self._past = self._run, None
         step, time_ns = run.clock.step, run.clock.time_ns
         run.clock.go_live()
-        entering = run.devices.enter(time_ns, step)
+        entering = run.devices.enter_samples(time_ns, step)
         entering = [one for one in entering if one.participant not in new_devices]
         entering += run.devices.inlets.restart(new_devices)
         log.info("live from %g s on", time_ns / 1e9)
@@ -213,6 +213,6 @@ class StepLoop:
                 self._on_ack(planned, ack)
         self._unbooked.clear()
         if self._run.recorded or any(publisher.needed for publisher in self._energy.values()):
-            for bond, payload in monitor.books(self._run.clock.time_ns).items():
+            for bond, payload in monitor.due_energy_books(self._run.clock.time_ns).items():
                 self._energy[bond].put(payload)
         monitor.record(_RECORDED_TOGETHER)

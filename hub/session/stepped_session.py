@@ -80,7 +80,7 @@ class SteppedSession:
             f"{name}.{port.name}": PortCodec(port)
             for name in self.plan.order
             for port in self.plan.participants[name].ports
-            if port.causality == "input" and port.name not in self.plan.connected(name)
+            if port.causality == "input" and port.name not in self.plan.connected_inputs(name)
         }
 
     def _configure(self) -> None:
@@ -165,7 +165,7 @@ class SteppedSession:
         self._host.run(grant, self._book)
         self.step += count
         if self._monitor is not None:
-            self._monitor.books(self.time_ns)
+            self._monitor.due_energy_books(self.time_ns)
             self._monitor.record()
 
     def _book(self, planned: PlannedParticipant, ack: Ack) -> None:
@@ -217,7 +217,7 @@ class SteppedSession:
             )
         participant, h = self._stepped[observer], planned.period * self.plan.step_ns
         if observer not in self._looking:
-            directory, connected = self._loaded.source.directory, self.plan.connected(observer)
+            directory, connected = self._loaded.source.directory, self.plan.connected_inputs(observer)
             participant.configure(Setup(h, directory, planned.bond_plans, connected))
             self._looking.add(observer)
             if self.step:  # what is sent once is sent at time 0

@@ -54,20 +54,22 @@ def check_engine(
         check_declarations(participant)
         participant.close()  # before `configure`
 
-    def rig(period: int = period_ns) -> Rig:
+    def create_rig(period: int = period_ns) -> Rig:
         return Rig(make(), period, inputs or {}, plans, place)
 
-    with rig() as one, rig() as other:
+    with create_rig() as one, create_rig() as other:
         _check_run(one, other)
         _check_restore(one)
     if not counts_steps:
-        with rig() as one, rig(2 * period_ns) as other:
+        with create_rig() as one, create_rig(2 * period_ns) as other:
             _check_step_length(one, other)
 
 
 def _check_run(one: Rig, other: Rig) -> None:
     """Two instances with equal inputs do the same."""
-    require(one.hash == other.hash, "two instances have the same state hash after configure()")
+    require(
+        one.checked_hash == other.checked_hash, "two instances have the same state hash after configure()"
+    )
     for step in range(_STEPS):
         require(
             one.step() == other.step(),
@@ -75,18 +77,18 @@ def _check_run(one: Rig, other: Rig) -> None:
         )
         for name, value in one.outputs.items():
             require(
-                _same(value, other.outputs[name]),
+                _equal_values(value, other.outputs[name]),
                 f"equal inputs give equal outputs, but '{name}' of two instances differs after step {step}",
             )
 
 
-def _same(one: Value, other: Value) -> bool:
+def _equal_values(one: Value, other: Value) -> bool:
     if isinstance(one, np.ndarray):
         return np.array_equal(one, cast("Any", other))
-    return _bytes(one) == _bytes(cast("Message | tuple[Message, ...]", other))
+    return _encode_all(one) == _encode_all(cast("Message | tuple[Message, ...]", other))
 
 
-def _bytes(value: Message | tuple[Message, ...]) -> list[bytes]:
+def _encode_all(value: Message | tuple[Message, ...]) -> list[bytes]:
     return [encode(message) for message in (value if isinstance(value, tuple) else (value,))]
 
 
@@ -99,10 +101,10 @@ def _check_restore(rig: Rig) -> None:
     require(
         isinstance(cast(Any, state), bytes), f"save() returns bytes, but it returned {type(state).__name__}"
     )
-    saved, surroundings = rig.hash, rig.surroundings()
+    saved, surroundings = rig.checked_hash, rig.save_surroundings()
     first = [rig.step() for _ in range(_STEPS)]
     rig.participant.restore(state)
-    require(rig.hash == saved, "restore() brings back the state, but the state hash is another one")
+    require(rig.checked_hash == saved, "restore() brings back the state, but the state hash is another one")
     rig.restore_surroundings(surroundings)
     again = [rig.step() for _ in range(_STEPS)]
     require(first == again, "what follows restore() is, bit for bit, what followed save()")

@@ -67,7 +67,7 @@ class Rig:
             name: cast("tuple[Message, ...]", inputs[name]) for name in inputs if name not in self._values
         }
         setup = Setup(period_ns, directory, plans, frozenset(inputs))
-        self.outputs = self._checked(participant.configure(setup), "configure()")
+        self.outputs = self._check_outputs(participant.configure(setup), "configure()")
         require(declared == participant.ports, "configure() does not change the ports")
         require(
             _shapes(participant.bonds) == _shapes(sides.values()),
@@ -82,7 +82,7 @@ class Rig:
         self.participant.close()  # may be called twice
 
     @property
-    def hash(self) -> int:
+    def checked_hash(self) -> int:
         """The state hash, read twice: both must be the same."""
         value = self.participant.state_hash()
         require(
@@ -95,7 +95,7 @@ class Rig:
 
     def step(self) -> int:
         """Step once; return the state hash."""
-        before, positions = self.hash, self._bonds.positions(self.outputs)
+        before, positions = self.checked_hash, self._bonds.positions(self.outputs)
         given = {
             name: cast("Vector", value).copy()
             for name, value in self._values.items()
@@ -107,14 +107,14 @@ class Rig:
         for name, value in given.items():
             same = np.array_equal(value, cast("Vector", self._values[name]))
             require(same, f"step() does not write to its inputs, but it changed '{name}'")
-        new = self._checked(outputs, "step()")
+        new = self._check_outputs(outputs, "step()")
         changed = [
             name
             for name, value in new.items()
             if isinstance(value, np.ndarray)
             and not np.array_equal(value, cast("Any", self.outputs.get(name)))
         ]
-        after = self.hash
+        after = self.checked_hash
         require(
             not changed or after != before,
             f"state_hash() changes with the state, but it did not when {changed} changed",
@@ -125,7 +125,7 @@ class Rig:
         self._bonds.move(self._values, seconds)
         return after
 
-    def surroundings(self) -> _Surroundings:
+    def save_surroundings(self) -> _Surroundings:
         """Return the state of the rig, without the participant, between two steps."""
         return _Surroundings(dict(self._values), self.outputs, dict(self._bonds.work), self.time_ns)
 
@@ -141,7 +141,7 @@ class Rig:
             return value if codec is None else codec.checked(np.atleast_1d(np.array(value, np.float64)))
         return start_value(port)
 
-    def _checked(self, outputs: Outputs, where: str) -> dict[str, Value]:
+    def _check_outputs(self, outputs: Outputs, where: str) -> dict[str, Value]:
         """Return copies of all outputs due now, each checked."""
         expected = [port for port in self._ports if port.causality == "output"]
         extra = sorted(outputs.keys() - {port.name for port in expected} - set(self._works))

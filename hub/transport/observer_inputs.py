@@ -152,7 +152,7 @@ class _Input:
         source = plan.participants[outlet.source]
         self.codec = PortCodec(source.port(outlet.source_port))
         self.port = outlet.target_port
-        self.stride_ns = plan.stride(source.name, outlet.source_port) * plan.step_ns
+        self.stride_ns = plan.output_stride(source.name, outlet.source_port) * plan.step_ns
         self.first: _Value | None = None
         self.recent: deque[_Value] = deque(maxlen=_KEPT)
 

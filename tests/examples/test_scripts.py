@@ -36,7 +36,7 @@ def test_the_last_picture_of_each_camera_becomes_a_file(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={}) as recorder:
         for eye in ("left", "right"):
             topic = f"/engine/endoscope/out/{eye}/image_raw/compressed"
-            channel = recorder.channel(topic, CompressedImage.ros_type)
+            channel = recorder.add_channel(topic, CompressedImage.ros_type)
             for byte in range(3 if eye == "left" else 0):
                 picture = CompressedImage(format="jpeg", data=np.array([byte], np.uint8))
                 recorder.write(channel, byte, encode(picture))

@@ -61,21 +61,21 @@ def write_session(directory: Path, seconds: float = 0.5) -> RecorderSummary:
     noise = np.random.default_rng(1)
     with Recorder(directory, attachments=ATTACHMENTS) as recorder:
         ports = {
-            "pose": recorder.channel(
+            "pose": recorder.add_channel(
                 topic(keys.output("engine", "robot", "PSM1/probe/pose")), pose.port.type
             ),
-            "twist": recorder.channel(
+            "twist": recorder.add_channel(
                 topic(keys.output("engine", "robot", "PSM1/probe/twist")), twist.port.type
             ),
-            "wrench": recorder.channel(
+            "wrench": recorder.add_channel(
                 topic(keys.output("engine", "tissue", "probe/wrench")), wrench.port.type
             ),
-            "stylus": recorder.channel(topic(keys.output("device", "stylus", "pose")), stylus.port.type),
-            "grant": recorder.channel(topic(keys.grant), GrantMessage.ros_type),
-            "robot": recorder.channel(topic(keys.ack("robot")), AckMessage.ros_type),
-            "tissue": recorder.channel(topic(keys.ack("tissue")), AckMessage.ros_type),
-            "energy": recorder.channel(topic(keys.energy(BOND)), CouplingEnergy.ros_type),
-            "status": recorder.channel(topic(keys.status), SessionStatus.ros_type),
+            "stylus": recorder.add_channel(topic(keys.output("device", "stylus", "pose")), stylus.port.type),
+            "grant": recorder.add_channel(topic(keys.grant), GrantMessage.ros_type),
+            "robot": recorder.add_channel(topic(keys.ack("robot")), AckMessage.ros_type),
+            "tissue": recorder.add_channel(topic(keys.ack("tissue")), AckMessage.ros_type),
+            "energy": recorder.add_channel(topic(keys.energy(BOND)), CouplingEnergy.ros_type),
+            "status": recorder.add_channel(topic(keys.status), SessionStatus.ros_type),
         }
         for step in range(steps):
             start, end = step * STEP_NS, (step + 1) * STEP_NS

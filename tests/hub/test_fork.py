@@ -4,7 +4,7 @@ import pytest
 
 from hub.command_line.app import app
 from hub.fork import Fork
-from hub.recording.family import family
+from hub.recording.family import recording_family
 from hub.recording.fork_origin import fork_origin
 from hub.recording.recording import Recording
 from hub.verify import verify
@@ -91,7 +91,7 @@ def test_forks_of_forks(parent, tmp_path):
     assert origin is not None
     assert [one.step for one in origin.renewals] == [20, 30]
     assert forked(second, 35).state_hash == later.state_hash
-    tree = [(one.file.parent.name, one.depth) for one in family([tmp_path])]
+    tree = [(one.file.parent.name, one.depth) for one in recording_family([tmp_path])]
     assert tree == [("parent", 0), ("a", 1), ("b", 2)]
 
 

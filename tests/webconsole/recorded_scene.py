@@ -68,7 +68,7 @@ def write_scene(directory: Path, steps: int = 60, *, pictures: bool = True) -> N
     }
     with Recorder(directory, attachments=attachments) as recorder:
         channels = {
-            name: recorder.channel(topic(keys.output("engine", *name.split(".", 1))), type_)
+            name: recorder.add_channel(topic(keys.output("engine", *name.split(".", 1))), type_)
             for name, type_ in (
                 ("robot.qpos", qpos.port.type),
                 ("robot.PSM1/tip_wrench", tip.port.type),
@@ -78,13 +78,13 @@ def write_scene(directory: Path, steps: int = 60, *, pictures: bool = True) -> N
             )
         }
         for eye, colour in EYES.items() if pictures else ():
-            image = recorder.channel(
+            image = recorder.add_channel(
                 topic(keys.output("engine", "endoscope", f"{eye}/image_raw/compressed")),
                 CompressedImage.ros_type,
             )
             recorder.write(image, 0, encode(_picture(colour)))
-        shown = recorder.channel(topic(keys.output("engine", "markers", "shown")), ShownMarkers.ros_type)
-        status = recorder.channel(topic(keys.status), SessionStatus.ros_type)
+        shown = recorder.add_channel(topic(keys.output("engine", "markers", "shown")), ShownMarkers.ros_type)
+        status = recorder.add_channel(topic(keys.status), SessionStatus.ros_type)
         for step in range(steps):
             stamp = Header(stamp=Time.from_ns(step * STEP_NS), frame_id="world")
             recorder.write(shown, step * STEP_NS, encode(markers(stamp, none=2 * step >= steps)))

@@ -42,8 +42,8 @@ def recorded(tmp_path_factory):
         "plan.json": plan.model_dump_json().encode(),
     }
     with Recorder(directory, attachments=attachments) as recorder:
-        books = recorder.channel(topic(keys.energy(BOND)), CouplingEnergy.ros_type)
-        statuses = recorder.channel(topic(keys.status), SessionStatus.ros_type)
+        books = recorder.add_channel(topic(keys.energy(BOND)), CouplingEnergy.ros_type)
+        statuses = recorder.add_channel(topic(keys.status), SessionStatus.ros_type)
         for step, (late, refused) in enumerate([(0, 0), (2, 0), (2, 1)]):
             book = CouplingEnergy(
                 header=Header(), bond=BOND, motion_work_j=step, force_work_j=2 * step, residual_j=step

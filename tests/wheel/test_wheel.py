@@ -26,7 +26,7 @@ pytestmark = [
 ]
 
 ROOT = Path(__file__).resolve().parents[2]
-IMPORT_NAMES = "from hub import doctor; print(doctor.as_json([*doctor._import_names()]))"
+IMPORT_NAMES = "from hub import doctor; print(doctor.as_json([*doctor._check_import_names()]))"
 """Prints what `trocar doctor` finds of the import names, without the rest, which takes seconds."""
 
 

@@ -64,7 +64,7 @@ class RecordedScene:
         name = robot or robots[0]
         parameters = trusted_parameters(recording, [name], trust=trust)
         try:
-            params = parameters.validated(name)
+            params = parameters.validate_last(name)
         except ScenarioError as error:
             raise RecordingError(f"'{recording.file}': no scene of '{name}' can be built: {error}") from error
         if not isinstance(params, MujocoParams):

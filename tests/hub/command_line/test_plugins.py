@@ -48,7 +48,7 @@ def run(app, *arguments):
 
 def test_a_sub_app_of_another_package_is_a_command(command_line, install_plugin):
     install_plugin("scales", {"trocar.commands": {"scale": "scales:app"}}, text=SCALES)
-    plugins.mount(command_line)
+    plugins.mount_plugins(command_line)
     assert "Weigh things." in run(command_line, "--help").stdout
     assert run(command_line, "scale", "weigh", "2.5").stdout == "2.5 kg\n"
     assert run(command_line, "check").stdout == "checked\n"
@@ -69,7 +69,7 @@ def test_a_broken_one_is_left_out_with_the_cause(command_line, install_plugin, c
         {"trocar.commands": {"broken": value, "scale": "scales:app"}},
         text=SCALES + "SPEED = 'slow'\n",
     )
-    plugins.mount(command_line)
+    plugins.mount_plugins(command_line)
     (record,) = (record for record in caplog.records if "'broken'" in record.message)
     assert (
         f"command 'broken' of 'scales' ({value}) is left out, it cannot be loaded: {cause}" in record.message
@@ -81,7 +81,7 @@ def test_a_broken_one_is_left_out_with_the_cause(command_line, install_plugin, c
 
 def test_a_name_that_is_taken_stays_with_its_owner(command_line, install_plugin, caplog):
     install_plugin("scales", {"trocar.commands": {"check": "scales:app"}}, text=SCALES)
-    plugins.mount(command_line)
+    plugins.mount_plugins(command_line)
     assert (
         "command 'check' of 'scales' (scales:app) is left out: another command has that name" in caplog.text
     )
@@ -104,5 +104,5 @@ def test_trocar_mounts_them_and_says_on_stderr_what_it_leaves_out(install_plugin
 def test_one_with_a_single_command_is_that_command(command_line, install_plugin):
     single = SCALES.partition("@app.command()\ndef tare")[0]
     install_plugin("scales", {"trocar.commands": {"scale": "scales:app"}}, text=single)
-    plugins.mount(command_line)
+    plugins.mount_plugins(command_line)
     assert run(command_line, "scale", "2.5").stdout == "2.5 kg\n"

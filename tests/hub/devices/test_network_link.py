@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from hub.devices.network_link import NetworkLink, NetworkLinkOrder, in_words
+from hub.devices.network_link import NetworkLink, NetworkLinkOrder, describe_link
 from schemas.network_link import PRESETS, NetworkLinkSpec
 from tests.hub.parts import into, out
 
@@ -29,7 +29,7 @@ def travel(line, count=200, period=MS):
     """Send a message each period; return (number, arrival) in the order of arrival."""
     for i in range(count):
         line.send(i * period, i)
-    return [(message, arrival) for arrival, message in line.arrived(10**15)]
+    return [(message, arrival) for arrival, message in line.pop_arrivals(10**15)]
 
 
 @given(SPECS)
@@ -80,7 +80,7 @@ def test_a_link_can_be_changed_while_messages_are_on_their_way():
     assert link.clear
     assert link.idle
     line.send(0, "at once")
-    assert list(line.arrived(0)) == [(0, "at once")]
+    assert list(line.pop_arrivals(0)) == [(0, "at once")]
     link.order(NetworkLinkOrder(spec=NetworkLinkSpec(delay="100 ms")))
     assert link.clear
     link.settle(MS)
@@ -91,13 +91,13 @@ def test_a_link_can_be_changed_while_messages_are_on_their_way():
     line.send(12 * MS, "after the outage")
     assert not link.clear
     assert not link.idle
-    assert list(line.arrived(200 * MS)) == [(12 * MS, "after the outage"), (101 * MS, "slow")]
+    assert list(line.pop_arrivals(200 * MS)) == [(12 * MS, "after the outage"), (101 * MS, "slow")]
 
 
 def test_a_link_in_words():
-    assert in_words(NetworkLinkSpec()) == ""
+    assert describe_link(NetworkLinkSpec()) == ""
     assert (
-        in_words(NetworkLinkSpec(preset="70 ms", jitter="2 ms", loss=0.01), 3 * 10**9)
+        describe_link(NetworkLinkSpec(preset="70 ms", jitter="2 ms", loss=0.01), 3 * 10**9)
         == "70 ms each way, up to 2 ms more, 1 % lost, nothing at all for 3 s"
     )
 

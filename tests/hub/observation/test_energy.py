@@ -130,13 +130,13 @@ def test_the_books_take_the_columns_of_each_participant_in_declared_order():
     )
     books = EnergyBooks(plan)
     # two steps, two bonds: the last step counts
-    books.take("robot", Ack(0, 0, 0, [1, 2], [1, 2], [9.0, 9.0, 1.0, 2.0]))
-    books.take("tissue", Ack(0, 0, 0, [1], [1], [1.5]))
-    books.take("other", Ack(0, 0, 0, [1], [1], [1.75]))
-    books.take("camera", Ack(0, 0, 0, [1], [1], []))
+    books.book_work("robot", Ack(0, 0, 0, [1, 2], [1, 2], [9.0, 9.0, 1.0, 2.0]))
+    books.book_work("tissue", Ack(0, 0, 0, [1], [1], [1.5]))
+    books.book_work("other", Ack(0, 0, 0, [1], [1], [1.75]))
+    books.book_work("camera", Ack(0, 0, 0, [1], [1], []))
     assert books.residual_j == pytest.approx(0.5 - 0.25)
-    left, right = (decode(CouplingEnergy, book) for book in books.encoded(7_000_000_009).values())
-    assert list(books.encoded(0)) == [left.bond, right.bond]
+    left, right = (decode(CouplingEnergy, book) for book in books.encode_books(7_000_000_009).values())
+    assert list(books.encode_books(0)) == [left.bond, right.bond]
     assert (left.bond, left.motion_work_j, left.force_work_j, left.residual_j, left.header.stamp.ns) == (
         "robot/left",
         1.0,

@@ -29,7 +29,7 @@ def measures(of, part):
 def test_of_a_field_of_several_numbers_the_norm_is_measured(values):
     found = measures("a.out.force", Part("a", out(type=WRENCH)))
     for value in values:
-        found.take("a", "out", value, 0)
+        found.add("a", "out", value, 0)
     norms = [np.linalg.norm(value[:3]) for value in values]
     drop = max(norms) - min(norms[np.argmax(norms) :])
     swing = np.ptp([value[:3] for value in values], axis=0).max()
@@ -50,7 +50,7 @@ def test_of_a_field_of_several_numbers_the_norm_is_measured(values):
 def test_a_single_number_keeps_its_sign_unless_the_norm_is_asked_for(values):
     found = measures("a.out", Part("a", out()))
     for value in values:
-        found.take("a", "out", value, 0)
+        found.add("a", "out", value, 0)
     numbers = np.concatenate(values)
     expected = {
         "peak": numbers.max(),
@@ -72,7 +72,7 @@ def test_the_time_above_a_level_is_that_of_the_longest_stretch():
     )
     found = Measures(scenario, plan_of(part, measure=measure))
     for value in (0.6, 0.6, 0.4, 0.5, 0.6, 0.7, 0.1):
-        found.take("a", "out", np.array([value]), 0)
+        found.add("a", "out", np.array([value]), 0)
     assert found.results() == {"held_s": pytest.approx(0.012)}
 
 
@@ -86,7 +86,7 @@ def test_values_before_a_time_do_not_count():
     )
     found = Measures(scenario, plan_of(Part("a", out()), measure=measure))
     for second, value in enumerate((5.0, 4.0, 3.0, 1.0, 2.0)):
-        found.take("a", "out", np.array([value]), second * 10**9)
+        found.add("a", "out", np.array([value]), second * 10**9)
     assert found.results() == {"late": 3.0, "never": None}
 
 
@@ -104,7 +104,7 @@ def test_the_events_of_a_port_are_measured_one_by_one():
     found = measures("a.out", Part("a", out(type=Float64Message.ros_type, variability="event")))
     assert (found.live(), found.results()["final"]) == ({}, None)
     for number in (3.0, -1.0, 2.0):
-        found.take("a", "out", Float64Message(data=number), 0)
+        found.add("a", "out", Float64Message(data=number), 0)
     results = found.results()
     assert [results[kind] for kind in ("peak", "least", "final", "swing")] == [3.0, -1.0, 2.0, 4.0]
     assert found.live() == {"final": (2.0, "N")}

@@ -3,7 +3,7 @@ import time
 import pytest
 
 from hub.planning import registry
-from hub.planning.limits import MAX_PARTICIPANTS, shown
+from hub.planning.limits import MAX_PARTICIPANTS, safe_text
 from hub.planning.scenario_file import load
 from schemas.errors import ScenarioError
 from tests.hub.parts import Part, into, out, plan_of
@@ -189,9 +189,9 @@ def test_a_thousand_participants_of_one_kind_are_read_within_seconds(tmp_path):
 
 
 def test_a_text_is_shown_shortened_and_printable():
-    assert shown("80 mm") == "80 mm"
-    assert shown("a\x1b\ud800\nb") == "a\\x1b\\ud800\nb"
-    assert shown("a" * 1_000, 10) == "aaaaa... (1000 characters) ...aaaaa"
+    assert safe_text("80 mm") == "80 mm"
+    assert safe_text("a\x1b\ud800\nb") == "a\\x1b\\ud800\nb"
+    assert safe_text("a" * 1_000, 10) == "aaaaa... (1000 characters) ...aaaaa"
 
 
 def test_an_override_may_leave_participants_out_but_for_names_of_the_top_level(tmp_path):

@@ -43,7 +43,7 @@ def test_a_camera_for_a_gateway_is_an_observer_and_in_no_order():
         ("camera", "gateway"),
     ]
     assert plan.participants["camera"].lock_step == ""
-    assert plan.contradiction() == ""
+    assert plan.find_contradiction() == ""
 
 
 FEEDS = ["robot.out -> camera.in", "camera.out -> servoing.in"]

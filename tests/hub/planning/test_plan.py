@@ -232,7 +232,7 @@ def test_devices():
         ("other", age),
     ]
     assert [(outlet.source, outlet.target_port) for outlet in plan.to_devices] == [("a", "force")]
-    assert plan.connections == plan.meetings() == ()
+    assert plan.connections == plan.exchanging_devices() == ()
     assert plan.order == ("a",)
     with pytest.raises(ScenarioError, match="a device cannot feed a device"):
         plan_of(stylus, connections=["stylus.pose -> stylus.force"])
@@ -273,7 +273,7 @@ def test_the_period_of_an_output_is_a_multiple_of_the_participants():
     ):
         plan_of(Part("a", out(period_ns=3_000_000)), specs={"a": {"period": "2 ms"}})
     plan = plan_of(Part("a", out(period_ns=6_000_000), out("each")), specs={"a": {"period": "2 ms"}})
-    assert (plan.stride("a", "out"), plan.stride("a", "each")) == (6, 2)
+    assert (plan.output_stride("a", "out"), plan.output_stride("a", "each")) == (6, 2)
 
 
 @pytest.mark.parametrize(
@@ -369,7 +369,7 @@ def test_a_device_that_follows_the_clock_reads_as_a_participant_does():
     )
     assert plan.to_devices == ()
     assert [(link.source, link.target, link.fresh) for link in plan.connections] == [("a", "stylus", False)]
-    assert [planned.name for planned in plan.meetings()] == ["stylus"]
+    assert [planned.name for planned in plan.exchanging_devices()] == ["stylus"]
     assert plan.order == ("a",)
 
 
@@ -398,7 +398,7 @@ def test_a_link_is_for_devices():
     link = {"preset": "100 ms", "loss": 0.01}
     device = plan_of(Stylus("s", out("pose", type=POSE)), specs={"s": {"network_link": link}})
     assert device.participants["s"].network_link.delay_ns == 100_000_000
-    assert [planned.name for planned in device.meetings()] == ["s"]
+    assert [planned.name for planned in device.exchanging_devices()] == ["s"]
     with pytest.raises(ScenarioError, match=r"but 'a' is no device \(engine\): remove it"):
         plan_of(Part("a", out()), specs={"a": {"network_link": link}})
 

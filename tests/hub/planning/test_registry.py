@@ -13,7 +13,7 @@ def test_own_kinds_are_found_with_their_roles():
         "teleoperation": "controller",
         "scripted": "device",
     }
-    assert registry.broken() == {}
+    assert registry.broken_kinds() == {}
 
 
 def test_a_plugin_is_loaded_by_name(pendulum):
@@ -31,7 +31,7 @@ def test_a_broken_plugin_is_listed_and_does_not_stop_the_rest(install_plugin):
     install_plugin(
         "wrecked", {"trocar.engines": {"wreck": "wrecked:Wreck"}}, text="import no_such_module_anywhere"
     )
-    assert "'no_such_module_anywhere'" in registry.broken()["wreck"]
+    assert "'no_such_module_anywhere'" in registry.broken_kinds()["wreck"]
     assert registry.load("scripted").__name__ == "ScriptedDevice"
 
 

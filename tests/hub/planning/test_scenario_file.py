@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hub.planning.scenario_file import installed_scenarios, load, located
+from hub.planning.scenario_file import installed_scenarios, load, locate_error
 from hub.planning.scenario_source import read
 from schemas.errors import ScenarioError
 from schemas.scenario import Scenario
@@ -246,9 +246,9 @@ def test_a_file_in_this_directory_is_found_whatever_its_suffix(good, tmp_path, m
 
 def test_an_error_of_the_wiring_gets_its_place(good):
     source = read(load(good).source.file)
-    error = located(ScenarioError("no such port", path=("participants", "two", "length")), source)
+    error = locate_error(ScenarioError("no such port", path=("participants", "two", "length")), source)
     assert str(error) == f"{good}:9:13: participants.two.length: no such port"
-    assert str(located(ScenarioError("of the whole"), source)) == "of the whole"
+    assert str(locate_error(ScenarioError("of the whole"), source)) == "of the whole"
 
 
 @given(text=st.text(alphabet=st.sampled_from("ab:{}[]-#&*!|>'\"%@` \n\t,?"), max_size=40))

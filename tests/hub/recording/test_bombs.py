@@ -23,7 +23,7 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from hub.recording.bag import Bag
-from hub.recording.family import family
+from hub.recording.family import recording_family
 from hub.recording.recover import recover
 from hub.recording.ros_bag_reader import RosBag
 from hub.recording.unpacking import MAX_CHUNK_BYTES, unpack
@@ -85,7 +85,7 @@ def test_a_bomb_in_a_recording(tmp_path: Path, compression: str, stated: int) ->
 import resource, sys
 from pathlib import Path
 from hub.recording.bag import Bag
-from hub.recording.family import family
+from hub.recording.family import recording_family
 from hub.recording.recover import recover
 from schemas.codec import typestore
 from schemas.errors import RecordingError
@@ -93,7 +93,7 @@ import numpy
 resource.setrlimit(resource.RLIMIT_AS, ({_ALLOWED_BYTES}, {_ALLOWED_BYTES}))
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 print(recover(Path({str(file)!r}), Path({str(tmp_path / "whole")!r})).damaged_chunks)
-list(family([Path({str(tmp_path)!r})]))
+list(recording_family([Path({str(tmp_path)!r})]))
 try:
     for _ in Bag({str(file)!r}, unfinished=True).messages():
         pass
@@ -125,7 +125,7 @@ def test_one_bomb_does_not_hide_the_recordings_beside_it(tmp_path: Path) -> None
     (tmp_path / "empty").mkdir()
     (tmp_path / "empty" / "odd.mcap").write_bytes(b"no recording")
     write_session(tmp_path / "good", 0.02)
-    assert [one.file.parent.name for one in family([tmp_path])] == ["good"]
+    assert [one.file.parent.name for one in recording_family([tmp_path])] == ["good"]
 
 
 def test_a_file_that_states_too_much_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:

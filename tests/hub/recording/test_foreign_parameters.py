@@ -120,7 +120,7 @@ class Guest:
             renewal = {"step": 2, "before": {"guest": before}}
             attachments["fork.json"] = json.dumps({**origin, "renewals": [renewal]}).encode()
         with Recorder(place, attachments=attachments) as recorder:
-            channel = recorder.channel(topic(Keys("guest").grant), GrantMessage.ros_type)
+            channel = recorder.add_channel(topic(Keys("guest").grant), GrantMessage.ros_type)
             for step in range(4):
                 grant = GrantMessage(
                     run=1, epoch=0, step=step, start_ns=step * 10**6, horizon_ns=(step + 1) * 10**6, inlets=[]

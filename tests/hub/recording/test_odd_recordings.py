@@ -11,7 +11,7 @@ import pytest
 
 from hub.command_line.app import options as command_line
 from hub.recording import bag
-from hub.recording.family import family
+from hub.recording.family import recording_family
 from hub.recording.fork_origin import fork_origin
 from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
@@ -29,7 +29,7 @@ def recorded(directory: Path, **changes: bytes) -> Recording:
     """Return a recording of one grant with other attachments: `scenario=b"..."`."""
     others = {f"{name}.json": content for name, content in changes.items()}
     with Recorder(directory, attachments={**ATTACHMENTS, **others}) as recorder:
-        channel = recorder.channel(topic(Keys("x").grant), GrantMessage.ros_type)
+        channel = recorder.add_channel(topic(Keys("x").grant), GrantMessage.ros_type)
         grant = GrantMessage(run=7, epoch=0, step=0, start_ns=0, horizon_ns=10**6, inlets=[])
         recorder.write(channel, 0, encode(grant))
     return Recording(directory)
@@ -48,7 +48,7 @@ def test_an_attachment_that_is_nested_too_deep(tmp_path: Path, name: str) -> Non
     }
     with pytest.raises(RecordingError):
         reads[name]()
-    list(family([tmp_path]))
+    list(recording_family([tmp_path]))
 
 
 def test_a_newer_recording_is_said_to_be_newer(tmp_path: Path) -> None:
@@ -66,7 +66,7 @@ def test_a_list_of_forks_passes_over_what_cannot_be_read(
     recorded(tmp_path / "odd", scenario=b"{}")
     write_session(tmp_path / "good", 0.01)
     with caplog.at_level(logging.INFO):
-        assert [one.file.parent.name for one in family([tmp_path])] == ["good"]
+        assert [one.file.parent.name for one in recording_family([tmp_path])] == ["good"]
     assert "passed over" in caplog.text
 
 
@@ -84,7 +84,7 @@ def test_a_chunk_is_unpacked_once_for_all_topics_that_begin_in_it(
     """A page asks for the first message of each; 20 000 of them took more than a minute."""
     with Recorder(tmp_path / "run", attachments=ATTACHMENTS) as recorder:
         for i in range(300):
-            channel = recorder.channel(f"/engine/a/out/p{i}", Float64Message.ros_type)
+            channel = recorder.add_channel(f"/engine/a/out/p{i}", Float64Message.ros_type)
             recorder.write(channel, i, encode(Float64Message(data=1.0)))
     recording, unpacked = Recording(tmp_path / "run"), list[int]()
     unpack = bag.chunk_records

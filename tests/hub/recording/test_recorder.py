@@ -46,11 +46,11 @@ def test_a_recording_reads_back_in_order(tmp_path: Path) -> None:
     with Recorder(
         tmp_path / "run", attachments={"scenario.yaml": b"name: x\n", "versions.json": b"{}"}
     ) as recorder:
-        pose = recorder.channel("/engine/robot/out/tip", POSE)
+        pose = recorder.add_channel("/engine/robot/out/tip", POSE)
         given = [(pose, t * 1000, _pose(t * 1000)) for t in range(3000)]
         for message in given[:1500]:
             recorder.write(*message)
-        ack = recorder.channel("/engine/robot/ack", "trocar_msgs/msg/Ack")
+        ack = recorder.add_channel("/engine/robot/ack", "trocar_msgs/msg/Ack")
         for message in given[1500:]:
             recorder.write(*message)
         recorder.write(ack, 5, encode(AckMessage(run=1, epoch=0, step=4)))
@@ -91,7 +91,10 @@ def test_a_long_recording_takes_no_more_memory_than_a_short_one(tmp_path: Path) 
 
 def test_ros_tools_open_it(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={"a.json": b"{}"}) as recorder:
-        pose, number = recorder.channel("/pose", POSE), recorder.channel("/number", "std_msgs/msg/Float64")
+        pose, number = (
+            recorder.add_channel("/pose", POSE),
+            recorder.add_channel("/number", "std_msgs/msg/Float64"),
+        )
         for t in range(2000):
             recorder.write(pose, t, _pose(t))
             recorder.write(number, t, encode(Float64Message(data=t / 7)))
@@ -178,8 +181,8 @@ def test_vectors_of_a_block_are_the_messages_that_their_codecs_make(data: st.Dat
 def test_vectors_are_recorded_and_counted_as_messages(tmp_path: Path) -> None:
     codecs = [VectorCodec(port) for port in PORTS]
     with Recorder(tmp_path / "run", attachments={}) as recorder:
-        channels = [recorder.channel(f"/{codec.port.name}", codec.port.type) for codec in codecs]
-        block = recorder.block(list(zip(channels, codecs, strict=True)))
+        channels = [recorder.add_channel(f"/{codec.port.name}", codec.port.type) for codec in codecs]
+        block = recorder.add_block(list(zip(channels, codecs, strict=True)))
         values = [codec.neutral + np.arange(codec.size) for codec in codecs]
         for t in range(3000):
             recorder.write(block, t, b"".join(value.tobytes() for value in values))
@@ -206,7 +209,7 @@ def test_several_threads_may_write(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={}) as recorder:
 
         def work(index: int) -> None:
-            channel = recorder.channel(f"/number{index}", "std_msgs/msg/Float64")
+            channel = recorder.add_channel(f"/number{index}", "std_msgs/msg/Float64")
             for t in range(2000):
                 recorder.write(channel, t, encode(Float64Message(data=float(t))))
 
@@ -230,7 +233,7 @@ def test_an_empty_recording_is_a_recording(tmp_path: Path) -> None:
 
 def test_a_channel_is_registered_once(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={}) as recorder:
-        assert recorder.channel("/pose", POSE) == recorder.channel("/pose", POSE)
+        assert recorder.add_channel("/pose", POSE) == recorder.add_channel("/pose", POSE)
         with pytest.raises(
             RecordingError,
             match=(
@@ -238,12 +241,12 @@ def test_a_channel_is_registered_once(tmp_path: Path) -> None:
                 r" 'geometry_msgs/msg/PoseStamped'"
             ),
         ):
-            recorder.channel("/other", "geometry_msgs/msg/PoseStampd")
+            recorder.add_channel("/other", "geometry_msgs/msg/PoseStampd")
 
 
 def test_close_twice_and_write_after_close(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     recorder = Recorder(tmp_path / "run", attachments={})
-    channel = recorder.channel("/pose", POSE)
+    channel = recorder.add_channel("/pose", POSE)
     recorder.write(channel, 0, _pose(0))
     first = recorder.close()
     assert recorder.close() == first
@@ -277,7 +280,7 @@ def test_a_full_queue_drops_and_says_so(
     recorder = Recorder(tmp_path / "run", attachments={})
     append = recorder._file.add_chunk
     monkeypatch.setattr(recorder._file, "add_chunk", lambda data: gate.wait() and append(data))
-    channel = recorder.channel("/pose", POSE)
+    channel = recorder.add_channel("/pose", POSE)
     for t in range(5000):
         recorder.write(channel, t, _pose(t))
     gate.set()
@@ -292,7 +295,7 @@ def test_a_full_queue_drops_and_says_so(
 
 def test_what_cannot_be_written_marks_the_recording(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     recorder = Recorder(tmp_path / "run", attachments={})
-    channel = recorder.channel("/pose", POSE)
+    channel = recorder.add_channel("/pose", POSE)
     recorder.write(channel, -1, _pose(0))
     summary = recorder.close()
     assert (summary.complete, summary.messages, summary.dropped) == (False, 0, 1)
@@ -308,7 +311,7 @@ from hub.recording.recorder import Recorder
 import json, logging, numpy as np
 logging.basicConfig()
 recorder = Recorder(Path(sys.argv[1]), attachments={"scenario.yaml": b"name: x"})
-channel = recorder.channel("/noise", "std_msgs/msg/Float64MultiArray")
+channel = recorder.add_channel("/noise", "std_msgs/msg/Float64MultiArray")
 noise = np.random.default_rng(0)
 import time
 for t in range(2000):
@@ -374,7 +377,7 @@ def test_a_full_disk(tmp_path: Path, small_disk: Path) -> None:
 def test_nothing_is_recorded_after_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What was queued while a chunk failed would fit on the disk, and leave a gap before it."""
     recorder = Recorder(tmp_path / "run", attachments={})
-    channel, failing, queued = recorder.channel("/pose", POSE), threading.Event(), threading.Event()
+    channel, failing, queued = recorder.add_channel("/pose", POSE), threading.Event(), threading.Event()
 
     def fails_once(data: object) -> None:
         monkeypatch.undo()
@@ -397,7 +400,7 @@ import sys
 from pathlib import Path
 from hub.recording.recorder import Recorder
 recorder = Recorder(Path(sys.argv[1]), attachments={"scenario.yaml": b"name: x"})
-channel = recorder.channel("/joy", "sensor_msgs/msg/Joy")
+channel = recorder.add_channel("/joy", "sensor_msgs/msg/Joy")
 for t in range(2000):
     recorder.write(channel, t, bytes(100))
 while recorder._file.statistics.message_count < 2000:

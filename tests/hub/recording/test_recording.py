@@ -51,9 +51,9 @@ def test_the_file_itself_may_be_named(session: Path) -> None:
 
 def test_payloads_are_not_trusted(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={}) as recorder:
-        recorder.write(recorder.channel("/hub/grant", "trocar_msgs/msg/Grant"), 3, b"no grant")
+        recorder.write(recorder.add_channel("/hub/grant", "trocar_msgs/msg/Grant"), 3, b"no grant")
         recorder.write(
-            recorder.channel("/number", Float64Message.ros_type),
+            recorder.add_channel("/number", Float64Message.ros_type),
             3,
             encode(Float64Message())[:4] + np.array([np.nan]).tobytes(),
         )

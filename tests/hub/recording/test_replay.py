@@ -85,6 +85,6 @@ def test_ctrl_c_ends_it_with_a_count(recording: Recording) -> None:
 
 def test_nothing_to_replay(tmp_path: Path, recording: Recording) -> None:
     with Recorder(tmp_path / "run", attachments=recording.attachments) as recorder:
-        recorder.channel("/hub/grant", "trocar_msgs/msg/Grant")
+        recorder.add_channel("/hub/grant", "trocar_msgs/msg/Grant")
     with pytest.raises(RecordingError, match="holds no outputs of a session; its topics: /hub/grant"):
         _collect(lambda session: replay(Recording(tmp_path / "run"), session, 0))

@@ -207,10 +207,10 @@ def _hostile(directory: Path) -> Path:
     )
     file = directory / "<img src=x onerror=alert(3)>"
     with Recorder(file, attachments=attachments) as recorder:
-        status = recorder.channel("/hub/status", SessionStatus.ros_type)
-        ack = recorder.channel("/engine/robot/ack", AckMessage.ros_type)
-        energy = recorder.channel(f"/hub/energy/robot/{bond}", CouplingEnergy.ros_type)
-        odd = recorder.channel(f"/engine/robot/out/{HOSTILE}", CouplingEnergy.ros_type)
+        status = recorder.add_channel("/hub/status", SessionStatus.ros_type)
+        ack = recorder.add_channel("/engine/robot/ack", AckMessage.ros_type)
+        energy = recorder.add_channel(f"/hub/energy/robot/{bond}", CouplingEnergy.ros_type)
+        odd = recorder.add_channel(f"/engine/robot/out/{HOSTILE}", CouplingEnergy.ros_type)
         for step in range(1, 5):
             time_ns = step * STEP_NS
             spent = np.array([1000 * step], np.uint64)

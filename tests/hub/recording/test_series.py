@@ -30,7 +30,7 @@ def recorded(directory: Path, *messages: tuple[str, int, Message], plan: Plan | 
     attachments = {} if plan is None else {"plan.json": plan.model_dump_json().encode()}
     with Recorder(directory, attachments=attachments) as recorder:
         for topic, time_ns, message in messages:
-            recorder.write(recorder.channel(topic, message.ros_type), time_ns, encode(message))
+            recorder.write(recorder.add_channel(topic, message.ros_type), time_ns, encode(message))
     return Recording(directory)
 
 
@@ -117,8 +117,8 @@ def test_numbers_and_arrays(tmp_path: Path) -> None:
 
 def test_a_series_without_messages_is_empty(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={}) as recorder:
-        recorder.channel("/number", Float64Message.ros_type)
-        recorder.write(recorder.channel("/other", Float64Message.ros_type), 0, encode(Float64Message()))
+        recorder.add_channel("/number", Float64Message.ros_type)
+        recorder.write(recorder.add_channel("/other", Float64Message.ros_type), 0, encode(Float64Message()))
     series = Recording(tmp_path / "run")["/number"]
     assert (series.time.shape, series.values.shape) == ((0,), (0, 0))
     assert (series.fields, series.columns, series.names, series.frame) == ((), (), (), "")
@@ -171,7 +171,7 @@ def test_a_notebook_shows_a_table(session: Recording) -> None:
 def test_payloads_are_not_trusted(tmp_path: Path) -> None:
     good = encode(Float64Message(data=1.0))
     with Recorder(tmp_path / "run", attachments={}) as recorder:
-        channel = recorder.channel("/number", Float64Message.ros_type)
+        channel = recorder.add_channel("/number", Float64Message.ros_type)
         recorder.write(channel, 0, good)
         recorder.write(channel, 1, good[:4] + np.array([np.nan]).tobytes())
     with pytest.raises(RecordingError, match=r"topic '/number' at 1 ns: .*finite"):

@@ -179,7 +179,7 @@ def stranger(
             for part, content in (("scenario", scenario), ("plan", planned), ("origin", origin))
         }
         with Recorder(tmp_path / "strange", attachments={**true.attachments, **attachments}) as recorder:
-            channels = {topic: recorder.channel(topic, kind) for topic, kind in true.topics.items()}
+            channels = {topic: recorder.add_channel(topic, kind) for topic, kind in true.topics.items()}
             for message in true.messages():
                 recorder.write(channels[message.topic], message.time_ns, message.payload)
         return Recording(tmp_path / "strange")

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from hub.planning.plan import Plan
-from hub.remote.hub_connection import obstacle, reach
+from hub.remote.hub_connection import connection_obstacle, reach
 from hub.security import certs
 from hub.security.access import access_settings
 from hub.security.credentials import Credentials, load
@@ -47,7 +47,7 @@ def port(authority, inside):
 
 
 def test_nothing_is_in_the_way_of_a_good_certificate(authority, port):
-    assert obstacle("127.0.0.1", port, authority.issued("touch")) == ""
+    assert connection_obstacle("127.0.0.1", port, authority.issued("touch")) == ""
     with reach(f"tls/127.0.0.1:{port}", "touch", authority.directory) as session:
         assert list(session.info.routers_zid())
 
@@ -74,14 +74,14 @@ def test_a_server_that_is_no_hub_is_left_alone(authority, tmp_path, monkeypatch)
 def test_the_hub_has_another_name(authority, port):
     assert re.search(
         r"not for the name 'localhost'.*trocar certs renew",
-        obstacle("localhost", port, authority.issued("touch")),
+        connection_obstacle("localhost", port, authority.issued("touch")),
     )
 
 
 def test_the_hub_is_of_another_authority(stranger, port):
     assert re.search(
         r"of another authority than .*touch\.pem.*trocar certs issue touch",
-        obstacle("127.0.0.1", port, stranger.issued("touch")),
+        connection_obstacle("127.0.0.1", port, stranger.issued("touch")),
     )
 
 
@@ -91,11 +91,11 @@ def test_the_hub_does_not_accept_the_certificate(authority, stranger, port, tmp_
     file.write_text(mixed.key + mixed.certificate + mixed.authority)
     assert re.search(
         r"touch\.pem is of another authority than the hub's.*trocar certs issue touch",
-        obstacle("127.0.0.1", port, mixed),
+        connection_obstacle("127.0.0.1", port, mixed),
     )
     expired = authority.issued("touch", days=-0.01)
     assert re.search(
-        r"touch\.pem has expired.*trocar certs issue touch", obstacle("127.0.0.1", port, expired)
+        r"touch\.pem has expired.*trocar certs issue touch", connection_obstacle("127.0.0.1", port, expired)
     )
     authority.issued("touch")
 
@@ -108,15 +108,17 @@ def test_the_hubs_certificate_has_expired(inside, tmp_path):
     gate.open(inside)
     try:
         assert re.search(
-            r"its certificate has expired.*trocar certs renew", obstacle("127.0.0.1", port, touch)
+            r"its certificate has expired.*trocar certs renew", connection_obstacle("127.0.0.1", port, touch)
         )
     finally:
         gate.close()
 
 
 def test_no_hub_is_there(authority):
-    assert "no process listens there" in obstacle("127.0.0.1", free_port(), authority.issued("touch"))
-    assert "this machine cannot resolve the name" in obstacle(
+    assert "no process listens there" in connection_obstacle(
+        "127.0.0.1", free_port(), authority.issued("touch")
+    )
+    assert "this machine cannot resolve the name" in connection_obstacle(
         "no-such-hub.invalid", 7447, authority.issued("touch")
     )
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -130,7 +132,7 @@ def test_no_hub_is_there(authority):
 
         thread = threading.Thread(target=hang_up)
         thread.start()
-        assert "does not use TLS as a hub does" in obstacle(
+        assert "does not use TLS as a hub does" in connection_obstacle(
             "127.0.0.1", server.getsockname()[1], authority.issued("touch")
         )
         thread.join()

@@ -123,7 +123,7 @@ def test_what_a_host_elsewhere_sees_of_a_session_is_enough_to_step_in_it(loaded)
     assert seen.order == ("near", "far")
     assert {(k.source, k.target) for k in seen.connections} == {("near", "far"), ("far", "near")}
     assert seen.participants["far"] == plan.participants["far"]
-    assert seen.stride("far", "out") == plan.stride("far", "out")
+    assert seen.output_stride("far", "out") == plan.output_stride("far", "out")
 
 
 def test_rules_are_for_remote_participants_and_the_observer(loaded):

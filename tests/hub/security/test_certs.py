@@ -180,7 +180,7 @@ def test_the_command_line_revokes(authority):
 
 
 def test_doctor_tells_until_when_they_are_valid(monkeypatch, tmp_path):
-    monkeypatch.setattr(doctor, "_checks", lambda: iter(()))
+    monkeypatch.setattr(doctor, "_run_package_checks", lambda: iter(()))
     monkeypatch.setattr(credentials, "default_directory", lambda: tmp_path / "certs")
     (nothing,) = (finding for finding in doctor.examine() if finding.area == "network")
     assert (nothing.works, nothing.name) == (False, "certificates")

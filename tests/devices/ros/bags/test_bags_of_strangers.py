@@ -61,7 +61,7 @@ def stranger(place: Path, hours: Sequence[int] = (), **gateways: dict[str, objec
     }
     with Recorder(place / "recording", attachments=attachments) as recorder:
         if hours:
-            entered = recorder.channel("/device/ros/out/PSM1/state_command", StringStamped.ros_type)
+            entered = recorder.add_channel("/device/ros/out/PSM1/state_command", StringStamped.ros_type)
             message = StringStamped(string="enable")
             for hour in hours:
                 recorder.write(entered, hour * 3_600_000_000_000, encode(message))

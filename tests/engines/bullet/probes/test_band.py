@@ -7,7 +7,7 @@ from engines.bullet.command_line import app
 from engines.bullet.organs.params import OrganParams
 from engines.bullet.probes.band import band
 from engines.bullet.report_notes import notes
-from hub.recording.report_notes import noted
+from hub.recording.report_notes import participant_notes
 from schemas.scenario import Scenario
 from tests.engines.bullet.rig import BLOCK
 
@@ -54,6 +54,6 @@ def test_a_report_opens_no_file_that_a_recording_names():
 def test_what_cannot_be_told_is_a_row():
     tissue = {"kind": "bullet", "organs": {"block": {"size": "large"}}}
     scenario = Scenario.model_validate({"name": "s", "step": "1 ms", "participants": {"tissue": tissue}})
-    ((name, _, text),) = noted(scenario)
+    ((name, _, text),) = participant_notes(scenario)
     assert name == "tissue"
     assert "ValidationError" in text
