@@ -114,7 +114,7 @@ def pose_of(tip: Vector) -> PoseStamped:
 
 def commands(stand: Motion, kind: str, count: int) -> list[Events]:
     """Return the events of `count` steps."""
-    arms = stand.motion.params.arms.driven
+    arms = stand.motion.params.arms.present_arms
     homes = {name: np.array(arm.home) for name, arm in arms.items()}
     if kind == "still":
         return [{}] * count

@@ -29,7 +29,7 @@ from controllers.teleoperation.contact_model import ContactModelBuilder, ForcePa
 from devices.haptics.contact import planes_of
 from devices.haptics.limits import Limits
 from devices.haptics.loop import HapticLoop
-from devices.simulated_touch.hand import Hand
+from devices.simulated_touch.hand import SimulatedHand
 from schemas.ros import Header, Vector3
 from schemas.trocar_msgs import ContactModel, ContactPlane
 
@@ -186,7 +186,7 @@ def run(trial: Trial, builder: ContactModelBuilder | Naive) -> np.ndarray:
         Link(trial.delay, trial.jitter if trial.delay else 0.0, trial.loss if trial.delay else 0.0, chance)
         for _ in range(2)
     )
-    hand, loop = Hand(*trial.hand, TICK, trial.goal(0.0)), HapticLoop(Limits())
+    hand, loop = SimulatedHand(*trial.hand, TICK, trial.goal(0.0)), HapticLoop(Limits())
     tip = Tip(
         trial.scale * np.array(hand.position), None if trial.surface is None else Surface(**trial.surface)
     )

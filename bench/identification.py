@@ -35,7 +35,7 @@ from robots.identification.arms import IdentifiedArm, of_psm
 from robots.identification.excitation import excitation
 from robots.identification.fit import Fit, fit, relative_residual
 from robots.identification.linear_model import LinearModel, pseudo_inertias
-from robots.identification.signals import Measured, Samples, filtered
+from robots.identification.signals import Measured, Samples, filter_signals
 from schemas.vectors import Vector
 
 TOOL = instrument("400006")
@@ -81,7 +81,7 @@ def noisy(model: LinearModel, truth: Vector, time: Vector, q: Vector, noise: flo
     regressor, carried = model.regressor(q, dq, np.gradient(dq, 1.0 / RATE, axis=0))
     effort = regressor @ truth + carried
     effort += noise * effort.std(axis=0) * random.normal(size=effort.shape)
-    return filtered(Measured(time, q + 1e-5 * random.normal(size=q.shape), effort), CUTOFF, 100.0)
+    return filter_signals(Measured(time, q + 1e-5 * random.normal(size=q.shape), effort), CUTOFF, 100.0)
 
 
 def against(found: Fit, truth: Vector) -> dict[str, Any]:
@@ -138,7 +138,7 @@ def simulated() -> dict[str, Any]:
         recording = Path(directory, "identify")
         trocar.run("identify", record=recording)
         measured = measurements(recording, "PSM1", joints)
-    found = fit([filtered(measured, CUTOFF, 100.0)], arm)
+    found = fit([filter_signals(measured, CUTOFF, 100.0)], arm)
     return against(found, LinearModel(arm, shape=found.model.shape).nominal)
 
 
@@ -166,7 +166,7 @@ def compared(train: Path, test: Path, rate: float) -> dict[str, Any]:
     arm = of_psm(TOOL, jaw=not ours)
     joints = [joint.name for joint in arm.joints]
     pair = [measurements(path, "PSM1", joints) if ours else wpi(path, rate) for path in (train, test)]
-    seen, judged = (filtered(measured, CUTOFF, 100.0) for measured in pair)
+    seen, judged = (filter_signals(measured, CUTOFF, 100.0) for measured in pair)
     result: dict[str, Any] = {}
     for stribeck in (False, True):
         found = fit([seen], arm, stribeck=stribeck, judged=judged)

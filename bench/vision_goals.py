@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.visual_servoing.camera import kept_view, projected, seen_points
-from controllers.visual_servoing.law import Law, Limits, joint_velocities
+from controllers.visual_servoing.camera import kept_view, project_points, seen_points
+from controllers.visual_servoing.law import Law, MotionLimits, joint_velocities
 from robots import rotation
 from robots.dvrk.endoscope import BASELINE, StereoCamera, left_camera
 from robots.training.targets import DISC_RADIUS, DISCS
@@ -37,7 +37,7 @@ class Servoed(NamedTuple):
 
 def features(camera: Vector, target: Vector) -> Vector:
     """Return the points as `camera` sees them, normalised, shape (4, 2); both poses in one frame, (4, 4)."""
-    return projected(seen_points(camera, target, POINTS))
+    return project_points(seen_points(camera, target, POINTS))
 
 
 def depths(camera: Vector, target: Vector) -> Vector:
@@ -45,10 +45,10 @@ def depths(camera: Vector, target: Vector) -> Vector:
     return seen_points(camera, target, POINTS)[:, 2]
 
 
-def limits(depths: Vector) -> Limits:
+def limits(depths: Vector) -> MotionLimits:
     """Return the limits where the points have these depths, m, shape (4,)."""
     view = kept_view(_LENS, DISC_RADIUS / float(depths.min()), _MARGIN_PX)
-    return Limits(CHAIN.lower, CHAIN.upper, CHAIN.velocity, view, 3.0)
+    return MotionLimits(CHAIN.lower, CHAIN.upper, CHAIN.velocity, view, 3.0)
 
 
 def random_goal(rng: np.random.Generator) -> tuple[Vector, Vector, Vector]:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.needle_tracker.arc_fit import Arc, Detection
-from controllers.needle_tracker.filter import Estimate, View
-from controllers.needle_tracker.pose import difference, moved
-from controllers.needle_tracker.tracking import Belief, Settings, followed
+from controllers.needle_tracker.filter import Estimate, NeedleView
+from controllers.needle_tracker.pose import move_pose, pose_error
+from controllers.needle_tracker.tracking import NeedleBelief, TrackerSettings, follow_needle
 from robots import rotation
 from robots.dvrk.endoscope import EYES, StereoCamera
 from robots.training.needles import NEEDLES
@@ -75,7 +75,7 @@ class Carried:
     def advance(self, slip: float = 0.0) -> None:
         """Let the needle drift for a period, and turn by `slip` (rad) in the jaws."""
         walk = np.repeat(self.drift, 3) * np.sqrt(PERIOD_S) * self.rng.normal(size=6)
-        self.needle = moved(self.needle, walk)
+        self.needle = move_pose(self.needle, walk)
         if slip:
             axis = self.rng.normal(size=3)
             turn = np.eye(4)
@@ -83,11 +83,13 @@ class Carried:
             turn[:3, 3] = self.grasp - turn[:3, :3] @ self.grasp
             self.needle = self.needle @ turn
 
-    def views(self, i: int, noise_px: float, tip_px: float, seen: float, trouble: Trouble) -> list[View]:
+    def views(
+        self, i: int, noise_px: float, tip_px: float, seen: float, trouble: Trouble
+    ) -> list[NeedleView]:
         """Return what the eyes see with picture `i`, of which the share `seen` of the wire is not covered."""
         gripper = self.gripper(i)
         to_gripper = gripper @ self.needle
-        found: list[View] = []
+        found: list[NeedleView] = []
         for projection in self.projections:
             points = self._wire(projection, to_gripper, noise_px, seen)
             if trouble.other:
@@ -97,7 +99,7 @@ class Carried:
             tip = tip + tip_px * self.rng.normal(size=2)
             tips = np.zeros((0, 2)) if i in trouble.covered else tip + trouble.aside
             detection = Detection(points + trouble.aside, np.ones(len(points)), tips)
-            found.append(View(projection @ gripper, detection))
+            found.append(NeedleView(projection @ gripper, detection))
         return found
 
     def _wire(self, projection: Vector, pose: Vector, noise_px: float, seen: float) -> Vector:
@@ -136,7 +138,7 @@ class Errors:
     seen: Vector
 
 
-_SETTINGS, _NONE = Settings(), Trouble()
+_SETTINGS, _NONE = TrackerSettings(), Trouble()
 
 
 def track(
@@ -149,20 +151,20 @@ def track(
     tip_px: float = 0.5,
     seen: float = 0.75,
     trouble: Trouble = _NONE,
-    settings: Settings = _SETTINGS,
+    settings: TrackerSettings = _SETTINGS,
 ) -> Errors:
     """Follow a needle through so many pictures at 25 Hz."""
     rng = np.random.default_rng(seed)
     carried = Carried(camera, eyes, rng, settings.drift)
-    start = moved(carried.needle, _PRIOR * rng.normal(size=6))
-    belief = Belief(Estimate(start, np.diag(_PRIOR**2)))
+    start = move_pose(carried.needle, _PRIOR * rng.normal(size=6))
+    belief = NeedleBelief(Estimate(start, np.diag(_PRIOR**2)))
     rows: list[tuple[float, ...]] = []
     for i in range(pictures):
         if i:
             carried.advance(trouble.angle if i == trouble.slip else 0.0)
         views = carried.views(i, noise_px, tip_px, seen, trouble)
-        belief = followed(ARC, belief, views, PERIOD_S if i else 0.0, settings)
-        error = difference(belief.estimate.pose, carried.needle)
+        belief = follow_needle(ARC, belief, views, PERIOD_S if i else 0.0, settings)
+        error = pose_error(belief.estimate.pose, carried.needle)
         normals = belief.estimate.pose[:3, 2] @ carried.needle[:3, 2]
         rows.append(
             (

@@ -17,7 +17,7 @@ import numpy as np
 
 from controllers.needle_tracker.controller import NeedleTracker
 from controllers.needle_tracker.params import TrackerParams
-from controllers.needle_tracker.pose import difference, moved
+from controllers.needle_tracker.pose import move_pose, pose_error
 from engines.mujoco.model import build, place
 from engines.mujoco.pictures.endoscope import Endoscope
 from hub.participant import Inputs, Setup
@@ -104,7 +104,7 @@ def track_pictures(changes: Mapping[str, Any], seed: int, pictures: int = 60) ->
     scene, deviations = _Scene(looked_at, params), np.repeat([1.5e-3, 0.1], 3)
     start, camera = np.array(params.holder.start), np.array(params.arms.ECM.start)
     held = _visible(params, rng)
-    guess = matrix_to_pose(moved(held, deviations * rng.normal(size=6))).tolist()
+    guess = matrix_to_pose(move_pose(held, deviations * rng.normal(size=6))).tolist()
     params = TrackerParams.model_validate(
         params.model_dump() | {"overlay": False, "grasp": {"position": guess[:3], "orientation": guess[3:]}}
     )
@@ -145,7 +145,7 @@ def _visible(params: TrackerParams, rng: np.random.Generator) -> Vector:
 
 
 def _errors(estimate: Vector, held: Vector, covariance: Vector) -> tuple[float, ...]:
-    error, between = difference(estimate, held), held - estimate
+    error, between = pose_error(estimate, held), held - estimate
     marks = _NEEDLE.marks @ between[:3, :3].T + between[:3, 3]
     return (
         float(np.linalg.norm(error[:3])),

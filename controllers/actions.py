@@ -85,7 +85,7 @@ class ActionsParams(Params):
 
     @model_validator(mode="after")
     def _has_its_hands(self) -> Self:
-        if missing := [arm for arm in self.hands if arm not in self.arms.driven]:
+        if missing := [arm for arm in self.hands if arm not in self.arms.present_arms]:
             raise ValueError(f"hands: {', '.join(missing)} is no arm of the scene")
         return self
 
@@ -164,7 +164,7 @@ class Actions(Controller):
         super().__init__(name, params)
         self._hands: list[_Hand] = []
         for arm in params.hands:
-            held = params.arms.driven[arm]
+            held = params.arms.present_arms[arm]
             if not isinstance(held, PsmParams) or held.tool.jaw is None:
                 raise ScenarioError(f"{arm} holds no instrument with a jaw", path=("participants", name))
             self._hands.append(_Hand(arm, params, held))

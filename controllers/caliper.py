@@ -129,7 +129,7 @@ class Caliper(Controller):
                 list(_JAWS)
             ]
             self._now.started, self._closing[list(_JAWS)] = True, np.clip(closings, 0.0, 1.0)
-        self._feel(inputs["force"].reshape(_FINGERS, _PHALANGES, 3))
+        self._note_touches(inputs["force"].reshape(_FINGERS, _PHALANGES, 3))
         if self._touched[list(_JAWS)].all():
             self._measure(inputs)
         else:
@@ -147,7 +147,7 @@ class Caliper(Controller):
         if not len(self._mesh) and body is not None and body.triangles.size:
             self._keep_mesh(body.nodes_m.astype(np.float64).reshape(-1, 3)[body.triangles.reshape(-1, 3)])
 
-    def _feel(self, forces: Vector) -> None:
+    def _note_touches(self, forces: Vector) -> None:
         """Note which fingertips are touched; the real hand has its force sensors there."""
         for finger in _JAWS:
             if np.linalg.norm(forces[finger, -1]) >= self.params.touch:

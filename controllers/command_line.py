@@ -26,7 +26,7 @@ _COLUMNS = {
 
 
 @app.callback()
-def _group() -> None:
+def _keep_group() -> None:
     """Make it a group, although it has a single command."""
 
 
@@ -49,13 +49,13 @@ def rolling(
     from robots.dvrk.stitch_study import study
 
     made = study()
-    found = _found(made)
+    found = _share_text(made)
     typer.echo(json.dumps(found, indent=2) if as_json else _text(found))
     if plot is not None:
         _draw(found, plot)
 
 
-def _found(made: Study) -> dict[str, Any]:
+def _share_text(made: Study) -> dict[str, Any]:
     by = {
         f"by_{what}_deg": {f"{degrees(value):.6g}": shares for value, shares in made.shares_by(what).items()}
         for what in ("tilt", "direction", "entry")

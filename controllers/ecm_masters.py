@@ -181,7 +181,7 @@ class EcmMasters(Controller):
 
     def _engage(self, left: Vector, right: Vector, endoscope: Vector) -> None:
         """Set the reference to the present poses."""
-        self._middle[:], self._up[:], side = _picture(left[:3], right[:3])
+        self._middle[:], self._up[:], side = _picture_axes(left[:3], right[:3])
         between = right[:3] - left[:3]
         self._span[:] = 0.5 * (side @ between), 0.5 * (self._middle @ between) / np.linalg.norm(self._middle)
         self._start[:] = np.clip(endoscope[:4], self._chain.lower, self._chain.upper)
@@ -190,7 +190,7 @@ class EcmMasters(Controller):
 
     def _lead(self, left: Vector, right: Vector, stamp: Time) -> dict[str, Value]:
         """Return the command to the endoscope, and the orientations at which the masters are held."""
-        middle, up, _ = _picture(left, right)
+        middle, up, _ = _picture_axes(left, right)
         a, b, r = (
             -_angle(_Y, self._middle, middle),
             _angle(_X, self._middle, middle),
@@ -203,7 +203,11 @@ class EcmMasters(Controller):
             self._chain.lower,
             self._chain.upper,
         )
-        back = rotation.conjugate(rotation.product(_turned(goal), rotation.conjugate(_turned(self._start))))
+        back = rotation.conjugate(
+            rotation.product(
+                _picture_orientation(goal), rotation.conjugate(_picture_orientation(self._start))
+            )
+        )
         locks: dict[str, Value] = {
             f"{m}/lock_orientation": (_quaternion(rotation.product(back, turn)),)
             for m, turn in self._turns.items()
@@ -212,7 +216,7 @@ class EcmMasters(Controller):
 
     def _hold_together(self, left: Vector, right: Vector, inputs: Inputs) -> dict[str, Value]:
         """Return the forces on the masters: springs that keep them apart, and dampers."""
-        middle, _, side = _picture(left, right)
+        middle, _, side = _picture_axes(left, right)
         right_share, middle_share = self._span.tolist()
         reach = right_share * side + middle_share * middle / np.linalg.norm(middle)
         forces: dict[str, Value] = {}
@@ -235,7 +239,7 @@ _COMMANDS = {
 """To each master: ROS type."""
 
 
-def _picture(left: Vector, right: Vector) -> tuple[Vector, Vector, Vector]:
+def _picture_axes(left: Vector, right: Vector) -> tuple[Vector, Vector, Vector]:
     """Return the middle between the masters, and up and right in the picture that they hold."""
     middle = 0.5 * (left + right)
     up = np.cross(right - left, middle)
@@ -250,7 +254,7 @@ def _angle(axis: Vector, one: Vector, other: Vector) -> float:
     return float(np.arctan2(axis @ np.cross(one, other), one @ other))
 
 
-def _turned(q: Vector) -> Vector:
+def _picture_orientation(q: Vector) -> Vector:
     """Return the orientation of the picture, a quaternion, at joint positions `q`.
 
     Roll is about z, yaw about y, pitch about x.

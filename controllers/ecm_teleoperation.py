@@ -141,7 +141,7 @@ def joint_velocities(chain: SerialChain, q: Vector, twist: Vector, mode: Mode, f
     return velocities
 
 
-def _limited(chain: SerialChain, q: Vector, twist: Vector, mode: Mode) -> Vector:
+def _limit_speeds(chain: SerialChain, q: Vector, twist: Vector, mode: Mode) -> Vector:
     """Return dq/dt, shape (4,), within the speed limits, and none out of a joint's range."""
     free = np.ones(_JOINTS, dtype=bool)
     while True:
@@ -248,7 +248,7 @@ class EcmTeleoperation(Controller):
         """Return dq/dt, shape (4,), for the twist of the head, turned into its own frame and scaled."""
         to_head, twist = rotation.matrix(inputs["pose"][3:]).T, inputs["twist"]
         own = self._now.scale * np.concatenate([to_head @ twist[:3], to_head @ twist[3:]])
-        return _limited(self._chain, self._command, own, self._now.mode)
+        return _limit_speeds(self._chain, self._command, own, self._now.mode)
 
     def _receive_state(self, events: tuple[Message, ...]) -> None:
         """Start where the arm is when it becomes ready: it may have been moved."""

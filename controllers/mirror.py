@@ -77,7 +77,7 @@ class Mirror(Controller):
 
     def __init__(self, name: str, params: MirrorParams) -> None:
         super().__init__(name, params)
-        self._arms = [_Arm(name, arm, params.max_age) for name, arm in params.arms.driven.items()]
+        self._arms = [_Arm(name, arm, params.max_age) for name, arm in params.arms.present_arms.items()]
         self.keep(*(arm.state for arm in self._arms))
 
     @property
@@ -178,7 +178,7 @@ class _Arm:
                     self._jaw_range,
                     stamp,
                 )
-            self._compare(real[:n], real[n : 2 * n], inputs[f"{name}/measured_js"][:n], h * 1e-9)
+            self._compare_tips(real[:n], real[n : 2 * n], inputs[f"{name}/measured_js"][:n], h * 1e-9)
         else:
             self._forget()
         return self.outputs
@@ -203,7 +203,7 @@ class _Arm:
         )
         self.outputs[f"{self._name}/{command}"] = (message,)
 
-    def _compare(self, real: Vector, velocity: Vector, simulated: Vector, h: float) -> None:
+    def _compare_tips(self, real: Vector, velocity: Vector, simulated: Vector, h: float) -> None:
         tips = self._chain.forward(np.array([real, simulated]))[:, :3, 3]
         self.state.distance = float(np.linalg.norm(tips[0] - tips[1]))
         self.outputs[f"{self._name}/distance"] = (Float64Message(data=self.state.distance),)

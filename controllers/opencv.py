@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from schemas.errors import MissingExtraError
 from schemas.ros import Image
 
-__all__ = ["opencv", "pixels"]
+__all__ = ["import_opencv", "picture_pixels"]
 
 _CHANNELS = {"rgb8": slice(None), "bgr8": slice(None, None, -1)}
 
 
-def opencv(who: str) -> Any:
+def import_opencv(who: str) -> Any:
     """Return the module cv2, which then uses one thread: others of this machine step the simulation.
 
     Raises MissingExtraError, about `who`, where it is not installed.
@@ -29,7 +29,7 @@ def opencv(who: str) -> Any:
     return cv2
 
 
-def pixels(image: Image) -> NDArray[np.uint8] | None:
+def picture_pixels(image: Image) -> NDArray[np.uint8] | None:
     """Return the picture as rows of red, green, blue, shape (height, width, 3); None if it is no such."""
     channels = _CHANNELS.get(image.encoding)
     row = 3 * image.width

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.opencv import opencv, pixels
+from controllers.opencv import import_opencv, picture_pixels
 from hub.participant import Controller
 from schemas.ros import Image, StringMessage
 
@@ -27,14 +27,14 @@ class PictureController(Controller):
 
     def _load_opencv(self) -> None:
         """Import OpenCV. Raises MissingExtraError where it is not installed."""
-        self._cv2 = opencv(f"participant '{self.name}' (kind {self.kind})")
+        self._cv2 = import_opencv(f"participant '{self.name}' (kind {self.kind})")
 
     def _warn(self, text: str) -> None:
         self._warnings.append(StringMessage(data=text))
 
     def _accepted_pixels(self, image: Image, width: float, height: float) -> NDArray[np.uint8] | None:
         """Return rows of red, green, blue, shape (height, width, 3); warn of a picture of another size."""
-        picture = pixels(image)
+        picture = picture_pixels(image)
         if picture is not None and picture.shape[:2] == (height, width):
             return picture
         self._warn(

@@ -62,7 +62,7 @@ class TipTracker(Controller):
     def __init__(self, name: str, params: TipTrackerParams) -> None:
         super().__init__(name, params)
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.driven if arm != "ECM"}
+        self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.present_arms if arm != "ECM"}
         self._camera = StereoCamera(params.width, params.height)
         held = params.arms.ECM or EcmParams()
         self._eye = endoscope.left_camera(held.endoscope, self._camera.baseline)

@@ -85,7 +85,7 @@ class VrepScene(Controller):
 
     def __init__(self, name: str, params: VrepSceneParams) -> None:
         super().__init__(name, params)
-        self._arms = [_Arm(name, arm) for name, arm in params.arms.driven.items()]
+        self._arms = [_Arm(name, arm) for name, arm in params.arms.present_arms.items()]
         self.keep(*(arm.state for arm in self._arms))
         stated = params.setup_joints
         self._setup = np.concatenate([_set(stated, arm)[:count] for arm, count in _SETUP])

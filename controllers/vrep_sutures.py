@@ -114,7 +114,7 @@ class VrepSutures(Controller):
 
     def _markers(self, inputs: Inputs) -> Iterator[Marker]:
         if not self._state.begun:
-            yield self._banner(_FIRST_WORD)
+            yield self._banner_marker(_FIRST_WORD)
         deletions = cast("tuple[BoolMessage, ...]", inputs.events(f"{_PLANNER}/delete_stitches"))
         if any(message.data for message in deletions):
             self._state.sx = self._state.dx = 0
@@ -125,13 +125,15 @@ class VrepSutures(Controller):
             for pose in cast("tuple[Pose, ...]", inputs.events(f"{_PLANNER}/suture_position_{side}")):
                 count = int(getattr(self._state, side))
                 setattr(self._state, side, count + 1)
-                yield _placed(side, count % _MOST_POINTS, MarkerType.SPHERE, pose, (_POINT, _POINT, _POINT))
+                yield _create_marker(
+                    side, count % _MOST_POINTS, MarkerType.SPHERE, pose, (_POINT, _POINT, _POINT)
+                )
         for pose in cast("tuple[Pose, ...]", inputs.events(f"{_PLANNER}/user_position")):
-            yield _placed("disc", 0, MarkerType.CYLINDER, pose, (_DISC, _DISC, _THICKNESS))
+            yield _create_marker("disc", 0, MarkerType.CYLINDER, pose, (_DISC, _DISC, _THICKNESS))
         for text in cast("tuple[StringMessage, ...]", inputs.events(f"{_PLANNER}/state_current")):
-            yield self._banner(text.data)
+            yield self._banner_marker(text.data)
 
-    def _banner(self, text: str) -> Marker:
+    def _banner_marker(self, text: str) -> Marker:
         """Return the banner, or its deletion if there is no text."""
         x, y, z = self.params.banner
         return Marker(
@@ -147,7 +149,9 @@ class VrepSutures(Controller):
         )
 
 
-def _placed(what: str, number: int, kind: MarkerType, pose: Pose, size: tuple[float, float, float]) -> Marker:
+def _create_marker(
+    what: str, number: int, kind: MarkerType, pose: Pose, size: tuple[float, float, float]
+) -> Marker:
     x, y, z = size
     # a sphere looks the same however it is turned, and the planner leaves its orientation empty
     turn = Quaternion() if kind is MarkerType.SPHERE else pose.orientation

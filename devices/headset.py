@@ -129,13 +129,13 @@ class Headset(Device):
         try:
             if self._runtime is None:
                 self._runtime = self.connect()
-            return self._located(t, self._runtime)
+            return self._locate_pose(t, self._runtime)
         except DeviceError as error:
             self.close()
             self._timer.failed(t)
             return self._diagnosis.report(Level.ERROR, f"{error}; the next try is in a second")
 
-    def _located(self, t: int, runtime: Runtime) -> list[Sample]:
+    def _locate_pose(self, t: int, runtime: Runtime) -> list[Sample]:
         state, before = runtime.locate(), self._newest
         if isinstance(state, NoHead):
             self._newest = None

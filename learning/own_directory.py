@@ -17,7 +17,7 @@ from typing import Self
 
 from schemas.errors import ScenarioError
 
-__all__ = ["MARKER", "NewDirectory", "claimed", "whole_file"]
+__all__ = ["MARKER", "NewDirectory", "claim_directory", "whole_file"]
 
 MARKER = ".trocar"
 """Name of the file with the command that has made a directory; locked while the command runs."""
@@ -36,7 +36,7 @@ else:
 
 
 @contextmanager
-def claimed(directory: Path, purpose: str) -> Generator[None]:
+def claim_directory(directory: Path, purpose: str) -> Generator[None]:
     """Make `directory`, or go on with a directory made for `purpose`, and keep other processes out.
 
     Raises ScenarioError if the directory holds something else, or a link, or if another process uses it.
@@ -111,7 +111,7 @@ class NewDirectory:
         self._claim = ExitStack()
 
     def __enter__(self) -> Self:
-        self._claim.enter_context(claimed(self.path, self._purpose))
+        self._claim.enter_context(claim_directory(self.path, self._purpose))
         for left in self.path.iterdir():  # of a process that was killed
             if left.is_dir():
                 shutil.rmtree(left)

@@ -37,7 +37,7 @@ __all__ = [
     "rihs01",
     "ros2msg_definition",
     "typestore",
-    "validated",
+    "validate_message",
 ]
 
 MAX_MESSAGE_BYTES = 16 * 2**20
@@ -112,7 +112,7 @@ def encode_as(model: type[Message], values: object) -> bytes:
     """
     encoder = _encoder(model, lists=True)
     encoded = None if encoder is None else encoder.encode(values)
-    return _by_rosbags(validated(model, values)) if encoded is None else encoded
+    return _by_rosbags(validate_message(model, values)) if encoded is None else encoded
 
 
 def _by_rosbags(message: Message) -> bytes:
@@ -157,7 +157,7 @@ def decode(model: type[M], payload: bytes) -> M:
         raise MessageError(
             f"{model.ros_type}: {len(payload)} bytes are no such message ({type(error).__name__}: {error})"
         ) from error
-    return validated(model, raw)
+    return validate_message(model, raw)
 
 
 def check_first_sequence(model: type[Message], length: bytes, order: Literal["big", "little"]) -> None:
@@ -181,7 +181,7 @@ def _first_sequence(model: type[Message]) -> tuple[str, int]:
     return "", 0
 
 
-def validated(model: type[M], raw: object) -> M:
+def validate_message(model: type[M], raw: object) -> M:
     """Return the message of type `model` with the fields of `raw`, a message of `rosbags`.
 
     Raises MessageError if a value is out of range.

@@ -68,7 +68,7 @@ class Keys:
         """Key of the profile of a host of the hub's machine (a query); `*` for all."""
         return f"{self.prefix}/host/{host}/profile"
 
-    def refused(self, role: str, participant: str) -> str:
+    def dropped_messages(self, role: str, participant: str) -> str:
         """Key of a host's reports of dropped messages, under the name of one of the host's participants."""
         return f"{self.prefix}/{role}/{participant}/refused"
 

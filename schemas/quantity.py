@@ -72,7 +72,7 @@ def _registry() -> Any:
     return UnitRegistry()  # pyright: ignore[reportUnknownVariableType]
 
 
-def _converted(number: float, unit: str, target: str) -> float:
+def _convert_unit(number: float, unit: str, target: str) -> float:
     """Return `number` in unit `target`; raises ValueError if `unit` has another dimension."""
     if unit == target:
         return number
@@ -110,7 +110,7 @@ def to_si(value: Any, unit: str) -> float:
             raise ValueError("expected a number and a unit")
         number = float(match[1] if match else value)
         if match and match[2]:
-            number = _converted(number, match[2], unit)
+            number = _convert_unit(number, match[2], unit)
     except (ValueError, OverflowError) as error:
         raise ValueError(f"'{value}' is not a quantity in {unit} ({error})") from error
     if not math.isfinite(number):
@@ -124,7 +124,7 @@ def same_unit(one: str, other: str) -> bool:
     if not one or not other or one == other:
         return True
     try:
-        return math.isclose(_converted(1.0, one, other), 1.0, rel_tol=1e-12)
+        return math.isclose(_convert_unit(1.0, one, other), 1.0, rel_tol=1e-12)
     except ValueError:
         return False
 

@@ -34,7 +34,7 @@ from schemas.ros import (
     WrenchStamped,
 )
 
-__all__ = ["Vector", "VectorCodec", "has_vector", "joined"]
+__all__ = ["Vector", "VectorCodec", "has_vector", "join_parts"]
 
 Vector = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def has_vector(type_name: str) -> bool:
     return type_name in _LAYOUTS
 
 
-def joined(parts: Iterable[bytes | Vector]) -> bytes:
+def join_parts(parts: Iterable[bytes | Vector]) -> bytes:
     """Return the bytes of `parts`, one after the other."""
     held = tuple(parts)
     try:
@@ -152,14 +152,14 @@ class VectorCodec:
             raise MessageError(
                 f"port '{self.port.name}': {len(payload)} bytes, a {self.port.type} here has {self._length}"
             )
-        found = self.found(payload)
+        found = self.find_vector(payload)
         if found is None:
             raise MessageError(
                 f"port '{self.port.name}': frame, names or layout differ from what the port declares"
             )
         return found
 
-    def found(self, payload: bytes) -> Vector | None:
+    def find_vector(self, payload: bytes) -> Vector | None:
         """Return the vector, shape (size,), in bytes that fit; otherwise None.
 
         Raises MessageError for numbers that are not valid.
@@ -168,7 +168,7 @@ class VectorCodec:
             return None
         # a third of the cost of np.concatenate
         numbers = bytearray().join([payload[start:stop] for start, stop, _ in self.spans])
-        return self.checked(np.frombuffer(numbers))
+        return self.check_vector(np.frombuffer(numbers))
 
     def unpack(self, numbers: bytes) -> Vector:
         """Return the vector, shape (size,), of the bytes of its numbers; raises MessageError if invalid."""
@@ -176,7 +176,7 @@ class VectorCodec:
             raise MessageError(
                 f"port '{self.port.name}': {len(numbers)} bytes of numbers, expected {self.neutral.nbytes}"
             )
-        return self.checked(np.frombuffer(numbers))
+        return self.check_vector(np.frombuffer(numbers))
 
     def decode_all(self, payloads: Sequence[bytes]) -> NDArray[np.float64]:
         """Return the vectors, shape (n, size), in the CDR bytes of many messages.
@@ -214,7 +214,7 @@ class VectorCodec:
                 return False
         return True
 
-    def checked(self, value: Vector) -> Vector:
+    def check_vector(self, value: Vector) -> Vector:
         """Return a valid `value`: float64 of shape (size,), finite, quaternions of norm 1."""
         try:
             fits = value.shape == (self.size,) and value.dtype == np.float64
@@ -295,7 +295,7 @@ class VectorCodec:
             value[block] = (
                 numbers[self._joint_order(message)] if path in ("position", "velocity", "effort") else numbers
             )
-        return self.checked(value)
+        return self.check_vector(value)
 
     def _joint_order(self, message: Message) -> Any:
         names: list[str] = getattr(message, "name", [])

@@ -25,15 +25,15 @@ if TYPE_CHECKING:
         Unavailable,
     )
     from devices.haptics.servo.params import ServoStylusParams as StylusParams
-    from devices.haptics.servo.phase import Phase
+    from devices.haptics.servo.phase import ServoPhase
 
 __all__ = [
     "Driver",
     "DriverError",
     "HapticDevice",
     "Opened",
-    "Phase",
     "Reading",
+    "ServoPhase",
     "StylusParams",
     "StylusSpec",
     "Unavailable",

@@ -14,11 +14,11 @@ from typing import cast
 
 import numpy as np
 
-from controllers.dvrk_console.master import Master, offset, opening
+from controllers.dvrk_console.master import Master, opening, orientation_offset
 from controllers.dvrk_console.params import DvrkConsoleParams
 from controllers.dvrk_console.ports import EventOutputs
 from controllers.dvrk_console.readiness import Readiness
-from controllers.teleoperation.engagement import Phase
+from controllers.teleoperation.engagement import EngagementPhase
 from hub.participant import Inputs, Record, choice, flag, integer, number
 from robots.limits import TOLERANCE, distinct
 from schemas.crtk import StringStamped
@@ -26,13 +26,13 @@ from schemas.errors import did_you_mean
 from schemas.message import Message
 from schemas.ros import BoolMessage, Float64Message, Header, Joy, QuaternionStamped, StringMessage, Time
 
-__all__ = ["Component", "Published", "State"]
+__all__ = ["Component", "Published", "TeleopState"]
 
 _ALIGN_NS = 10_000_000
 """Time from a command to turn to the next command (RunAligningMTM)."""
 
 
-class State(IntEnum):
+class TeleopState(IntEnum):
     """Of a component."""
 
     DISABLED = 0
@@ -49,17 +49,21 @@ class Published(IntEnum):
     TRUE = 1
 
 
-_COMMANDS = {"enable": State.ENABLED, "disable": State.DISABLED, "align_mtm": State.ALIGNING_MTM}
+_COMMANDS = {
+    "enable": TeleopState.ENABLED,
+    "disable": TeleopState.DISABLED,
+    "align_mtm": TeleopState.ALIGNING_MTM,
+}
 
 
 class ComponentState(Record):
     """Everything in a component that lasts from step to step."""
 
-    desired = choice(State.DISABLED)
-    requested = choice(State.DISABLED)
+    desired = choice(TeleopState.DISABLED)
+    requested = choice(TeleopState.DISABLED)
     """Last request of the console; `desired` follows only when the request changes."""
-    current = choice(State.DISABLED)
-    phase = choice(Phase.DISABLED)
+    current = choice(TeleopState.DISABLED)
+    phase = choice(EngagementPhase.DISABLED)
     """Last published phase of the `teleoperation`."""
     following = flag()
     leads = choice(Published.NOTHING)
@@ -105,7 +109,7 @@ class Component:
         self._publish("scale", Float64Message(data=scale))
 
     def step(
-        self, now_ns: int, inputs: Inputs, requested: State, readiness: Readiness, *, clutched: bool
+        self, now_ns: int, inputs: Inputs, requested: TeleopState, readiness: Readiness, *, clutched: bool
     ) -> None:
         """Go towards the desired state, by a step that ends at `now_ns`.
 
@@ -121,25 +125,29 @@ class Component:
             self._receive(inputs)
         if requested is not state.requested:
             state.requested = requested
-            self._desire(requested)
+            self._set_desired(requested)
         state.gripper = opening(float(inputs[f"{self.master}/gripper/measured_js"][0]))
         if lost := readiness.lost & {self.master, self.arm}:
             self._disable(lost)
         before, followed = state.current, state.following
         state.current = self._next(readiness, clutched=clutched)
         self._permit(
-            leads=state.desired is State.ENABLED and state.current >= State.ALIGNING_MTM and not clutched
+            leads=state.desired is TeleopState.ENABLED
+            and state.current >= TeleopState.ALIGNING_MTM
+            and not clutched
         )
-        state.following = state.current is State.ENABLED and state.phase is Phase.ENABLED and not clutched
+        state.following = (
+            state.current is TeleopState.ENABLED and state.phase is EngagementPhase.ENABLED and not clutched
+        )
         if before is not state.current:
             self._enter()
-        if state.current is State.SETTING_ARMS_STATE:
+        if state.current is TeleopState.SETTING_ARMS_STATE:
             self._set_arms(
                 readiness, {self.arm, self.master} if before is not state.current else readiness.new
             )
         if followed is not state.following:
             self._publish("following", BoolMessage(data=state.following))
-        floats = followed is not state.following and state.current is State.ENABLED
+        floats = followed is not state.following and state.current is TeleopState.ENABLED
         self._command_master(inputs, now_ns, floats=floats, clutched=clutched)
 
     def _receive(self, inputs: Inputs) -> None:
@@ -147,7 +155,7 @@ class Component:
         state = self.state
         for command in cast("tuple[StringStamped, ...]", inputs.events(f"{self.name}/state_command")):
             if command.string in _COMMANDS:
-                self._desire(_COMMANDS[command.string])
+                self._set_desired(_COMMANDS[command.string])
             else:
                 self.warn(
                     f"there is no state_command '{command.string}'.{did_you_mean(command.string, _COMMANDS)}"
@@ -160,28 +168,28 @@ class Component:
                 self.warn(
                     f"scale {value} is refused, allowed is above 0 and up to 1; it stays {state.scale:g}"
                 )
-        for lock in self._bools(inputs, "lock_rotation"):
+        for lock in self._bool_messages(inputs, "lock_rotation"):
             state.rotation_locked = lock.data
             self._publish_lock("rotation", lock)
-        for lock in self._bools(inputs, "lock_translation"):
+        for lock in self._bool_messages(inputs, "lock_translation"):
             state.translation_locked = lock.data
             self._publish_lock("translation", lock)
-        for align in self._bools(inputs, "set_align_MTM"):
+        for align in self._bool_messages(inputs, "set_align_MTM"):
             state.align = align.data
             self._publish("align_mtm", align)
         for phase in cast("tuple[StringMessage, ...]", inputs.events(f"teleop/{self.name}/state")):
-            state.phase = Phase[phase.data]
+            state.phase = EngagementPhase[phase.data]
         for message in cast("tuple[StringMessage, ...]", inputs.events(f"teleop/{self.name}/warning")):
             self._publish("warning", message)
 
-    def _bools(self, inputs: Inputs, name: str) -> tuple[BoolMessage, ...]:
+    def _bool_messages(self, inputs: Inputs, name: str) -> tuple[BoolMessage, ...]:
         return cast("tuple[BoolMessage, ...]", inputs.events(f"{self.name}/{name}"))
 
     def _publish_lock(self, what: str, lock: BoolMessage) -> None:
         self._publish(f"{what}_locked", lock)
         self._events.publish(f"teleop/{self.name}/lock_{what}", lock)
 
-    def _desire(self, state: State) -> None:
+    def _set_desired(self, state: TeleopState) -> None:
         self.state.desired = state
         self._publish("desired_state", StringMessage(data=state.name))
 
@@ -190,20 +198,22 @@ class Component:
 
         Only a command starts the component again, as on the real system.
         """
-        if self.state.current >= State.ALIGNING_MTM:
+        if self.state.current >= TeleopState.ALIGNING_MTM:
             self.warn(
                 f"{' and '.join(sorted(lost))} not ENABLED and homed any more; send state_command enable"
             )
-            self._desire(State.DISABLED)
+            self._set_desired(TeleopState.DISABLED)
 
-    def _next(self, readiness: Readiness, *, clutched: bool) -> State:
+    def _next(self, readiness: Readiness, *, clutched: bool) -> TeleopState:
         state = self.state
-        if state.desired is State.DISABLED:
-            return State.DISABLED
+        if state.desired is TeleopState.DISABLED:
+            return TeleopState.DISABLED
         if not (readiness.is_ready(self.arm) and readiness.may_lead(self.master)):
-            return State.SETTING_ARMS_STATE
-        led = state.phase is Phase.ENABLED or (clutched and state.current is State.ENABLED)
-        return State.ENABLED if led and state.desired is State.ENABLED else State.ALIGNING_MTM
+            return TeleopState.SETTING_ARMS_STATE
+        led = state.phase is EngagementPhase.ENABLED or (clutched and state.current is TeleopState.ENABLED)
+        return (
+            TeleopState.ENABLED if led and state.desired is TeleopState.ENABLED else TeleopState.ALIGNING_MTM
+        )
 
     def _permit(self, *, leads: bool) -> None:
         """Enable or clutch the teleoperation."""
@@ -215,16 +225,18 @@ class Component:
     def _set_arms(self, readiness: Readiness, names: Set[str]) -> None:
         """Command arm and master, if among `names`, to be enabled and homed."""
         for name in (self.arm, self.master):
-            for command in readiness.orders(name) if name in names else ():
+            for command in readiness.state_commands(name) if name in names else ():
                 self._events.publish(f"{name}/state_command", StringStamped(string=command))
 
     def _enter(self) -> None:
         """Begin the current state."""
         state = self.state
         self._publish_state()
-        if state.current is State.DISABLED or (state.current is State.ALIGNING_MTM and not state.align):
+        if state.current is TeleopState.DISABLED or (
+            state.current is TeleopState.ALIGNING_MTM and not state.align
+        ):
             self._commands.hold()
-        if state.current is State.ALIGNING_MTM:
+        if state.current is TeleopState.ALIGNING_MTM:
             state.aligned_ns = -_ALIGN_NS
             self._publish("scale", Float64Message(data=state.scale))
 
@@ -232,14 +244,14 @@ class Component:
         state = self.state
         if floats:
             locked = state.rotation_locked or (clutched and state.align)
-            self._commands.float(inputs[f"{self.master}/measured_cp"][3:] if locked else None)
-        aligns = state.current is State.ALIGNING_MTM and state.align and not clutched
+            self._commands.float_free(inputs[f"{self.master}/measured_cp"][3:] if locked else None)
+        aligns = state.current is TeleopState.ALIGNING_MTM and state.align and not clutched
         if aligns and now_ns - state.aligned_ns >= _ALIGN_NS:
             state.aligned_ns = now_ns
             master, tip = inputs[f"{self.master}/measured_cp"], inputs[f"{self.arm}/setpoint_cp"]
             self._commands.turn(master, tip[3:])
             header = Header(stamp=Time.from_ns(now_ns))
-            offset_to_tip = offset(master[3:], tip[3:])
+            offset_to_tip = orientation_offset(master[3:], tip[3:])
             self._publish("alignment_offset", QuaternionStamped(header=header, quaternion=offset_to_tip))
 
     def warn(self, text: str) -> None:

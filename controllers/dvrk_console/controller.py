@@ -11,7 +11,7 @@ from typing import ClassVar, cast
 
 import numpy as np
 
-from controllers.dvrk_console.component import Component, Published, State
+from controllers.dvrk_console.component import Component, Published, TeleopState
 from controllers.dvrk_console.params import DvrkConsoleParams
 from controllers.dvrk_console.ports import EventOutputs, console_ports
 from controllers.dvrk_console.readiness import Readiness
@@ -101,7 +101,7 @@ class DvrkConsole(Controller):
         self._lead_camera()
         for component in self._components.values():
             component.step(
-                t + h, inputs, self._requested(component), self._readiness, clutched=self._state.clutch
+                t + h, inputs, self._requested_state(component), self._readiness, clutched=self._state.clutch
             )
         return self._outputs
 
@@ -114,13 +114,13 @@ class DvrkConsole(Controller):
         for component in self._components.values():
             component.publish_all()
 
-    def _requested(self, component: Component) -> State:
+    def _requested_state(self, component: Component) -> TeleopState:
         """Return the state of a component as requested by the console (UpdateTeleopState)."""
         if not (self._state.enabled and component.state.selected):
-            return State.DISABLED
+            return TeleopState.DISABLED
         if not self._state.operator_present:
-            return State.ALIGNING_MTM
-        return State.DISABLED if self._state.camera else State.ENABLED
+            return TeleopState.ALIGNING_MTM
+        return TeleopState.DISABLED if self._state.camera else TeleopState.ENABLED
 
     def _execute_system_commands(self, inputs: Inputs) -> None:
         for name, command in _POWER.items():
@@ -218,7 +218,9 @@ class DvrkConsole(Controller):
         state = self._state
         leads = state.enabled and state.operator_present and state.camera
         if leads != state.leads_camera:
-            for command in self._readiness.orders("ECM") if leads and "ECM" in self.params.arms else ():
+            for command in (
+                self._readiness.state_commands("ECM") if leads and "ECM" in self.params.arms else ()
+            ):
                 self._events.publish("ECM/state_command", StringStamped(string=command))
             state.leads_camera = Published(leads)
             self._events.publish("teleop/ECM/buttons", Joy(buttons=np.array([leads], np.int32)))

@@ -16,7 +16,7 @@ from robots import rotation
 from schemas.ros import BoolMessage, EmptyMessage, Point, Pose, PoseStamped, Quaternion, WrenchStamped
 from schemas.vectors import Vector
 
-__all__ = ["Master", "offset", "opening"]
+__all__ = ["Master", "opening", "orientation_offset"]
 
 _GRIPPER_ZERO, _GRIPPER_MAX = 0.0, radians(60.0)
 """Angles of a gripper closed and open (mtsIntuitiveResearchKit.h: GripperZero, GripperMax)."""
@@ -44,7 +44,7 @@ class Master:
         pose = Pose(position=position, orientation=_quaternion(orientation))
         self._events.publish(f"{self._name}/move_cp", PoseStamped(pose=pose))
 
-    def float(self, locked: Vector | None) -> None:
+    def float_free(self, locked: Vector | None) -> None:
         """Follow the hand without a force; keep the orientation `locked` (x, y, z, w), if any."""
         self._events.publish(f"{self._name}/use_gravity_compensation", BoolMessage(data=True))
         self._events.publish(f"{self._name}/body/servo_cf", WrenchStamped())
@@ -63,7 +63,7 @@ def opening(angle: float) -> float:
     )
 
 
-def offset(master: Vector, tip: Vector) -> Quaternion:
+def orientation_offset(master: Vector, tip: Vector) -> Quaternion:
     """Return the orientation of the tip relative to the master's.
 
     Both are quaternions (x, y, z, w) in frames with corresponding axes: the camera's and the display's.

@@ -49,7 +49,7 @@ class Readiness:
         """Return whether a master may lead: a master without an operating state, such as a stylus, may."""
         return self.is_ready(master) or not self.state[self._rows[master], 0]
 
-    def orders(self, name: str) -> tuple[str, ...]:
+    def state_commands(self, name: str) -> tuple[str, ...]:
         """Return the state commands to make an arm ready; none before the arm has published its state."""
         known, enabled, homed = self.state[self._rows[name]]
         return () if not known else (*(() if enabled else ("enable",)), *(() if homed else ("home",)))

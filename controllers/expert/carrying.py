@@ -51,9 +51,9 @@ class Carrying(Errand):
         if self._has_lost():
             return
         self.state.turns += 1
-        if acos(min(1.0, self._up[2])) > _STRAIGHT and self.state.turns <= _TURNS:
+        if acos(min(1.0, self._upright_axis[2])) > _STRAIGHT and self.state.turns <= _TURNS:
             goal = self.hand.line()
-            goal[3:] = rotation.product(rotation.from_matrix(upright(self._up)), goal[3:])
+            goal[3:] = rotation.product(rotation.from_matrix(upright(self._upright_axis)), goal[3:])
             self._enter(HandPhase.TURN, goal)
             return
         self._put_aside()
@@ -121,7 +121,7 @@ class Carrying(Errand):
         elif self.state.waited > _OFFERED:
             self._put_aside()
 
-    def _take(self) -> None:
+    def _take_object(self) -> None:
         other = self.team.other(self)
         if other is not None and other.state.phase in _LEAVING:
             return

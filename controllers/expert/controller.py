@@ -60,7 +60,7 @@ class Expert(Controller):
     def _hand(self, arm: ArmName) -> RobotHand:
         params = self.params
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        held = cast("PsmParams", params.arms.driven[arm])
+        held = cast("PsmParams", params.arms.present_arms[arm])
         if held.tool.jaw is None:
             raise SessionError(f"expert '{self.name}': {arm} holds {held.tool.name}, which has no jaw")
         return RobotHand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)

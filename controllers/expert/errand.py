@@ -67,12 +67,12 @@ class Errand:
         return self._seen.poses[self.state.object_index, :3, 3]
 
     @property
-    def _up(self) -> Vector:
+    def _upright_axis(self) -> Vector:
         """Axis of the object to be upright, in the world."""
         return self._seen.poses[self.state.object_index, :3, :3] @ self.state.up
 
     @property
-    def _before(self) -> Vector:
+    def _approach_pose(self) -> Vector:
         """Pose of the tip before the straight approach to the grasp."""
         goal = self.state.grasp.copy()
         goal[:3] -= (BESIDE if self.state.leans else _HOVER) * rotation.matrix(goal[3:])[:, 2]
@@ -105,7 +105,7 @@ class Errand:
     @property
     def _level(self) -> float:
         """Height of the tip of an empty hand above all obstacles, m."""
-        return max(self._chore.clear + self.hand.jaw.length, self._before[2])
+        return max(self._chore.clear + self.hand.jaw.length, self._approach_pose[2])
 
     def _let_go(self) -> None:
         self.hand.move_jaw(self.state.opening)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.expert.outlines import gap
+from controllers.expert.outlines import outline_gap
 from robots.training.boards import Ring
 from robots.training.dishes import PIECE
 from robots.transform import rigid_transform
@@ -134,7 +134,7 @@ def grasps_of_ring(
         if post is not None:
             room = min(room, finger.to_post(axes @ (post[0] - centre[:2]), post[1]))
         both = [outline @ axes + centre[:2] for outline in finger.outlines()]
-        room = min([room, *(gap(one, other) for one, other in product(both, others))])
+        room = min([room, *(outline_gap(one, other) for one, other in product(both, others))])
         if room < LEAST_ROOM:
             continue
         away = np.array([middle, aside]) @ axes

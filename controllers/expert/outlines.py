@@ -9,7 +9,7 @@ import numpy as np
 from robots.training.boards import Ring
 from schemas.vectors import Vector
 
-__all__ = ["box_of_ring", "gap", "outline_of_ring"]
+__all__ = ["box_of_ring", "outline_gap", "outline_of_ring"]
 
 
 def outline_of_ring(ring: Ring, pose: Vector) -> Vector:
@@ -29,15 +29,15 @@ def _corners(ring: Ring) -> Vector:
     return around * np.array([[0.0, 1.0, 0.0], [-sqrt(0.75), -0.5, 0.0], [sqrt(0.75), -0.5, 0.0]])
 
 
-def gap(one: Vector, other: Vector) -> float:
+def outline_gap(one: Vector, other: Vector) -> float:
     """Return how far two convex outlines, corners of shape (n, 2), are apart along the normal of one's side.
 
     That is at most their distance; negative: by how much they overlap (the theorem of separating axes).
     """
-    return max(_beyond(one, other), _beyond(other, one))
+    return max(_distance_beyond(one, other), _distance_beyond(other, one))
 
 
-def _beyond(sides: Vector, points: Vector) -> float:
+def _distance_beyond(sides: Vector, points: Vector) -> float:
     """Return how far all `points` are beyond one of the sides, at best."""
     along = np.roll(sides, -1, axis=0) - sides
     normals = np.column_stack([along[:, 1], -along[:, 0]])

@@ -62,7 +62,7 @@ class ExpertParams(Params):
 
     @model_validator(mode="after")
     def _is_a_task(self) -> Self:
-        if missing := [arm for arm in self.hands if arm not in self.arms.driven]:
+        if missing := [arm for arm in self.hands if arm not in self.arms.present_arms]:
             raise ValueError(f"hands: {', '.join(missing)} is no arm of the scene")
         if self.hand_over and len(self.hands) < 2:
             raise ValueError("hand_over needs two hands, such as [PSM1, PSM2]")

@@ -10,7 +10,7 @@ import numpy as np
 from controllers.expert.chore import DROP, SLACK
 from controllers.expert.fallen_rings import Around, grasps_of_fallen_ring
 from controllers.expert.grasps import AMPLE_ROOM, UPRIGHT_COSINE, Grasps, grasps_of_ring, shut_fingers
-from controllers.expert.outlines import box_of_ring, gap, outline_of_ring
+from controllers.expert.outlines import box_of_ring, outline_gap, outline_of_ring
 from controllers.expert.reach import LINK_RADII
 from robots.training.fixtures import BoardParams
 from schemas.vectors import Vector
@@ -108,7 +108,7 @@ class PegBoard:
         best, place = -np.inf, free[0]
         for _, post, shift in sorted(ways, key=lambda way: way[0]):
             at = post[:2] + aside * shift
-            room = min([_APART, *(gap(outline + at, other) for other in outlines)])
+            room = min([_APART, *(outline_gap(outline + at, other) for other in outlines)])
             if room > best:
                 best, place = room, np.append(at, post[2] + DROP)
             if room == _APART:

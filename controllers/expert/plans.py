@@ -15,7 +15,7 @@ from robots import rotation
 from robots.transform import matrix_to_pose
 from schemas.vectors import Vector
 
-__all__ = ["Plan", "plan", "plan_leaning", "upright"]
+__all__ = ["GraspPlan", "plan", "plan_leaning", "upright"]
 
 _COMFORT, _PER_TURN, _PER_OPENING, _PER_SIDE, _PER_ROOM = 0.25, 0.02, 0.2, 60.0, 100.0
 """Score of a grasp, in joint margins: margin without further benefit; cost of a radian of turning and of a
@@ -31,7 +31,7 @@ _HEADINGS = tuple(2.0 * pi * k / 12.0 for k in range(12))
 """Rotations about the vertical of a fallen object at its target, rad."""
 
 
-class Plan(NamedTuple):
+class GraspPlan(NamedTuple):
     """A planned grasp."""
 
     grasp: Vector
@@ -48,7 +48,7 @@ class Plan(NamedTuple):
 
 def plan(
     hand: RobotHand, found: Grasps, lift: float, way: Vector, away: Vector, room: Callable[[Vector], Vector]
-) -> Plan | None:
+) -> GraspPlan | None:
     """Return the best grasp of an upright object; None: no grasp is within reach.
 
     Args:
@@ -77,10 +77,12 @@ def plan(
     if score[best] == -np.inf:
         return None
     pose = matrix_to_pose(found.poses[best])
-    return Plan(pose, float(found.opening[best]), found.ups[best], leans=False, upright=pose[3:])
+    return GraspPlan(pose, float(found.opening[best]), found.ups[best], leans=False, upright=pose[3:])
 
 
-def plan_leaning(hand: RobotHand, found: Grasps, middle: Vector, lift: float, rest: Vector) -> Plan | None:
+def plan_leaning(
+    hand: RobotHand, found: Grasps, middle: Vector, lift: float, rest: Vector
+) -> GraspPlan | None:
     """Return the best grasp for putting a fallen object upright; None: no grasp is within reach.
 
     Args:
@@ -110,7 +112,7 @@ def plan_leaning(hand: RobotHand, found: Grasps, middle: Vector, lift: float, re
         return None
     k = int(few[i])
     turned = rotation.from_matrix(tips[i, j, 3])
-    return Plan(
+    return GraspPlan(
         matrix_to_pose(found.poses[k]), float(found.opening[k]), found.ups[k], leans=True, upright=turned
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 from controllers.expert.errand import GENTLE, PATIENCE, TURNING, Errand
 from controllers.expert.grasps import UPRIGHT_COSINE, Grasps
 from controllers.expert.hand import HandPhase, HandRole
-from controllers.expert.plans import Plan, plan, plan_leaning
+from controllers.expert.plans import GraspPlan, plan, plan_leaning
 from robots.transform import pose_to_matrix
 
 __all__ = ["Taking"]
@@ -41,7 +41,7 @@ class Taking(Errand):
         self._follow(found)
         self._enter(HandPhase.RISE, self._line_raised_to(self._level))
 
-    def _follow(self, found: Plan) -> None:
+    def _follow(self, found: GraspPlan) -> None:
         """Adopt a plan."""
         state = self.state
         state.grasp[:], state.opening, state.leans = found.grasp, found.opening, found.leans
@@ -51,7 +51,7 @@ class Taking(Errand):
             state.role = HandRole.ALONE
 
     def _rise(self) -> None:
-        goal = self._before
+        goal = self._approach_pose
         goal[2] = self._level
         self.hand.move_jaw(self.state.opening)
         self._enter(HandPhase.ACROSS, goal)
@@ -72,7 +72,7 @@ class Taking(Errand):
     def _go_beside(self) -> None:
         """Descend beside a fallen object, if the object is still at rest."""
         if self._seen.is_free(self.state.object_index):
-            self._enter(HandPhase.DESCEND, self._before, GENTLE)
+            self._enter(HandPhase.DESCEND, self._approach_pose, GENTLE)
         else:
             self._give_up()
 
@@ -92,7 +92,7 @@ class Taking(Errand):
                 return
         self._shut()
 
-    def _goes_on(self, found: Plan) -> bool:
+    def _goes_on(self, found: GraspPlan) -> bool:
         """Return whether a plan continues the present grasp, up to a shift of the object."""
         same = abs(float(found.grasp[3:] @ self.state.grasp[3:])) > _SAME
         return same and not found.leans
@@ -118,14 +118,14 @@ class Taking(Errand):
         elif self.state.waited > _GIVEN_UP:
             self._let_go()
 
-    def _plan(self, index: int) -> Plan | None:
+    def _plan(self, index: int) -> GraspPlan | None:
         """Return the best plan for an object; None: no feasible grasp."""
         other = self.team.other(self) if self.state.role is HandRole.TAKER else None
         held = None if other is None else pose_to_matrix(other.hand.measured)
         ways = self._chore.grasps(index, self._seen.poses, self.hand.jaw.length, held)
         return next((found for found in (self._best(index, each) for each in ways) if found), None)
 
-    def _best(self, index: int, found: Grasps) -> Plan | None:
+    def _best(self, index: int, found: Grasps) -> GraspPlan | None:
         poses, hand = self._seen.poses, self.hand
         middle, role = poses[index, :3, 3], self.state.role
         lift = self._chore.travel - middle[2]

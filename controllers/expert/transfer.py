@@ -43,7 +43,7 @@ class Transfer(Taking, Carrying):
             HandPhase.OPEN: self._open,
             HandPhase.RETREAT: self._retreat,
             HandPhase.OFFER: self._offer,
-            HandPhase.TAKE: self._take,
+            HandPhase.TAKE: self._take_object,
         }
 
     def step(self) -> None:

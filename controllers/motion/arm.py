@@ -63,7 +63,7 @@ class Arm:
             period: the controller's step, s.
             outputs: the controller's outputs; the arm adds its own, with arrays kept for the whole session.
         """
-        arm = params.arms.driven[name]
+        arm = params.arms.present_arms[name]
         self._period = period
         held = arm.equipment
         self._messages = Messages(name, event_names(arm), outputs)
@@ -197,10 +197,10 @@ class Arm:
         if drives.gripper is not None:
             self._gripper_setpoint[:] = drives.gripper.commanded
 
-    def restored(self) -> None:
+    def recompute_derived(self) -> None:
         """Recompute all values derived from `state` after a restore."""
         for axes in self._drives.groups:
-            axes.setpoint.restored()
+            axes.setpoint.recompute_derived()
         self._condition = self._lifecycle.condition if self._now.started else None
         self._update_modes()
         self._rests = False
@@ -239,7 +239,7 @@ class Arm:
                 # as the real controller does; a move that is under way continues
                 self._messages.goal_reached(reached=False)
             return
-        self._messages.executed(command)
+        self._messages.note_executed(command)
         if command in crtk.CARTESIAN_COMMANDS:
             self._drives.control.cartesian = True
 

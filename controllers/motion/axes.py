@@ -74,7 +74,7 @@ class Axes:
         under_way = self.setpoint.activity is Activity.FOLLOW or self.setpoint.is_moving
         return self.setpoint.goal if under_way else self.setpoint.position
 
-    def finished(self) -> bool:
+    def pop_finished(self) -> bool:
         """Return once, a step after the arrival, that the move has arrived: every move takes a step."""
         arrived = self.is_moving and not self.setpoint.is_moving
         if arrived:

@@ -12,7 +12,7 @@ import numpy as np
 
 from controllers.motion import goals
 from controllers.motion.drives import Drives, WrenchFrame
-from controllers.motion.frames import BaseFrame, turned
+from controllers.motion.frames import BaseFrame, rotate_twist
 from robots.dvrk.cannula import Cannula
 from robots.dvrk.crtk import tip_frame
 from robots.dvrk.inverse import inverse as inverse_kinematics
@@ -93,7 +93,9 @@ class CartesianCommands:
                 "a wrench beside a pose or a twist, allowed is one or the other: the drives apply efforts or"
                 " hold positions"
             )
-        velocity = self._joint_velocity(turned(frame[:3, :3], goals.twist(message.twist))) if moved else None
+        velocity = (
+            self._joint_velocity(rotate_twist(frame[:3, :3], goals.twist(message.twist))) if moved else None
+        )
         if posed:
             self._drives.follow(
                 self._joints, self._inverse(frame @ goals.frame(message.pose)), self._period, velocity
@@ -102,7 +104,9 @@ class CartesianCommands:
             self._drives.drift(velocity)
         else:
             wrench = goals.wrench(message.wrench) if pushed else np.zeros(6)
-            self._drives.press(turned(self._base.pose[:3, :3] @ frame[:3, :3], wrench), WrenchFrame.REFERENCE)
+            self._drives.press(
+                rotate_twist(self._base.pose[:3, :3] @ frame[:3, :3], wrench), WrenchFrame.REFERENCE
+            )
 
     def _servo_ci(self, message: CartesianImpedance) -> None:
         goals.check_frame(message.header.frame_id, self._base.reference)

@@ -41,7 +41,7 @@ class MotionController(Controller):
         self._telemetry: Telemetry | None = None
         self._followers: Followers | None = None
         self._period = 0.0
-        self._camera_stand = base_in_world("ECM", params) if "ECM" in params.arms.driven else None
+        self._camera_stand = base_in_world("ECM", params) if "ECM" in params.arms.present_arms else None
         self._world_seen, self._camera_seen = np.eye(4), b""
         self._outputs: dict[str, Any] = {}
         self._setup_joints = SetupJoints(params, self._outputs)
@@ -56,12 +56,14 @@ class MotionController(Controller):
         params, period = self.params, self.params.publish_period
         ports = [
             port
-            for name, arm in params.arms.driven.items()
+            for name, arm in params.arms.present_arms.items()
             for port in arm_ports(name, arm, reference_frame(name, params), period)
         ]
         if params.mounting == "cart":
             ports += [
-                port for name in params.arms.driven for port in setup_joint_ports(name, CART_FRAME, period)
+                port
+                for name in params.arms.present_arms
+                for port in setup_joint_ports(name, CART_FRAME, period)
             ]
         return tuple(ports)
 
@@ -74,7 +76,7 @@ class MotionController(Controller):
         period = self._period = setup.period_ns * 1e-9
         self._arms = {
             name: Arm(name, self.params, self._camera, period, self._outputs)
-            for name in self.params.arms.driven
+            for name in self.params.arms.present_arms
         }
         self._telemetry = Telemetry([(name, arm.chain, arm.weight) for name, arm in self._arms.items()])
         self._publish(self._telemetry)
@@ -124,8 +126,8 @@ class MotionController(Controller):
         """Return to a saved state, of trajectories from their start, goal and age."""
         super().restore(state)
         for arm in self._arms.values():
-            arm.restored()
-        self._setup_joints.restored()
+            arm.recompute_derived()
+        self._setup_joints.recompute_derived()
 
     def close(self) -> None:
         """Release the arms."""

@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from controllers.motion.axes import Axes, Mode
-from controllers.motion.frames import turned
+from controllers.motion.frames import rotate_twist
 from controllers.motion.impedance import Impedance
 from controllers.motion.messages import Messages
 from controllers.motion.params import EcmParams, PsmParams
@@ -157,7 +157,7 @@ class Drives:
     def report_arrivals(self, *, silent: bool) -> None:
         """Report moves arrived since the last step; `silent`: without the homing arm's."""
         for axes in self.groups:
-            if axes.finished() and not (silent and axes is self.joints):
+            if axes.pop_finished() and not (silent and axes is self.joints):
                 self._messages.goal_reached(reached=True)
 
     def _take_over(self, axes: Axes) -> None:
@@ -195,6 +195,6 @@ class Drives:
         wrench = self.control.wrench
         if self.control.frame is WrenchFrame.IMPEDANCE:
             wrench = self._impedance.wrench(
-                base @ tip, turned(base[:3, :3], jacobian @ self.joints.measured[n : 2 * n])
+                base @ tip, rotate_twist(base[:3, :3], jacobian @ self.joints.measured[n : 2 * n])
             )
-        return turned(base[:3, :3].T, wrench)
+        return rotate_twist(base[:3, :3].T, wrench)

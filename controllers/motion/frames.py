@@ -22,12 +22,12 @@ __all__ = [
     "BaseFrame",
     "base_in_world",
     "reference_frame",
+    "rotate_twist",
     "setup_positions",
-    "turned",
 ]
 
 
-def turned(rotation_matrix: Vector, vector: Vector) -> Vector:
+def rotate_twist(rotation_matrix: Vector, vector: Vector) -> Vector:
     """Return a twist or wrench, shape (6,), with both parts rotated by a matrix of shape (3, 3)."""
     return np.concatenate([rotation_matrix @ vector[:3], rotation_matrix @ vector[3:]])
 
@@ -41,13 +41,13 @@ def base_in_world(arm: CartArm, params: MotionParams) -> Vector:
     """Return the pose of the arm's base frame in the world by the scenario, shape (4, 4)."""
     if params.mounting == "cart":
         return setup_joints.base_pose(arm, setup_positions(arm, params))
-    stands = params.arms.driven[arm]
+    stands = params.arms.present_arms[arm]
     return rigid_transform(rotation.matrix(np.array(stands.orientation)), stands.position)
 
 
 def reference_frame(arm: CartArm, params: MotionParams) -> str:
     """Return the `frame_id` of the arm's Cartesian ports other than `local/`."""
-    return crtk.reference_frame(arm, params.arms.driven, params.mounting, params.reference)
+    return crtk.reference_frame(arm, params.arms.present_arms, params.mounting, params.reference)
 
 
 _ORIGIN = np.eye(4)

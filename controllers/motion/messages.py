@@ -106,7 +106,7 @@ class Messages:
             text = f"{command} refused: {reason}" + (f" ({count} times)" if count > 1 else "")
             (self.error if ready else self.warning)(text)
 
-    def executed(self, command: str) -> None:
+    def note_executed(self, command: str) -> None:
         """Note an executed command: the next refusal is reported at once."""
         if (stream := _row(command)) is not None:
             self.state[stream] = 0.0

@@ -81,12 +81,12 @@ class Arms(Params):
 
     @model_validator(mode="after")
     def _at_least_one(self) -> Self:
-        if not self.driven:
+        if not self.present_arms:
             raise ValueError("name at least one of PSM1, PSM2, PSM3, ECM")
         return self
 
     @property
-    def driven(self) -> Mapping[CartArm, PsmParams | EcmParams]:
+    def present_arms(self) -> Mapping[CartArm, PsmParams | EcmParams]:
         """Present arms by name."""
         named: dict[CartArm, PsmParams | EcmParams | None] = {
             "PSM1": self.PSM1,

@@ -168,7 +168,7 @@ class Setpoint:
             return False
         return self._slow_down(h)
 
-    def restored(self) -> None:
+    def recompute_derived(self) -> None:
         """Recompute all values derived from `state` after a restore."""
         if self.state.activity is Activity.MOVE:
             self._plan()

@@ -41,7 +41,7 @@ class SetupJoints:
 
     def __init__(self, params: MotionParams, outputs: dict[str, Any]) -> None:
         """`outputs`: the controller's outputs, setup joints included."""
-        arms = tuple(params.arms.driven) if params.mounting == "cart" else ()
+        arms = tuple(params.arms.present_arms) if params.mounting == "cart" else ()
         self._power_time = params.power_time * 1e-9
         self._messages = {arm: Messages(f"SUJ/{arm}", setup_joint_event_names(), outputs) for arm in arms}
         self._commands = {f"SUJ/{arm}/{name}" for arm in arms for name in crtk.SETUP_JOINT_COMMANDS}
@@ -87,7 +87,7 @@ class SetupJoints:
                 )
         self._rests = not self._now.powering and all(messages.quiet for messages in self._messages.values())
 
-    def restored(self) -> None:
+    def recompute_derived(self) -> None:
         """Note a restored state."""
         self._rests = False
 

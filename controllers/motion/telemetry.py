@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.motion.frames import turned
+from controllers.motion.frames import rotate_twist
 from robots.dvrk import arm_bodies
 from robots.dvrk.dynamics import STANDARD_GRAVITY, Dynamics
 from robots.dvrk.linkage import Linkage
@@ -119,7 +119,7 @@ class Telemetry:
 
         `wrenches`: whether an output of `self.wrenches` is in use.
         """
-        if changed := self._changed():
+        if changed := self._changed_groups():
             for group in changed:
                 group.update_tips()
             self._update_poses()
@@ -129,7 +129,7 @@ class Telemetry:
             self._update_wrenches(self._behind)
             self._behind = []
 
-    def _changed(self) -> list[_Group]:
+    def _changed_groups(self) -> list[_Group]:
         """Return the groups with changed input bits."""
         given = self._given.tobytes()
         changed = [group for group in self._groups if group.is_new()] if given == self._seen else self._groups
@@ -228,7 +228,7 @@ class _Group:
             self._carried[i] = carries * weight.effort(self.state[i, 1, 0])
             if absolute:
                 in_reference = base[i, :3, :3] @ self._tips[i, 1, :3, :3]
-                self._wrenches[i, 0] = turned(in_reference, self._wrenches[i, 0])
+                self._wrenches[i, 0] = rotate_twist(in_reference, self._wrenches[i, 0])
 
 
 def _pseudo_inverse(matrices: Vector) -> Vector:

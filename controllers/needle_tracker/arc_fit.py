@@ -17,7 +17,7 @@ from controllers.needle_tracker.noise import PIECES, Noise
 from robots.training.needles import NeedleShape
 from schemas.vectors import Vector
 
-__all__ = ["Arc", "Detection", "Fit", "fit"]
+__all__ = ["Arc", "ArcFit", "Detection", "fit_arc"]
 
 _PIECE = 4
 """Samples of the centre line in a piece; the distances of a piece are averaged."""
@@ -66,7 +66,7 @@ class Arc:
         focal = float(np.linalg.norm(np.cross(projection[0, :3], projection[2, :3])))
         return 2.0 * focal * self.needle.wire_radius / depth
 
-    def seen(self, projection: Vector, pose: Vector) -> tuple[Vector, Vector, float]:
+    def project_line(self, projection: Vector, pose: Vector) -> tuple[Vector, Vector, float]:
         """Return the line's image (m, 2), its derivative by an error of `pose` (m, 2, 6), and its mean depth.
 
         `projection`, shape (3, 4), is from the frame in which the needle has `pose`, shape (4, 4), to pixels.
@@ -83,7 +83,7 @@ class Arc:
 
 
 @dataclass(frozen=True)
-class Fit:
+class ArcFit:
     """Residuals (n,), what they change by with an error (n, 6), and their variances (n,): px, px^2."""
 
     residuals: Vector
@@ -103,7 +103,7 @@ class Fit:
     """Whether something of the tip's colour is seen, but too far away."""
 
     @property
-    def tip_only(self) -> Fit:
+    def tip_only(self) -> ArcFit:
         """The same without the arc."""
         rows = slice(len(self.residuals) - 2 * self.tip, None)
         return replace(
@@ -115,9 +115,9 @@ class Fit:
         )
 
 
-def fit(
+def fit_arc(
     arc: Arc, projection: Vector, pose: Vector, seen: Detection, noise: Noise, covariance: Vector, gate: float
-) -> Fit:
+) -> ArcFit:
     """Return how far `seen` is from the needle at `pose`, shape (4, 4), through `projection`, shape (3, 4).
 
     Args:
@@ -129,9 +129,9 @@ def fit(
         covariance: of the pose's error, shape (6, 6).
         gate: standard deviations up to which something seen is taken for the needle.
     """
-    image, slopes, depth = arc.seen(projection, pose)
+    image, slopes, depth = arc.project_line(projection, pose)
     width = arc.width(projection, depth)
-    lasts = noise.that_lasts(width)
+    lasts = noise.lasting_noise(width)
     along = cast("Vector", np.gradient(image, axis=0))
     spacing = np.hypot(along[:, 0], along[:, 1])  # (m,)
     tangents = along / np.maximum(spacing, 1e-9)[:, None]
@@ -144,7 +144,7 @@ def fit(
     used = (lengths > _LEAST_COVER * expected) & (lengths < _MOST_COVER * expected)
     tip, refused = _tip(image[-1], slopes[-1], seen.tips, noise.tip**2 + lasts.tip**2, covariance, gate)
     # each piece has the slope of its middle sample
-    found = Fit(
+    found = ArcFit(
         residuals[used],
         rows[_PIECE // 2 :: _PIECE][used],
         noise.of_pieces(lengths[used], expected[used], width),

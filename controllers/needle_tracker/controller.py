@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import EcmParams
 from controllers.needle_tracker.arc_fit import Arc
-from controllers.needle_tracker.filter import Estimate, View
+from controllers.needle_tracker.filter import Estimate, NeedleView
 from controllers.needle_tracker.noise import Noise
-from controllers.needle_tracker.overlay import drawn
+from controllers.needle_tracker.overlay import draw_overlay
 from controllers.needle_tracker.params import TrackerParams
 from controllers.needle_tracker.ports import tracker_ports
-from controllers.needle_tracker.segmentation import Region, detected, region_about
-from controllers.needle_tracker.tracking import Belief, Settings, followed
+from controllers.needle_tracker.segmentation import Region, detect_needle, region_about
+from controllers.needle_tracker.tracking import NeedleBelief, TrackerSettings, follow_needle
 from controllers.pictures import PictureController
 from controllers.ports import CAMERA
 from hub.participant import (
@@ -73,7 +73,7 @@ the arc's centre was when the tracker started.
 """
 
 
-class Phase(IntEnum):
+class TrackerPhase(IntEnum):
     """What the pose is from."""
 
     BLIND = 0
@@ -92,7 +92,7 @@ class TrackerState(Record):
     share = number()
     slips = number()
     picture_ns = integer(-1)
-    phase = choice(Phase.BLIND)
+    phase = choice(TrackerPhase.BLIND)
     steps = integer()
     at = array(_KEPT)
     """s, of the arms' poses."""
@@ -118,9 +118,11 @@ class NeedleTracker(PictureController):
         self._base = base_in_world(params.arm, params.frames)
         self._camera_base = base_in_world("ECM", params.frames)
         self._chain = params.holder.chain
-        self._camera = left_camera(cast("EcmParams", params.arms.driven["ECM"]).endoscope, params.baseline)
+        self._camera = left_camera(
+            cast("EcmParams", params.arms.present_arms["ECM"]).endoscope, params.baseline
+        )
         self._middle = np.array(params.grasp.position)
-        self._settings = Settings(
+        self._settings = TrackerSettings(
             Noise(params.arc_noise, params.tip_noise, params.lasting, params.shading, params.capping),
             (params.drift.position, params.drift.angle),
             (params.slip.position, params.slip.angle),
@@ -140,11 +142,11 @@ class NeedleTracker(PictureController):
         now.pose[:] = pose_to_matrix(np.array([*grasp.position, *grasp.orientation]))
         deviations = np.repeat([grasp.position_deviation, grasp.angle_deviation], 3)
         now.covariance[:] = np.diag(deviations**2)
-        now.doubts = Belief(Estimate(now.pose, now.covariance)).doubts
-        arms = self.params.arms.driven
+        now.doubts = NeedleBelief(Estimate(now.pose, now.covariance)).doubts
+        arms = self.params.arms.present_arms
         start = np.array(self.params.holder.start), np.array(arms["ECM"].start)
         in_base = self._chain.forward(start[0])
-        return self._outputs(0, in_base, self._in_camera(in_base, start[1]), Phase.BLIND, ())
+        return self._outputs(0, in_base, self._in_camera(in_base, start[1]), TrackerPhase.BLIND, ())
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Follow the needle through the newest pictures."""
@@ -159,9 +161,9 @@ class NeedleTracker(PictureController):
         pictures = self._pictures(inputs)
         overlay = self._follow(pictures, h * 1e-9)
         if self._is_blind(t, now.picture_ns):
-            now.phase = Phase.BLIND
+            now.phase = TrackerPhase.BLIND
         elif pictures:
-            now.phase = Phase.TRACKING if now.seen else Phase.PREDICTING
+            now.phase = TrackerPhase.TRACKING if now.seen else TrackerPhase.PREDICTING
         return self._outputs(t + h, in_base, in_camera, before, overlay)
 
     def _in_camera(self, in_base: Vector, camera_joints: Vector) -> Vector:
@@ -202,7 +204,7 @@ class NeedleTracker(PictureController):
         """Update what is known; return the picture with what was seen, if one is wanted."""
         now = self._now
         gripper = self._gripper_at(now.picture_ns * 1e-9)
-        regions, views = dict[int, Region](), dict[int, View]()
+        regions, views = dict[int, Region](), dict[int, NeedleView]()
         for i, picture in pictures.items():
             projection = now.projections[i] @ gripper
             radius = _REGION * self._arc.needle.radius
@@ -211,9 +213,9 @@ class NeedleTracker(PictureController):
                 depth = float(projection[2] @ [*self._middle, 1.0])
                 regions[i] = region
                 wire = self._arc.width(projection, depth)
-                views[i] = View(projection, detected(self._cv2, picture, region, wire))
-        belief = Belief(Estimate(now.pose.copy(), now.covariance.copy()), now.doubts)
-        belief = followed(self._arc, belief, tuple(views.values()), seconds, self._settings)
+                views[i] = NeedleView(projection, detect_needle(self._cv2, picture, region, wire))
+        belief = NeedleBelief(Estimate(now.pose.copy(), now.covariance.copy()), now.doubts)
+        belief = follow_needle(self._arc, belief, tuple(views.values()), seconds, self._settings)
         now.pose[:], now.covariance[:] = belief.estimate.pose, belief.estimate.covariance
         now.doubts = belief.doubts
         if pictures:
@@ -227,7 +229,7 @@ class NeedleTracker(PictureController):
         seen = views[0].seen if 0 in views else None
         return (
             _image(
-                drawn(self._cv2, pictures[0], regions.get(0), seen, self._arc, projection, now.pose),
+                draw_overlay(self._cv2, pictures[0], regions.get(0), seen, self._arc, projection, now.pose),
                 now.picture_ns,
             ),
         )
@@ -239,7 +241,7 @@ class NeedleTracker(PictureController):
         return now.grippers[int(np.argmin(abs(now.at[:kept] - seconds)))]
 
     def _outputs(
-        self, t: int, in_base: Vector, in_camera: Vector, before: Phase, overlay: tuple[Image, ...]
+        self, t: int, in_base: Vector, in_camera: Vector, before: TrackerPhase, overlay: tuple[Image, ...]
     ) -> Outputs:
         now = self._now
         needle = in_base @ now.pose

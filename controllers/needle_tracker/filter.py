@@ -18,12 +18,12 @@ from typing import cast
 
 import numpy as np
 
-from controllers.needle_tracker.arc_fit import Arc, Detection, Fit, fit
+from controllers.needle_tracker.arc_fit import Arc, ArcFit, Detection, fit_arc
 from controllers.needle_tracker.noise import Noise
-from controllers.needle_tracker.pose import difference, moved
+from controllers.needle_tracker.pose import move_pose, pose_error
 from schemas.vectors import Vector
 
-__all__ = ["Estimate", "Update", "View", "predicted", "updated"]
+__all__ = ["Estimate", "NeedleView", "Update", "predict_estimate", "update_estimate"]
 
 _ITERATIONS = 6
 _DONE = 1e-6
@@ -43,7 +43,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class View:
+class NeedleView:
     """What one eye sees, and from where."""
 
     projection: Vector
@@ -72,7 +72,7 @@ class Update:
     """Whether eyes saw a tip elsewhere only."""
 
 
-def predicted(estimate: Estimate, seconds: float, drift: tuple[float, float]) -> Estimate:
+def predict_estimate(estimate: Estimate, seconds: float, drift: tuple[float, float]) -> Estimate:
     """Return the estimate after a time in which the needle may have drifted in the gripper.
 
     `drift`: standard deviations after a second, m and rad; they grow with the square root of the time.
@@ -81,10 +81,10 @@ def predicted(estimate: Estimate, seconds: float, drift: tuple[float, float]) ->
     return Estimate(estimate.pose, estimate.covariance + np.diag(grown))
 
 
-def updated(
+def update_estimate(
     arc: Arc,
     prior: Estimate,
-    views: Sequence[View],
+    views: Sequence[NeedleView],
     noise: Noise,
     gate: float,
     start: Vector | None = None,
@@ -102,21 +102,21 @@ def updated(
     """
     information = np.linalg.inv(prior.covariance)
     pose, spread = prior.pose if start is None else start, prior.covariance
-    first: list[Fit] = []
-    fits: list[Fit] = []
+    first: list[ArcFit] = []
+    fits: list[ArcFit] = []
     posterior = spread
     tip_first = start is not None
     for _ in range(_ITERATIONS if start is None else _SEARCHING):
-        fits = [fit(arc, view.projection, pose, view.seen, noise, spread, gate) for view in views]
+        fits = [fit_arc(arc, view.projection, pose, view.seen, noise, spread, gate) for view in views]
         first = first or fits
         tip_first = tip_first and any(each.tip for each in fits)
-        residuals, slopes, spreads = _stacked([each.tip_only for each in fits] if tip_first else fits)
+        residuals, slopes, spreads = _stack_fits([each.tip_only for each in fits] if tip_first else fits)
         weights = np.sqrt(_robust(residuals, spreads))
         weighted = np.linalg.solve(spreads, weights[:, None] * slopes) * weights[:, None]  # (n, 6)
-        off = difference(prior.pose, pose)
+        off = pose_error(prior.pose, pose)
         normal = information + slopes.T @ weighted
         step = np.linalg.solve(normal, weighted.T @ residuals - information @ off)
-        pose = moved(pose, cast("Vector", step))
+        pose = move_pose(pose, cast("Vector", step))
         posterior = cast("Vector", np.linalg.inv(normal))
         if tip_first:
             # no other thing has a tip, so it says first whereabouts the wire is to be looked for
@@ -125,10 +125,10 @@ def updated(
             spread = _NARROWING * spread
         elif abs(step).max() < _DONE:
             break
-    return _judged(Estimate(pose, 0.5 * (posterior + posterior.T)), prior, first, fits)
+    return _judge_estimate(Estimate(pose, 0.5 * (posterior + posterior.T)), prior, first, fits)
 
 
-def _stacked(fits: Sequence[Fit]) -> tuple[Vector, Vector, Vector]:
+def _stack_fits(fits: Sequence[ArcFit]) -> tuple[Vector, Vector, Vector]:
     """Return the residuals of all eyes (n,), their slopes (n, 6), and their covariance (n, n)."""
     common = np.vstack([each.common for each in fits])
     spread = np.diag(np.concatenate([each.variances for each in fits])) + common @ common.T
@@ -144,11 +144,13 @@ def _robust(residuals: Vector, spread: Vector) -> Vector:
     return np.minimum(1.0, _HUBER / np.maximum(size, 1e-12))
 
 
-def _judged(estimate: Estimate, prior: Estimate, first: Sequence[Fit], last: Sequence[Fit]) -> Update:
-    residuals, _, spread = _stacked(last)
+def _judge_estimate(
+    estimate: Estimate, prior: Estimate, first: Sequence[ArcFit], last: Sequence[ArcFit]
+) -> Update:
+    residuals, _, spread = _stack_fits(last)
     misfit = float((residuals**2 / np.diag(spread)).mean()) if residuals.size else 0.0
-    off = difference(prior.pose, estimate.pose)
-    residuals, slopes, spread = _stacked(first)
+    off = pose_error(prior.pose, estimate.pose)
+    residuals, slopes, spread = _stack_fits(first)
     innovation = 1.0
     if residuals.size:
         spread = slopes @ prior.covariance @ slopes.T + spread

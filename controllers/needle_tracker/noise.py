@@ -15,7 +15,7 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["PIECES", "Lasting", "Noise"]
+__all__ = ["PIECES", "LastingNoise", "Noise"]
 
 PIECES = 24
 """Pieces of the wire; the distances of a piece are averaged."""
@@ -51,17 +51,17 @@ class Noise:
         # the middle of what is left is anywhere within `missing` of that of the wire
         return self.arc**2 / np.maximum(seen, 1e-9) + _LASTS * missing**2 / 3.0
 
-    def that_lasts(self, width: float) -> Lasting:
+    def lasting_noise(self, width: float) -> LastingNoise:
         """Return what lasts, for a single picture in which the wire is `width` px wide.
 
         The same error in `_LASTS` pictures is taken for as many independent ones, each larger.
         """
         often = sqrt(_LASTS)
-        return Lasting(often * self.lasting, often * self.shading * width, often * self.capping * width)
+        return LastingNoise(often * self.lasting, often * self.shading * width, often * self.capping * width)
 
 
 @dataclass(frozen=True)
-class Lasting:
+class LastingNoise:
     """Errors that all of a picture has in common: standard deviations, px.
 
     They are combinations of independent numbers of variance 1: a displacement in the picture, slow changes
@@ -91,7 +91,7 @@ class Lasting:
         return np.hstack([self.shift * np.eye(2), np.zeros((2, _MODES)), self.cap * np.eye(2)])
 
 
-def _slow() -> Vector:
+def _slow_changes() -> Vector:
     """Return changes along the wire, shape (pieces, modes), whose squares add up to 1 in the mean."""
     along = (np.arange(PIECES) + 0.5) / PIECES
     modes = np.cos(pi * np.outer(along, np.arange(_MODES)))
@@ -99,4 +99,4 @@ def _slow() -> Vector:
     return modes / sqrt(_MODES)
 
 
-_SLOW = _slow()
+_SLOW = _slow_changes()

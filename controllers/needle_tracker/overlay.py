@@ -11,7 +11,7 @@ from controllers.needle_tracker.arc_fit import Arc, Detection
 from controllers.needle_tracker.segmentation import Region
 from schemas.vectors import Vector
 
-__all__ = ["drawn"]
+__all__ = ["draw_overlay"]
 
 _REGION, _WIRE, _TIP, _ESTIMATE, _AXIS = (
     (250, 220, 60),
@@ -24,7 +24,7 @@ _FINE = 4
 """Binary digits behind the point of OpenCV's coordinates."""
 
 
-def drawn(
+def draw_overlay(
     cv2: Any,
     picture: NDArray[np.uint8],
     region: Region | None,
@@ -45,7 +45,7 @@ def drawn(
         image[rows.clip(0, len(image) - 1), columns.clip(0, image.shape[1] - 1)] = _WIRE
         for x, y in seen.tips.tolist():
             cv2.circle(image, (round(x), round(y)), 6, _TIP, 1, cv2.LINE_AA)
-    line, _, depth = arc.seen(projection, pose)
+    line, _, depth = arc.project_line(projection, pose)
     if depth > 0.0:
         centre = projection @ [*pose[:3, 3], 1.0]
         ahead = projection @ [*(pose[:3, 3] + 0.5 * arc.needle.radius * pose[:3, 2]), 1.0]

@@ -97,7 +97,7 @@ class TrackerParams(HeldNeedleParams):
 
     @model_validator(mode="after")
     def _has_arms(self) -> Self:
-        if missing := [arm for arm in (self.arm, "ECM") if arm not in self.arms.driven]:
+        if missing := [arm for arm in (self.arm, "ECM") if arm not in self.arms.present_arms]:
             raise ValueError(
                 f"arms: {', '.join(missing)} is missing: one holds the needle, the ECM the cameras"
             )
@@ -106,7 +106,7 @@ class TrackerParams(HeldNeedleParams):
     @property
     def holder(self) -> PsmParams:
         """The arm that holds the needle."""
-        held = self.arms.driven[self.arm]
+        held = self.arms.present_arms[self.arm]
         if not isinstance(held, PsmParams):
             raise TypeError(self.arm)
         return held

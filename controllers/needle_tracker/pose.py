@@ -11,10 +11,10 @@ import numpy as np
 from robots import rotation
 from schemas.vectors import Vector
 
-__all__ = ["difference", "moved", "turned_about"]
+__all__ = ["move_pose", "pose_error", "turned_about"]
 
 
-def moved(pose: Vector, error: Vector) -> Vector:
+def move_pose(pose: Vector, error: Vector) -> Vector:
     """Return `pose`, shape (4, 4), moved by an error, shape (6,)."""
     result = pose.copy()
     result[:3, 3] += pose[:3, :3] @ error[:3]
@@ -22,7 +22,7 @@ def moved(pose: Vector, error: Vector) -> Vector:
     return result
 
 
-def difference(pose: Vector, other: Vector) -> Vector:
+def pose_error(pose: Vector, other: Vector) -> Vector:
     """Return the error, shape (6,), that moves `pose` to `other`, both (4, 4)."""
     turn = pose[:3, :3].T
     return np.concatenate(

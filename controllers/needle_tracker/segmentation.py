@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from controllers.needle_tracker.arc_fit import Detection
 from schemas.vectors import Vector
 
-__all__ = ["Region", "detected", "region_about"]
+__all__ = ["Region", "detect_needle", "region_about"]
 
 _STRONGER = 1.35
 """A pixel is green, or blue, where that colour is stronger than both others by this factor,"""
@@ -57,7 +57,7 @@ def region_about(projection: Vector, point: Vector, radius: float, width: int, h
     return Region(left, top, right, bottom) if left < right and top < bottom else None
 
 
-def detected(cv2: Any, picture: NDArray[np.uint8], region: Region, wire_px: float) -> Detection:
+def detect_needle(cv2: Any, picture: NDArray[np.uint8], region: Region, wire_px: float) -> Detection:
     """Return what is seen of the needle in `region` of `picture` (RGB), in pixels of the whole picture.
 
     `wire_px`: width of the wire as it is seen about there, px.

@@ -15,13 +15,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from controllers.needle_tracker.arc_fit import Arc
-from controllers.needle_tracker.filter import Estimate, Update, View, predicted, updated
+from controllers.needle_tracker.filter import Estimate, NeedleView, Update, predict_estimate, update_estimate
 from controllers.needle_tracker.noise import Noise
-from controllers.needle_tracker.pose import difference, moved, turned_about
+from controllers.needle_tracker.pose import move_pose, pose_error, turned_about
 from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
-__all__ = ["Belief", "Settings", "followed", "mirrored"]
+__all__ = ["NeedleBelief", "TrackerSettings", "follow_needle", "mirror_pose"]
 
 _GATE = 4.0
 _INNOVATION = 6.0
@@ -49,7 +49,7 @@ _DEPARTURE, _MISFIT = 0.02, 0.02
 
 
 @dataclass(frozen=True)
-class Settings:
+class TrackerSettings:
     """What the tracker assumes."""
 
     noise: Noise = field(default_factory=Noise)
@@ -60,7 +60,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Belief:
+class NeedleBelief:
     """What is known of the needle."""
 
     estimate: Estimate
@@ -74,60 +74,67 @@ class Belief:
     """Share of the wire in its place in the newest picture."""
 
 
-def followed(arc: Arc, belief: Belief, views: Sequence[View], seconds: float, settings: Settings) -> Belief:
+def follow_needle(
+    arc: Arc, belief: NeedleBelief, views: Sequence[NeedleView], seconds: float, settings: TrackerSettings
+) -> NeedleBelief:
     """Return what is known `seconds` later, after what `views` show; none are no picture."""
-    prior = predicted(belief.estimate, seconds, settings.drift)
+    prior = predict_estimate(belief.estimate, seconds, settings.drift)
     if not any(len(view.seen.points) for view in views):
         return replace(belief, estimate=prior, seen=False, slipped=False)
-    update = updated(arc, prior, views, settings.noise, _GATE)
+    update = update_estimate(arc, prior, views, settings.noise, _GATE)
     doubts = belief.doubts + 1 if belief.doubts >= 0 else _SUSPECT
-    if _doubtful(update):
+    if _is_doubtful(update):
         if doubts < _SUSPECT or (doubts - _SUSPECT) % _AGAIN:
             # neither believed nor forgotten: the kinematics go on, a little less sure
-            return Belief(_loosened(prior, _held(arc, prior.pose), settings.slip, _DOUBT), doubts)
-        found = _searched(arc, prior, views, settings)
+            return NeedleBelief(
+                _loosen_prior(prior, _holding_point(arc, prior.pose), settings.slip, _DOUBT), doubts
+            )
+        found = _search_needle(arc, prior, views, settings)
         if found is None:
             believed = update.explained >= _LEAST and update.misfit < _FITS
-            return Belief(update.estimate if believed else prior, doubts)
+            return NeedleBelief(update.estimate if believed else prior, doubts)
         update = found
     # while it was doubted, the estimate stood still: it is where the needle was before
-    turn = np.linalg.norm(difference(prior.pose, update.estimate.pose)[3:])
+    turn = np.linalg.norm(pose_error(prior.pose, update.estimate.pose)[3:])
     slipped = belief.doubts > 0 and bool(turn > _SLIPPED)
-    return Belief(update.estimate, 0, update.explained > 0.0, slipped, update.explained)
+    return NeedleBelief(update.estimate, 0, update.explained > 0.0, slipped, update.explained)
 
 
-def _doubtful(update: Update) -> bool:
+def _is_doubtful(update: Update) -> bool:
     missing = update.explained < _LEAST and update.unexplained > _MOST
     return missing or update.tip_refused or update.innovation > _INNOVATION
 
 
-def _searched(arc: Arc, prior: Estimate, views: Sequence[View], settings: Settings) -> Update | None:
+def _search_needle(
+    arc: Arc, prior: Estimate, views: Sequence[NeedleView], settings: TrackerSettings
+) -> Update | None:
     """Return the best of several searches; None if none is better than to go on as before."""
-    held = _held(arc, prior.pose)
-    loose = _loosened(prior, held, settings.slip)
-    trials = [updated(arc, prior, views, settings.noise, _GATE, prior.pose)]
+    held = _holding_point(arc, prior.pose)
+    loose = _loosen_prior(prior, held, settings.slip)
+    trials = [update_estimate(arc, prior, views, settings.noise, _GATE, prior.pose)]
     trials += [
-        updated(arc, loose, views, settings.noise, _GATE, start) for start in _starts(prior.pose, held, views)
+        update_estimate(arc, loose, views, settings.noise, _GATE, start)
+        for start in _starts(prior.pose, held, views)
     ]
-    best = max(trials, key=_worth)
-    usual = _worth(updated(arc, prior, views, settings.noise, _GATE))
+    best = max(trials, key=_score_estimate)
+    usual = _score_estimate(update_estimate(arc, prior, views, settings.noise, _GATE))
     fits = best.explained > _FOUND and best.misfit < _FITS
-    return best if fits and _worth(best) > usual else None
+    return best if fits and _score_estimate(best) > usual else None
 
 
-def _worth(update: Update) -> float:
+def _score_estimate(update: Update) -> float:
     """Return how much speaks for an estimate, as a share of the wire."""
     against = _DEPARTURE * update.departure + _MISFIT * min(update.misfit, 25.0)
     return update.explained + (_TIP if update.tip else 0.0) - against
 
 
-def _held(arc: Arc, pose: Vector) -> Vector:
+def _holding_point(arc: Arc, pose: Vector) -> Vector:
     """Return the point of the wire nearest to the middle of the gripper, in the needle's frame, (3,), m."""
     in_gripper = arc.points @ pose[:3, :3].T + pose[:3, 3]
     return arc.points[int((in_gripper**2).sum(axis=1).argmin())]
 
 
-def _loosened(prior: Estimate, held: Vector, slip: tuple[float, float], share: float = 1.0) -> Estimate:
+def _loosen_prior(prior: Estimate, held: Vector, slip: tuple[float, float], share: float = 1.0) -> Estimate:
     """Return the prior as it is after a slip of `share` of the variance."""
     turns = slip[1] * turned_about(held)
     covariance = prior.covariance + share * (turns @ turns.T)
@@ -135,17 +142,17 @@ def _loosened(prior: Estimate, held: Vector, slip: tuple[float, float], share: f
     return Estimate(prior.pose, covariance)
 
 
-def _starts(pose: Vector, held: Vector, views: Sequence[View]) -> Iterator[Vector]:
+def _starts(pose: Vector, held: Vector, views: Sequence[NeedleView]) -> Iterator[Vector]:
     yield pose
-    yield mirrored(pose, views[0].projection)
+    yield mirror_pose(pose, views[0].projection)
     turns = turned_about(held)
     for axis in range(3):
         for angle in _TURNS:
-            turn = moved(np.eye(4), angle * turns[:, axis])[:3, :3]
+            turn = move_pose(np.eye(4), angle * turns[:, axis])[:3, :3]
             yield pose @ rigid_transform(turn, held - turn @ held)
 
 
-def mirrored(pose: Vector, projection: Vector) -> Vector:
+def mirror_pose(pose: Vector, projection: Vector) -> Vector:
     """Return the other pose, shape (4, 4), of which an eye sees about the same arc with the same tip.
 
     The arc is mirrored in depth: at its centre across the line of sight.

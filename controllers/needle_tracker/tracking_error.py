@@ -8,7 +8,7 @@ import numpy as np
 
 from controllers.motion.frames import base_in_world
 from controllers.needle_tracker.params import HeldNeedleParams
-from controllers.needle_tracker.pose import difference
+from controllers.needle_tracker.pose import pose_error
 from hub.participant import (
     Controller,
     Inputs,
@@ -94,7 +94,7 @@ class TrackingError(Controller):
         truth, estimate = pose_to_matrix(inputs["truth"]), self._base @ pose_to_matrix(inputs["estimate"])
         covariance = inputs["covariance"].reshape(6, 6)
         now = self._now
-        now.error[:] = difference(estimate, truth)
+        now.error[:] = pose_error(estimate, truth)
         now.deviation[:] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         now.figures[:] = (
             np.linalg.norm(now.error[:3]),

@@ -62,7 +62,7 @@ class Stitching(TwoHands):
         surgeon = self._surgeon
         surgeon.step()
         for hand, settles in zip(self._hands, surgeon.settles, strict=True):
-            rests = surgeon.looks and hand.has_arrived
+            rests = surgeon.looks_at_hands and hand.has_arrived
             self._outputs[f"{hand.arm}/servo_cp"] = () if rests else (hand.advance(settle=settles),)
             self._outputs[f"{hand.arm}/jaw/move_jp"] = hand.jaw_commands()
         self._shown.phase[0], self._shown.stitch[0] = surgeon.state.phase, surgeon.state.stitch

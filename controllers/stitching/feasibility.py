@@ -11,7 +11,7 @@ from robots.serial_chain import SerialChain
 from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
-__all__ = ["MARGIN", "Reach", "reach", "room"]
+__all__ = ["MARGIN", "ArmReach", "best_reach", "joint_room"]
 
 MARGIN = 0.05
 """Least share of half a joint's range left by a way, 4 degrees of a wrist.
@@ -25,7 +25,7 @@ _JUMP = 0.7
 """Largest turn of a joint between two poses of a way, rad: beyond, the arm would change its branch."""
 
 
-class Reach:
+class ArmReach:
     """The best branch of an arm along a way."""
 
     def __init__(self, chain: SerialChain, q: Vector) -> None:
@@ -38,7 +38,7 @@ class Reach:
         """Least share of half a joint's range left; below `MARGIN` the way is not feasible."""
 
     @property
-    def problem(self) -> str:
+    def failure_reason(self) -> str:
         """Why the way is not feasible, with the number that fails; empty: feasible."""
         if self.margin >= MARGIN:
             return ""
@@ -59,28 +59,30 @@ class Reach:
         )
 
 
-def room(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
+def joint_room(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
     """Return the free share of half a joint's range at each of `tips`, shape (n, 4, 4), as (n,), alone.
 
     `base`: pose of the arm's base in the world, shape (4, 4). Below 0 a pose is out of reach.
     """
-    found = np.stack([_wound(q, turn) for q in _two(chain, base, tips) for turn in _TURNS])  # (6, n, joints)
+    found = np.stack(
+        [_wind_roll(q, turn) for q in _both_branches(chain, base, tips) for turn in _TURNS]
+    )  # (6, n, joints)
     most: Vector = _free(chain, found).min(axis=-1).max(axis=0)
     return most
 
 
-def reach(chain: SerialChain, base: Vector, tips: Vector, roll: float | None = None) -> Reach:
+def best_reach(chain: SerialChain, base: Vector, tips: Vector, roll: float | None = None) -> ArmReach:
     """Return the best of all joint paths along `tips`, shape (poses, 4, 4), in the world.
 
     `base`: pose of the arm's base in the world, shape (4, 4). The shaft's roll begins nearest to `roll`
     (rad); without, the roll may begin a turn on or back.
     """
-    found = list[Reach]()
+    found = list[ArmReach]()
     turning = [joint.kind == "revolute" for joint in chain.joints]
-    for q in _two(chain, base, tips):
+    for q in _both_branches(chain, base, tips):
         q[:, turning] = np.unwrap(q[:, turning], axis=0)
         turns = _TURNS if roll is None else (2.0 * pi * round((roll - q[0, 3]) / (2.0 * pi)),)
-        found += [Reach(chain, _wound(q, turn)) for turn in turns]
+        found += [ArmReach(chain, _wind_roll(q, turn)) for turn in turns]
     return max(found, key=lambda each: each.margin)
 
 
@@ -90,12 +92,12 @@ def _free(chain: SerialChain, q: Vector) -> Vector:
     return free
 
 
-def _two(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
+def _both_branches(chain: SerialChain, base: Vector, tips: Vector) -> Vector:
     """Return the joint positions of both branches of an arm, shape (2, poses, 6)."""
     return branches(chain, inverse_transform(base) @ tips)[:2]
 
 
-def _wound(q: Vector, turn: float) -> Vector:
+def _wind_roll(q: Vector, turn: float) -> Vector:
     """Return joint positions, shape (poses, 6), with the shaft's roll a turn (rad) on."""
     wound = q.copy()
     wound[:, 3] += turn

@@ -10,19 +10,19 @@ from controllers.expert.hand import RobotHand
 from robots.dvrk.instruments import SHAFT_RADIUS
 from schemas.vectors import Vector
 
-__all__ = ["ROOM", "gap"]
+__all__ = ["ROOM", "instrument_gap"]
 
 ROOM = 2.0 * SHAFT_RADIUS + 1.6e-3
 """m: between the middles of two instruments, at least."""
 
 
-def gap(one: RobotHand, tips: Vector, other: RobotHand, others: Vector) -> Vector:
+def instrument_gap(one: RobotHand, tips: Vector, other: RobotHand, others: Vector) -> Vector:
     """Return the least distance of two instruments, shape (n,), with tips at poses of shape (n, 4, 4).
 
     An instrument is two lines: from the remote centre to the wrist, and on to the ends of the fingers.
     """
     pairs = product(_lines(one, tips), _lines(other, others))
-    return np.min([_distance(*a, *b) for a, b in pairs], axis=0)
+    return np.min([_segment_distance(*a, *b) for a, b in pairs], axis=0)
 
 
 def _lines(hand: RobotHand, tips: Vector) -> list[tuple[Vector, Vector]]:
@@ -31,7 +31,7 @@ def _lines(hand: RobotHand, tips: Vector) -> list[tuple[Vector, Vector]]:
     return [(centre, wrist), (wrist, wrist + hand.jaw.length * tips[:, :3, 2])]
 
 
-def _distance(p: Vector, p_end: Vector, q: Vector, q_end: Vector) -> Vector:
+def _segment_distance(p: Vector, p_end: Vector, q: Vector, q_end: Vector) -> Vector:
     """Return the distance of segments, ends of shape (n, 3), as (n,).
 
     Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.9; no segment here is a point.

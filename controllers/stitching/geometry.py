@@ -20,7 +20,7 @@ from robots.transform import matrix_to_pose
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Grip", "Stitch", "before", "grip_pose", "stitch_between"]
+__all__ = ["Grip", "Stitch", "approach_pose", "grip_pose", "stitch_between"]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Stitch:
         return float(np.mod(np.arctan2(x[1], x[0]) + self.needle.arc / 2.0, 2.0 * pi))
 
     @property
-    def out(self) -> float:
+    def base_out_angle(self) -> float:
         """Angle of the tip when the base has left the tissue, rad."""
         return self.exit + self.needle.arc
 
@@ -116,7 +116,7 @@ def grip_pose(grip: Grip, needle: NeedleShape, reach: float) -> Vector:
     return pose
 
 
-def before(tip: Vector, away: float) -> Vector:
+def approach_pose(tip: Vector, away: float) -> Vector:
     """Return a pose of the tip, shape (7,), `away` metres against the fingers from `tip`, shape (4, 4)."""
     pose = matrix_to_pose(tip)
     pose[:3] -= away * tip[:3, 2]

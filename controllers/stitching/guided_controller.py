@@ -125,7 +125,7 @@ class GuidedStitching(TwoHands):
                     yield f"refused: {error}"
 
     def _command(self) -> None:
-        surgeon, moves = self._surgeon, self._surgeon.moves
+        surgeon, moves = self._surgeon, self._surgeon.moves_arms
         for hand, settles in zip(self._hands, surgeon.settles, strict=True):
             self._outputs[f"{hand.arm}/servo_cp"] = (hand.advance(settle=settles),) if moves else ()
             self._outputs[f"{hand.arm}/jaw/move_jp"] = hand.jaw_commands() if moves else ()
@@ -139,13 +139,13 @@ class GuidedStitching(TwoHands):
         if seen.published < 0:
             said = [_FIRST_WORDS]
         if said:
-            markers.append(path_markers.banner(said[-1], self._camera, self._banner))
+            markers.append(path_markers.banner_marker(said[-1], self._camera, self._banner))
         if seen.picked != guided.picked or seen.published != stage:
             pose = params.phantom.pose
             for number, place in enumerate(guided.points):
                 there = (pose @ [*place, 1.0])[:3] if number < guided.picked else None
-                markers.append(path_markers.point(number, there))
+                markers.append(path_markers.point_marker(number, there))
             planned = stage is not Stage.PICKING and guided.picked == len(guided.points)
-            markers += path_markers.path(self._surgeon.stitch if planned else None, params.emerge)
+            markers += path_markers.path_markers(self._surgeon.stitch if planned else None, params.emerge)
         seen.picked, seen.published, seen.stage[0] = guided.picked, int(stage), stage
         self._outputs["markers"] = (MarkerArray(markers=markers),) if markers else ()

@@ -18,7 +18,7 @@ from controllers.expert.hand import RobotHand
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.handing import Handing
 from controllers.stitching.params import StitchParams
-from controllers.stitching.phase import Phase
+from controllers.stitching.phase import StitchPhase
 from controllers.stitching.plan import stitch_through
 from controllers.stitching.procedure import Procedure
 from controllers.stitching.stage import COMMANDS, Stage
@@ -77,7 +77,7 @@ class GuidedSurgeon(Procedure):
         return stitch_through(phantom.measures, phantom.pose, entry, leave, self._needle, "the stitch")
 
     @property
-    def moves(self) -> bool:
+    def moves_arms(self) -> bool:
         """Whether the procedure commands the arms in this step."""
         return self.guided.pace > 0.0
 
@@ -86,7 +86,7 @@ class GuidedSurgeon(Procedure):
         self._setpoints[:], self.led = setpoints, led
         if not self.guided.begun:
             self.guided.begun, self.state.park[:] = True, setpoints
-            self._enter(Phase.DONE)
+            self._enter(StitchPhase.DONE)
 
     def pick(self, point: Vector) -> None:
         """Store the next point, shape (3,), in the world: an entry, then an exit, then the next entry.
@@ -122,9 +122,9 @@ class GuidedSurgeon(Procedure):
             self.guided.picked = 0
             raise MotionError(f"{error}{hint}") from error
         self.guided.stage = Stage.PROPOSED
-        self._status.append(self._question(plan))
+        self._status.append(self._question_text(plan))
 
-    def _question(self, plan: WayOn) -> str:
+    def _question_text(self, plan: WayOn) -> str:
         """Return the question whether a person consents to a plan, with the plan's name."""
         who = self.hands[plan.exchanged].arm
         pulls, over = " and pulls" if plan.alone else "", _HANDED[len(plan.handed)]
@@ -140,7 +140,7 @@ class GuidedSurgeon(Procedure):
         """Start the proposal of this name. Raises MotionError if another proposal is valid now."""
         plan = self._way_on()
         if name != (proposed := self._name(plan)):
-            self._status.append(self._question(plan))  # what is shown last is the question
+            self._status.append(self._question_text(plan))  # what is shown last is the question
             raise MotionError(f"a consent to '{name:.40}', but '{proposed}' is proposed")
         self._go_on(plan)
 
@@ -175,7 +175,7 @@ class GuidedSurgeon(Procedure):
             raise MotionError(f"'{word}' is no command, allowed: {', '.join(COMMANDS)}")
         if guided.stage not in COMMANDS[word]:
             allowed = ", ".join(name for name, stages in COMMANDS.items() if guided.stage in stages)
-            raise MotionError(f"'{word}' while {_words(guided.stage)}, allowed: {allowed}")
+            raise MotionError(f"'{word}' while {_command_words(guided.stage)}, allowed: {allowed}")
         if word == "pause":
             self._stage(Stage.PAUSED)
         elif word == "take over":
@@ -183,7 +183,7 @@ class GuidedSurgeon(Procedure):
         elif word == "cancel":
             guided.picked = 0
             self.rejoin.give_up()
-            self._enter(Phase.DONE)
+            self._enter(StitchPhase.DONE)
             self._stage(Stage.PICKING)
         elif self.led:
             raise MotionError(f"'{word}' while a hand leads an arm: release it first")
@@ -201,7 +201,7 @@ class GuidedSurgeon(Procedure):
 
     def _stage(self, stage: Stage) -> None:
         self.guided.stage = stage
-        self._status.append(_words(stage))
+        self._status.append(_command_words(stage))
 
     @property
     def _is_where_it_paused(self) -> bool:
@@ -223,7 +223,7 @@ class GuidedSurgeon(Procedure):
             hands = (self.driver, self.puller)
             plan = way_on(params, *hands, stitch, state.needle, state.holder)
             return replace(plan, exchanged=self.handing.exchanged, alone=self.handing.alone)
-        plan = Handing(params, self.hands, stitch, state.needle, self._held, state.park).plan()
+        plan = Handing(params, self.hands, stitch, state.needle, self._present_hold, state.park).plan()
         if plan is None:
             super()._way_on()  # says which joint fails
             raise MotionError(
@@ -258,10 +258,10 @@ class GuidedSurgeon(Procedure):
 
     def _raise(self) -> None:
         """Let the puller hold the needle over the skin until the next stitch is picked."""
-        if self._arrived(self.puller):
+        if self._has_arrived(self.puller):
             self.state.made[0] += 1.0
             self.guided.picked = 0
-            self._enter(Phase.DONE)
+            self._enter(StitchPhase.DONE)
             self._stage(Stage.PICKING)
 
     def _recover(self, why: str) -> None:
@@ -271,8 +271,8 @@ class GuidedSurgeon(Procedure):
     def _fail(self, why: str) -> None:
         self.state.failed[0], self.guided.stage = 1.0, Stage.STOPPED
         self._status.append(f"stopped: {why}")
-        self._enter(Phase.FAILED)
+        self._enter(StitchPhase.FAILED)
 
 
-def _words(stage: Stage) -> str:
+def _command_words(stage: Stage) -> str:
     return stage.name.lower().replace("_", " ")

@@ -18,15 +18,15 @@ from math import pi, radians
 import numpy as np
 
 from controllers.expert.hand import RobotHand
-from controllers.stitching.feasibility import MARGIN, reach, room
-from controllers.stitching.gap import ROOM, gap
+from controllers.stitching.feasibility import MARGIN, best_reach, joint_room
+from controllers.stitching.gap import ROOM, instrument_gap
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.itinerary import Itinerary
 from controllers.stitching.params import StitchParams
-from controllers.stitching.phase import Phase
-from controllers.stitching.plan import BEFORE, driving, grips_of, pulling, require_room
+from controllers.stitching.phase import StitchPhase
+from controllers.stitching.plan import BEFORE, driving_poses, grips_of, pulling_poses, require_room
 from controllers.stitching.rejoin import BACK
-from controllers.stitching.way_on import HandOver, WayOn, raised
+from controllers.stitching.way_on import HandOver, WayOn, raise_needle
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -95,9 +95,9 @@ class Handing:
     ) -> None:
         self._params, self._hands, self._stitch = params, hands, stitch
         self._needle, self._held, self._rests = needle, held, rests
-        self._drive = np.array(driving(stitch, params.emerge, params.lift))
-        self._pull = np.array(pulling(stitch, params.emerge, params.lift))
-        self._up = raised(params, needle)
+        self._drive = np.array(driving_poses(stitch, params.emerge, params.lift))
+        self._pull = np.array(pulling_poses(stitch, params.emerge, params.lift))
+        self._up = raise_needle(params, needle)
         self._rooms = dict[Hold, Vector]()
         self._meetings = dict[tuple[Hold, Hold], Vector]()
         self._places = _places(stitch, params)
@@ -106,7 +106,7 @@ class Handing:
         """Return how the stitch is made; None if there is no way."""
         for alone in (False, True):
             goals = self._goals(alone=alone)
-            for way in (self._in_hand, self._once, self._twice):
+            for way in (self._in_hand, self._one_handover, self._two_handovers):
                 if (found := way(goals)) is not None:
                     return found
         return None
@@ -117,18 +117,18 @@ class Handing:
         require_room(params.grip, stitch, params.emerge)
         for exchanged, driver in enumerate(self._hands):
             puller = driver if alone else self._hands[1 - exchanged]
-            grips = _grips(puller, params.taken, stitch)
+            grips = _four_grips(puller, params.taken, stitch)
             taken = tuple(grip for grip in grips if _margin(puller, grip, self._pull) >= MARGIN)
-            for hold in self._drivers(driver) if taken else ():
+            for hold in self._driver_holds(driver) if taken else ():
                 margin = _margin(driver, hold.grip, self._drive)
                 if margin >= MARGIN:
                     found.append(_Goal(hold, puller, taken, margin, bool(exchanged), alone))
         return sorted(found, key=lambda goal: -goal.margin)
 
-    def _drivers(self, driver: RobotHand) -> list[Hold]:
+    def _driver_holds(self, driver: RobotHand) -> list[Hold]:
         """Return the holds of a driving hand: the present hold, or the hold of the parameters."""
         params, stitch, held = self._params, self._stitch, self._held
-        holds = [Hold(driver, grip, params.grip) for grip in _grips(driver, params.grip, stitch)]
+        holds = [Hold(driver, grip, params.grip) for grip in _four_grips(driver, params.grip, stitch)]
         if held is not None and held.hand is driver:
             with suppress(MotionError):
                 require_room(held.behind, stitch, params.emerge)
@@ -155,7 +155,7 @@ class Handing:
         return [
             Hold(hand, grip, behind)
             for hand, behind in product(self._hands, angles)
-            for grip in _grips(hand, behind, self._stitch)
+            for grip in _four_grips(hand, behind, self._stitch)
         ]
 
     def _in_hand(self, goals: Sequence[_Goal]) -> WayOn | None:
@@ -166,27 +166,27 @@ class Handing:
                 return found
         return None
 
-    def _once(self, goals: Sequence[_Goal]) -> WayOn | None:
+    def _one_handover(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way with a single hand-over."""
-        return self._best(((start, goal.driver), goal) for goal in goals for start in self._starts)
+        return self._best_way(((start, goal.driver), goal) for goal in goals for start in self._starts)
 
-    def _twice(self, goals: Sequence[_Goal]) -> WayOn | None:
+    def _two_handovers(self, goals: Sequence[_Goal]) -> WayOn | None:
         """Return the best way by the second hand and back."""
-        return self._best(
+        return self._best_way(
             ((start, between, goal.driver), goal)
             for goal in goals
             for start in self._starts
             for between in self._holds
         )
 
-    def _best(self, chains: Iterator[tuple[Sequence[Hold], _Goal]]) -> WayOn | None:
+    def _best_way(self, chains: Iterator[tuple[Sequence[Hold], _Goal]]) -> WayOn | None:
         """Return the first way, in the order of the room at the hand-over, feasible throughout."""
         scored = list[tuple[float, Sequence[Hold], list[int], _Goal]]()
         for holds, goal in chains:
             pairs = list(pairwise(holds))
             if not all(_can_meet(*pair) for pair in pairs):
                 continue
-            rooms = [self._meeting(giver, taker) for giver, taker in pairs]
+            rooms = [self._meeting_room(giver, taker) for giver, taker in pairs]
             at = [int(each.argmax()) for each in rooms]
             margin = min(goal.margin, *(float(each[i]) for each, i in zip(rooms, at, strict=True)))
             if margin >= MARGIN:
@@ -197,24 +197,24 @@ class Handing:
                 return found
         return None
 
-    def _room(self, hold: Hold) -> Vector:
+    def _place_room(self, hold: Hold) -> Vector:
         """Return the free share of the joints' ranges at each place for a hand-over, shape (n,)."""
         if hold not in self._rooms:
             tips = self._places @ hold.grip
             away = tips.copy()
             away[:, :3, 3] -= BACK * tips[:, :3, 2]
             chain, base = hold.hand.chain, hold.hand.base
-            self._rooms[hold] = np.minimum(room(chain, base, tips), room(chain, base, away))
+            self._rooms[hold] = np.minimum(joint_room(chain, base, tips), joint_room(chain, base, away))
         return self._rooms[hold]
 
-    def _meeting(self, giver: Hold, taker: Hold) -> Vector:
+    def _meeting_room(self, giver: Hold, taker: Hold) -> Vector:
         """Return the lesser room of both at each place, shape (n,); -1 where the instruments would meet."""
         key = giver, taker
         if key not in self._meetings:
-            rooms = np.minimum(self._room(giver), self._room(taker))
+            rooms = np.minimum(self._place_room(giver), self._place_room(taker))
             at = np.flatnonzero(rooms >= 0.0)
             there = self._places[at]
-            gaps = gap(giver.hand, there @ giver.grip, taker.hand, there @ taker.grip)
+            gaps = instrument_gap(giver.hand, there @ giver.grip, taker.hand, there @ taker.grip)
             rooms[at[gaps < ROOM]] = -1.0
             self._meetings[key] = rooms
         return self._meetings[key]
@@ -225,11 +225,11 @@ class Handing:
         rests = dict(zip(self._hands, self._rests, strict=True))
         first, driver = holds[0], goal.driver
         if self._held is None:
-            going[first.hand].take(self._needle, first.grip)
+            going[first.hand].take_hold(self._needle, first.grip)
             going[first.hand].lead(self._up, first.grip)
         for giver, taker, needle in zip(holds, holds[1:], needles, strict=False):
             going[giver.hand].lead(needle, giver.grip)
-            going[taker.hand].take(needle, taker.grip)
+            going[taker.hand].take_hold(needle, taker.grip)
             going[giver.hand].leave(rests[giver.hand])
         going[driver.hand].lead(self._drive[0], driver.grip)
         going[driver.hand].follow(self._drive[1:], driver.grip)
@@ -242,7 +242,7 @@ class Handing:
             if not (goal.alone or self._can_take_out(driver, goal.puller, grip)):
                 continue
             pulling = going[goal.puller].copy()
-            pulling.take(self._drive[-1], grip)
+            pulling.take_hold(self._drive[-1], grip)
             pulling.follow(self._pull, grip)
             margin = min(at_least, pulling.margin)
             if margin >= MARGIN:
@@ -252,7 +252,7 @@ class Handing:
     def _can_take_out(self, driver: Hold, puller: RobotHand, grip: Vector) -> bool:
         """Return whether the puller can take the needle after its exit, beside the driver."""
         end = self._drive[-1:]
-        return bool(gap(driver.hand, end @ driver.grip, puller, end @ grip)[0] >= ROOM)
+        return bool(instrument_gap(driver.hand, end @ driver.grip, puller, end @ grip)[0] >= ROOM)
 
     def _is_clear(self, going: dict[RobotHand, Itinerary]) -> bool:
         """Return whether each hand with the needle keeps away from the resting place of the second hand."""
@@ -271,9 +271,9 @@ class Handing:
     ) -> WayOn:
         handed = tuple(HandOver(needle, taker.grip) for needle, taker in zip(needles, takers, strict=True))
         if self._held is None:
-            phase, holder, where = Phase.HOVER, None, self._needle
+            phase, holder, where = StitchPhase.HOVER, None, self._needle
         else:
-            phase, holder = Phase.PRESENT if handed else Phase.LIFT, self._held.hand
+            phase, holder = StitchPhase.PRESENT if handed else StitchPhase.LIFT, self._held.hand
             where = needles[0] if handed else self._up
         return WayOn(
             phase,
@@ -290,13 +290,13 @@ class Handing:
         )
 
 
-def _grips(hand: RobotHand, behind: float, stitch: Stitch) -> list[Vector]:
+def _four_grips(hand: RobotHand, behind: float, stitch: Stitch) -> list[Vector]:
     """Return all four holds of the needle `behind` its tip (rad)."""
     return [grip for side in (False, True) for grip in grips_of(hand, behind, stitch.needle, backwards=side)]
 
 
 def _margin(hand: RobotHand, grip: Vector, needles: Vector) -> float:
-    return reach(hand.chain, hand.base, needles @ grip).margin
+    return best_reach(hand.chain, hand.base, needles @ grip).margin
 
 
 def _can_meet(giver: Hold, taker: Hold) -> bool:

@@ -11,8 +11,8 @@ from math import ceil
 import numpy as np
 
 from controllers.expert.hand import RobotHand
-from controllers.stitching.feasibility import reach
-from controllers.stitching.geometry import before
+from controllers.stitching.feasibility import best_reach
+from controllers.stitching.geometry import approach_pose
 from controllers.stitching.rejoin import BACK
 from robots import rotation
 from robots.transform import inverse_transform, pose_to_matrix
@@ -51,21 +51,21 @@ class Itinerary:
         """Lead the needle through poses, shape (n, 4, 4), near to each other."""
         self._tips.append(needles @ grip)
 
-    def take(self, needle: Vector, grip: Vector) -> None:
+    def take_hold(self, needle: Vector, grip: Vector) -> None:
         """Come along the fingers, and take the needle."""
-        self.go(_away(needle @ grip))
+        self.go(_retreat_pose(needle @ grip))
         self.go(needle @ grip)
 
     def leave(self, rest: Vector | None = None) -> None:
         """Go back along the fingers, and to the resting pose, shape (7,)."""
-        self.go(_away(self._tips[-1][-1]))
+        self.go(_retreat_pose(self._tips[-1][-1]))
         if rest is not None:
             self.go(pose_to_matrix(rest))
 
     @property
     def margin(self) -> float:
         """Least share of half a joint's range left; below 0 the joints cannot follow."""
-        return reach(self.hand.chain, self.hand.base, np.concatenate(self._tips), self.hand.roll).margin
+        return best_reach(self.hand.chain, self.hand.base, np.concatenate(self._tips), self.hand.roll).margin
 
     def distance(self, place: Vector) -> float:
         """Return how near tip or needle come to a place, shape (3,), while the needle is carried."""
@@ -75,9 +75,9 @@ class Itinerary:
         return min((float(np.linalg.norm(way - place, axis=1).min()) for way in ways), default=np.inf)
 
 
-def _away(tip: Vector) -> Vector:
+def _retreat_pose(tip: Vector) -> Vector:
     """Return the pose (4, 4) of a tip on approach to `tip` and on retreat."""
-    return pose_to_matrix(before(tip, BACK))
+    return pose_to_matrix(approach_pose(tip, BACK))
 
 
 def _line(a: Vector, b: Vector) -> Vector:

@@ -24,7 +24,7 @@ _PATIENCE = 10.0
 """s there without knowing where the tip is."""
 
 
-class Going(IntEnum):
+class LookingPhase(IntEnum):
     """Motion of the hand at work."""
 
     NOWHERE = 0
@@ -37,7 +37,7 @@ class LookingState(Record):
 
     at_work = integer()
     """Number of the hand."""
-    going = choice(Going.NOWHERE)
+    going = choice(LookingPhase.NOWHERE)
     waited = number()
     """Time in view, s."""
     back = array(7)
@@ -59,24 +59,24 @@ class Looking:
         Raises MotionError if a tip is not seen in time.
         """
         state = self.state
-        while state.going is Going.NOWHERE:
+        while state.going is LookingPhase.NOWHERE:
             if state.at_work == len(self._hands):
                 return True
             if not self._sights[state.at_work].is_known:
                 state.back[:] = self._hands[state.at_work].measured
                 goal = np.concatenate([self._over, state.back[3:]])
-                self._send(goal, Going.INTO_VIEW)
+                self._send(goal, LookingPhase.INTO_VIEW)
                 return False
             state.at_work += 1
         hand = self._hands[state.at_work]
         if not hand.has_arrived:
             return False
-        if state.going is Going.BACK:
-            state.going = Going.NOWHERE
+        if state.going is LookingPhase.BACK:
+            state.going = LookingPhase.NOWHERE
             return False
         state.waited += hand.period
         if self._sights[state.at_work].is_known:
-            self._send(state.back, Going.BACK)
+            self._send(state.back, LookingPhase.BACK)
         elif state.waited > _PATIENCE:
             raise MotionError(
                 f"{hand.arm} has been over the pad for {_PATIENCE:.0f} s, and no tracker has shown well"
@@ -84,7 +84,7 @@ class Looking:
             )
         return False
 
-    def _send(self, goal: Vector, going: Going) -> None:
+    def _send(self, goal: Vector, going: LookingPhase) -> None:
         hand = self._hands[self.state.at_work]
         hand.stay()
         hand.go(goal)

@@ -47,7 +47,7 @@ class StitchParams(Params):
 
     @model_validator(mode="after")
     def _is_a_scene(self) -> Self:
-        if missing := [arm for arm in (self.driver, self.puller) if arm not in self.arms.driven]:
+        if missing := [arm for arm in (self.driver, self.puller) if arm not in self.arms.present_arms]:
             raise ValueError(f"{', '.join(missing)} is no arm of the scene")
         if self.driver == self.puller:
             raise ValueError(f"driver and puller are both {self.driver}; a stitch needs two hands")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from controllers.expert.hand import RobotHand
-from controllers.stitching.phase import Phase
+from controllers.stitching.phase import StitchPhase
 from controllers.stitching.way_on import WayOn
 from hub.participant import Record, array, choice, flag, integer, number
 
@@ -13,7 +13,7 @@ __all__ = ["HandingState", "Parts", "ProcedureState"]
 class ProcedureState(Record):
     """Everything in the procedure that changes."""
 
-    phase = choice(Phase.BEGIN)
+    phase = choice(StitchPhase.BEGIN)
     stitch = integer(1)
     """Number of the pair of holes at work."""
     attempts = integer()
@@ -22,7 +22,7 @@ class ProcedureState(Record):
     """Recoveries from a lost needle in this stitch."""
     free = flag()
     """Whether no jaw is to hold the needle, though a hand holds the needle in this phase."""
-    picked_for = choice(Phase.LIFT)
+    picked_for = choice(StitchPhase.LIFT)
     """Phase after the driver has taken the needle up."""
     waited = number()
     """s since the hand at work has arrived."""
@@ -79,20 +79,20 @@ class Parts:
     @property
     def puller(self) -> RobotHand:
         """The pulling hand."""
-        return self.driver if self.handing.alone else self._other(self.driver)
+        return self.driver if self.handing.alone else self._second_hand(self.driver)
 
     @property
     def settles(self) -> tuple[bool, bool]:
         """Whether the tips of the hands are to be brought exactly to their goals."""
         phase = self.state.phase
-        if phase in (Phase.HOVER, Phase.DESCEND):
+        if phase in (StitchPhase.HOVER, StitchPhase.DESCEND):
             at_work = self._picker
-        elif phase in (Phase.ALIGN, Phase.DRIVE):
+        elif phase in (StitchPhase.ALIGN, StitchPhase.DRIVE):
             at_work = self.driver
-        elif phase in (Phase.COME, Phase.TAKE, Phase.COME_BACK, Phase.TAKE_BACK):
-            at_work = self._taker
+        elif phase in (StitchPhase.COME, StitchPhase.TAKE, StitchPhase.COME_BACK, StitchPhase.TAKE_BACK):
+            at_work = self._next_taker
         else:
-            at_work = self.puller if phase is Phase.PULL else None
+            at_work = self.puller if phase is StitchPhase.PULL else None
         return self.hands[0] is at_work, self.hands[1] is at_work
 
     @property
@@ -100,29 +100,29 @@ class Parts:
         phase = self.state.phase
         if self.state.free:
             return None
-        if phase is Phase.LIFT:
+        if phase is StitchPhase.LIFT:
             return self._picker
-        if phase is Phase.LEAVE_BACK:
-            return self._taker
-        if Phase.PRESENT <= phase <= Phase.HOLD_BACK:
+        if phase is StitchPhase.LEAVE_BACK:
+            return self._next_taker
+        if StitchPhase.PRESENT <= phase <= StitchPhase.HOLD_BACK:
             return self._giver
-        if Phase.APPROACH <= phase <= Phase.HOLD:
+        if StitchPhase.APPROACH <= phase <= StitchPhase.HOLD:
             return self.driver
-        return self.puller if Phase.LEAVE <= phase <= Phase.RAISE else None
+        return self.puller if StitchPhase.LEAVE <= phase <= StitchPhase.RAISE else None
 
     @property
-    def _taker(self) -> RobotHand:
+    def _next_taker(self) -> RobotHand:
         """The next taker of the needle."""
-        if self.handing.pending or Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK:
-            return self._other(self.driver) if self.handing.left % 2 else self.driver
+        if self.handing.pending or StitchPhase.PRESENT <= self.state.phase <= StitchPhase.LEAVE_BACK:
+            return self._second_hand(self.driver) if self.handing.left % 2 else self.driver
         return self.puller
 
     @property
     def _giver(self) -> RobotHand:
         """The giving hand."""
-        return self._other(self._taker)
+        return self._second_hand(self._next_taker)
 
-    def _other(self, hand: RobotHand) -> RobotHand:
+    def _second_hand(self, hand: RobotHand) -> RobotHand:
         return self.hands[hand is self.hands[0]]
 
     @property
@@ -135,7 +135,7 @@ class Parts:
         handing, handed = self.handing, plan.handed
         handing.exchanged, handing.alone = plan.exchanged, plan.alone
         handing.left = max(0, len(handed) - 1)
-        handing.pending = bool(handed) and plan.phase is Phase.HOVER
+        handing.pending = bool(handed) and plan.phase is StitchPhase.HOVER
         for i, each in enumerate(reversed(handed)):
             handing.needles[i] = each.needle
         if len(handed) > 1:

@@ -18,7 +18,7 @@ from schemas.ros import Header, Point, Pose, Quaternion, Vector3
 from schemas.vectors import Vector
 from schemas.visualization import ColorRGBA, Marker, MarkerAction, MarkerType
 
-__all__ = ["banner", "path", "point"]
+__all__ = ["banner_marker", "path_markers", "point_marker"]
 
 _NAMESPACE = "stitch"
 _BLUE, _RED = ColorRGBA(b=1.0, a=1.0), ColorRGBA(r=1.0, a=1.0)
@@ -32,12 +32,12 @@ _LINES = 24
 """Lines of the path."""
 
 
-def point(number: int, place: Vector | None) -> Marker:
+def point_marker(number: int, place: Vector | None) -> Marker:
     """Return the entry (0) or the exit (1) at `place`, shape (3,), or a deletion."""
     if place is None:
-        return _marker(("entry", "exit")[number], action=MarkerAction.DELETE)
+        return _create_marker(("entry", "exit")[number], action=MarkerAction.DELETE)
     x, y, z = place.tolist()
-    return _marker(
+    return _create_marker(
         ("entry", "exit")[number],
         type=MarkerType.SPHERE,
         pose=Pose(position=Point(x=x, y=y, z=z)),
@@ -46,17 +46,17 @@ def point(number: int, place: Vector | None) -> Marker:
     )
 
 
-def path(stitch: Stitch | None, emerge: float) -> Iterator[Marker]:
+def path_markers(stitch: Stitch | None, emerge: float) -> Iterator[Marker]:
     """Yield the way of the tip until the take-over and the needle's plane, or their deletion."""
     if stitch is None:
-        yield from (_marker(name, action=MarkerAction.DELETE) for name in ("path", "disc"))
+        yield from (_create_marker(name, action=MarkerAction.DELETE) for name in ("path", "disc"))
         return
     tip = np.append(stitch.needle.marks[2], 1.0)
     way = [
         (stitch.pose(float(angle)) @ tip)[:3].tolist()
         for angle in np.linspace(stitch.entry - BEFORE, stitch.exit + emerge, _LINES + 1)
     ]
-    yield _marker(
+    yield _create_marker(
         "path",
         type=MarkerType.LINE_STRIP,
         scale=Vector3(x=_LINE),
@@ -66,7 +66,7 @@ def path(stitch: Stitch | None, emerge: float) -> Iterator[Marker]:
     x, y, z = stitch.centre.tolist()
     i, j, k, w = rotation.from_matrix(stitch.axes).tolist()
     across = 2.0 * stitch.needle.radius
-    yield _marker(
+    yield _create_marker(
         "disc",
         type=MarkerType.CYLINDER,
         pose=Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=i, y=j, z=k, w=w)),
@@ -75,10 +75,10 @@ def path(stitch: Stitch | None, emerge: float) -> Iterator[Marker]:
     )
 
 
-def banner(text: str, camera: str, place: tuple[float, float, float]) -> Marker:
+def banner_marker(text: str, camera: str, place: tuple[float, float, float]) -> Marker:
     """Return the words in the picture, at `place` in the left camera's optical frame."""
     x, y, z = place
-    return _marker(
+    return _create_marker(
         "banner",
         frame=f"{camera}_left_optical",
         type=MarkerType.TEXT_VIEW_FACING,
@@ -89,7 +89,7 @@ def banner(text: str, camera: str, place: tuple[float, float, float]) -> Marker:
     )
 
 
-def _marker(name: str, frame: str = WORLD_FRAME, **fields: object) -> Marker:
+def _create_marker(name: str, frame: str = WORLD_FRAME, **fields: object) -> Marker:
     return Marker.model_validate(
         {"header": Header(frame_id=frame), "ns": f"{_NAMESPACE}/{name}", "frame_locked": True} | fields
     )

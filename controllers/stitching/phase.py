@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["Phase"]
+__all__ = ["StitchPhase"]
 
 
-class Phase(IntEnum):
+class StitchPhase(IntEnum):
     """Phases of a session; a stitch is from APPROACH to PULL."""
 
     BEGIN = 0

@@ -9,7 +9,7 @@ from math import ceil, radians
 import numpy as np
 
 from controllers.expert.hand import RobotHand
-from controllers.stitching.feasibility import Reach, reach
+from controllers.stitching.feasibility import ArmReach, best_reach
 from controllers.stitching.geometry import Grip, Stitch, grip_pose, stitch_between
 from robots.training.needles import NeedleShape
 from robots.training.phantoms import Phantom
@@ -20,13 +20,13 @@ __all__ = [
     "BEFORE",
     "BEYOND",
     "DEEP",
-    "Plan",
+    "GripPlan",
     "best_grip",
-    "driving",
+    "driving_poses",
     "grips_of",
     "make_plan",
     "make_stitch",
-    "pulling",
+    "pulling_poses",
     "require_room",
     "stitch_through",
 ]
@@ -39,7 +39,7 @@ _STEP = radians(5.0)
 
 
 @dataclass(frozen=True)
-class Plan:
+class GripPlan:
     """How the hands hold the needle, as poses of their tips in the needle's frame, shape (4, 4)."""
 
     driver: Vector
@@ -91,7 +91,7 @@ def make_plan(
     taken: float,
     emerge: float,
     lift: float,
-) -> Plan:
+) -> GripPlan:
     """Return the holds for a needle at `start` (4, 4), with the angles of the parameters.
 
     Raises MotionError if no grip will do, with the joint that fails.
@@ -102,13 +102,13 @@ def make_plan(
     raised[:3, 3] -= lift * start[:3, 2]
     best = list[tuple[Vector, float]]()
     for hand, behind, ways in (
-        (driver, held, [[raised, start], *(driving(stitch, emerge, lift) for stitch in stitches)]),
-        (puller, taken, [pulling(stitch, emerge, lift) for stitch in stitches]),
+        (driver, held, [[raised, start], *(driving_poses(stitch, emerge, lift) for stitch in stitches)]),
+        (puller, taken, [pulling_poses(stitch, emerge, lift) for stitch in stitches]),
     ):
         grip, worst, way = best_grip(hand, grips_of(hand, behind, needle), ways)
         _require(hand, worst, way - (hand is driver))
         best.append((grip, worst.margin))
-    return Plan(best[0][0], best[1][0], min(margin for _, margin in best))
+    return GripPlan(best[0][0], best[1][0], min(margin for _, margin in best))
 
 
 def require_room(held: float, stitch: Stitch, emerge: float) -> None:
@@ -123,43 +123,43 @@ def require_room(held: float, stitch: Stitch, emerge: float) -> None:
 
 
 def grips_of(hand: RobotHand, behind: float, needle: NeedleShape, *, backwards: bool = False) -> list[Vector]:
-    """Return both holds of the needle `behind` its tip (rad), as in a `Plan`, from the same side."""
+    """Return both holds of the needle `behind` its tip (rad), as in a `GripPlan`, from the same side."""
     length = hand.jaw.length - DEEP
     return [grip_pose(Grip(behind, side, backwards), needle, length) for side in (False, True)]
 
 
 def best_grip(
     hand: RobotHand, grips: Sequence[Vector], ways: Sequence[Sequence[Vector]]
-) -> tuple[Vector, Reach, int]:
+) -> tuple[Vector, ArmReach, int]:
     """Return the grip with the most room on its worst way, the reach on that way, and the grip's number."""
-    found = [[reach(hand.chain, hand.base, np.array(way) @ grip) for way in ways] for grip in grips]
+    found = [[best_reach(hand.chain, hand.base, np.array(way) @ grip) for way in ways] for grip in grips]
     worst = [min(each, key=lambda one: one.margin) for each in found]
     chosen = max(range(len(grips)), key=lambda i: worst[i].margin)
     return grips[chosen], worst[chosen], found[chosen].index(worst[chosen])
 
 
-def driving(stitch: Stitch, emerge: float, lift: float, start: float | None = None) -> list[Vector]:
+def driving_poses(stitch: Stitch, emerge: float, lift: float, start: float | None = None) -> list[Vector]:
     """Return poses of the needle (4, 4) from over the skin, or from `start` (rad), to the take-over."""
     end = stitch.exit + emerge
     if start is not None:
-        return [stitch.pose(angle) for angle in _angles(min(start, end), end)]
-    angles = _angles(stitch.entry - BEFORE, end)
+        return [stitch.pose(angle) for angle in _path_angles(min(start, end), end)]
+    angles = _path_angles(stitch.entry - BEFORE, end)
     return [stitch.pose(angles[0], lift), *(stitch.pose(angle) for angle in angles)]
 
 
-def pulling(stitch: Stitch, emerge: float, lift: float, start: float | None = None) -> list[Vector]:
+def pulling_poses(stitch: Stitch, emerge: float, lift: float, start: float | None = None) -> list[Vector]:
     """Return poses of the needle (4, 4) from the take-over, or `start`, until out and raised."""
-    end = stitch.out + BEYOND
-    angles = _angles(stitch.exit + emerge if start is None else min(start, end), end)
+    end = stitch.base_out_angle + BEYOND
+    angles = _path_angles(stitch.exit + emerge if start is None else min(start, end), end)
     return [*(stitch.pose(angle) for angle in angles), stitch.pose(angles[-1], lift)]
 
 
-def _angles(start: float, end: float) -> list[float]:
+def _path_angles(start: float, end: float) -> list[float]:
     angles: list[float] = np.linspace(start, end, ceil((end - start) / _STEP) + 1).tolist()
     return angles
 
 
-def _require(hand: RobotHand, found: Reach, way: int) -> None:
-    if problem := found.problem:
+def _require(hand: RobotHand, found: ArmReach, way: int) -> None:
+    if problem := found.failure_reason:
         what = "the needle cannot be picked up" if way < 0 else f"stitch {way + 1} of these is not feasible"
         raise MotionError(f"{what}: of {hand.arm}, {problem}")

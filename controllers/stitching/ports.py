@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from controllers.expert.hand import RobotHand
 from controllers.expert.ports import hand_ports
 from controllers.ports import measured_joints
-from controllers.stitching.phase import Phase
+from controllers.stitching.phase import StitchPhase
 from hub.participant import event_in, event_out, signal_in, signal_out
 from robots.dvrk import crtk
 from schemas.ports import Port
@@ -21,7 +21,7 @@ from schemas.ros import (
 __all__ = ["stitching_ports"]
 
 _NUMBERS = (
-    ("phase", "", ", ".join(f"{phase:d} {phase.name.lower()}" for phase in Phase)),
+    ("phase", "", ", ".join(f"{phase:d} {phase.name.lower()}" for phase in StitchPhase)),
     ("stitch", "", "number of the pair of holes at work"),
     ("made", "", "how many stitches are made"),
     ("angle", "rad", "of the needle's tip on its way: 0 towards the side it comes from, a quarter turn down"),

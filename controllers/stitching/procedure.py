@@ -14,13 +14,13 @@ from math import radians
 import numpy as np
 
 from controllers.expert.hand import RobotHand
-from controllers.stitching.feasibility import reach
-from controllers.stitching.geometry import Stitch, before
+from controllers.stitching.feasibility import best_reach
+from controllers.stitching.geometry import Stitch, approach_pose
 from controllers.stitching.handing import Hold
 from controllers.stitching.params import StitchParams
 from controllers.stitching.parts import Parts
-from controllers.stitching.phase import Phase
-from controllers.stitching.plan import BEFORE, BEYOND, driving
+from controllers.stitching.phase import StitchPhase
+from controllers.stitching.plan import BEFORE, BEYOND, driving_poses
 from controllers.stitching.rejoin import BACK, OPEN, OPENED, SHUT, Rejoin
 from controllers.stitching.way_on import WayOn, behind_tip, way_on
 from robots import rotation
@@ -60,32 +60,32 @@ class Procedure(Parts, ABC):
         self.rejoin = Rejoin(driver, puller)
         self._needle = params.needle[1].shape
         self._status: list[str] = []
-        self._steps: dict[Phase, Callable[[], None]] = {
-            Phase.BEGIN: self._begin,
-            Phase.HOVER: self._hover,
-            Phase.DESCEND: self._descend,
-            Phase.CLOSE: self._close,
-            Phase.LIFT: self._lift,
-            Phase.APPROACH: self._approach,
-            Phase.ALIGN: self._align,
-            Phase.DRIVE: self._drive,
-            Phase.COME: lambda: self._come(Phase.TAKE),
-            Phase.TAKE: lambda: self._take(Phase.HOLD),
-            Phase.HOLD: lambda: self._hold(Phase.RELEASE),
-            Phase.RELEASE: lambda: self._release(Phase.LEAVE),
-            Phase.LEAVE: self._leave,
-            Phase.PULL: self._pull,
-            Phase.RAISE: self._raise,
-            Phase.PRESENT: self._present,
-            Phase.COME_BACK: lambda: self._come(Phase.TAKE_BACK),
-            Phase.TAKE_BACK: lambda: self._take(Phase.HOLD_BACK),
-            Phase.HOLD_BACK: lambda: self._hold(Phase.RELEASE_BACK),
-            Phase.RELEASE_BACK: lambda: self._release(Phase.LEAVE_BACK),
-            Phase.LEAVE_BACK: self._leave_back,
-            Phase.LET_GO: self._let_go,
-            Phase.STEP_BACK: self._step_back,
-            Phase.DONE: lambda: None,
-            Phase.FAILED: lambda: None,
+        self._steps: dict[StitchPhase, Callable[[], None]] = {
+            StitchPhase.BEGIN: self._begin,
+            StitchPhase.HOVER: self._hover,
+            StitchPhase.DESCEND: self._descend,
+            StitchPhase.CLOSE: self._close,
+            StitchPhase.LIFT: self._lift,
+            StitchPhase.APPROACH: self._approach,
+            StitchPhase.ALIGN: self._align,
+            StitchPhase.DRIVE: self._drive,
+            StitchPhase.COME: lambda: self._come(StitchPhase.TAKE),
+            StitchPhase.TAKE: lambda: self._take_over(StitchPhase.HOLD),
+            StitchPhase.HOLD: lambda: self._hold(StitchPhase.RELEASE),
+            StitchPhase.RELEASE: lambda: self._release(StitchPhase.LEAVE),
+            StitchPhase.LEAVE: self._leave,
+            StitchPhase.PULL: self._pull,
+            StitchPhase.RAISE: self._raise,
+            StitchPhase.PRESENT: self._present,
+            StitchPhase.COME_BACK: lambda: self._come(StitchPhase.TAKE_BACK),
+            StitchPhase.TAKE_BACK: lambda: self._take_over(StitchPhase.HOLD_BACK),
+            StitchPhase.HOLD_BACK: lambda: self._hold(StitchPhase.RELEASE_BACK),
+            StitchPhase.RELEASE_BACK: lambda: self._release(StitchPhase.LEAVE_BACK),
+            StitchPhase.LEAVE_BACK: self._leave_back,
+            StitchPhase.LET_GO: self._let_go,
+            StitchPhase.STEP_BACK: self._step_back,
+            StitchPhase.DONE: lambda: None,
+            StitchPhase.FAILED: lambda: None,
         }
 
     @property
@@ -133,7 +133,7 @@ class Procedure(Parts, ABC):
         return way_on(self.params, *self.hands, self.stitch, self.state.needle, self.state.holder)
 
     @property
-    def _held(self) -> Hold | None:
+    def _present_hold(self) -> Hold | None:
         """The holding hand and its grip. Raises MotionError for a hand of another part."""
         for hand in self.hands:
             if hand.number == self.state.holder:
@@ -151,9 +151,9 @@ class Procedure(Parts, ABC):
         state.angle[0], state.attempts, state.failed[0] = plan.angle, 0, 0.0
         state.picked_for, state.free = plan.picked_for, plan.holder is None
         if plan.holder is not None:
-            self._grasped(plan.holder)
+            self._learn_grasp(plan.holder)
         self.rejoin.begin(plan, state.grip, state.park)
-        self._enter(Phase.BEGIN)
+        self._enter(StitchPhase.BEGIN)
 
     def _come_back(self) -> None:
         """Let the hands go on to where the stitch goes on."""
@@ -180,7 +180,7 @@ class Procedure(Parts, ABC):
         turn = rotation.log(rotation.from_matrix(now[:3, :3] @ state.grip[:3, :3].T))
         state.grip[:3, :3] = rotation.matrix(rotation.exp(share * turn)) @ state.grip[:3, :3]
 
-    def _enter(self, phase: Phase) -> None:
+    def _enter(self, phase: StitchPhase) -> None:
         self.state.phase, self.state.waited = phase, 0.0
 
     def _fail(self, why: str) -> None:
@@ -188,9 +188,9 @@ class Procedure(Parts, ABC):
         self.state.failed[0] = 1.0
         for hand in (self.driver, self.puller):
             hand.stay()
-        self._enter(Phase.FAILED)
+        self._enter(StitchPhase.FAILED)
 
-    def _arrived(self, hand: RobotHand, within: float | None = None) -> bool:
+    def _has_arrived(self, hand: RobotHand, within: float | None = None) -> bool:
         """Return whether a hand is at its goal, as near as possible."""
         if not hand.has_arrived:
             return False
@@ -201,7 +201,7 @@ class Procedure(Parts, ABC):
         """Send a hand, on a line, so that its needle comes to a pose, shape (4, 4)."""
         hand.go(matrix_to_pose(needle @ self.state.grip), share)
 
-    def _track(self, hand: RobotHand, angle: float) -> None:
+    def _track_angle(self, hand: RobotHand, angle: float) -> None:
         """Bring the needle to an angle of the way, at once."""
         state, wanted = self.state, self.stitch.pose(angle)
         goal = matrix_to_pose(wanted @ state.grip)
@@ -212,32 +212,32 @@ class Procedure(Parts, ABC):
         off = marks @ (state.needle[:3, :3] - wanted[:3, :3]).T + state.needle[:3, 3] - wanted[:3, 3]
         state.deviation[0] = float(np.sqrt((off * off).sum(axis=1).max()))
 
-    def _pick(self, away: float) -> Vector:
+    def _pick_pose(self, away: float) -> Vector:
         """Return the tip's pose, shape (7,), for picking the needle up, or so far before."""
         grip = self.handing.pick if self.handing.pending else self.state.planned[0]
-        return before(self.state.needle @ grip, away)
+        return approach_pose(self.state.needle @ grip, away)
 
     def _hover(self) -> None:
         hand = self._picker
-        if self._arrived(hand, _ACCURATE):
-            hand.go(self._pick(0.0), _GENTLE)
-            self._enter(Phase.DESCEND)
+        if self._has_arrived(hand, _ACCURATE):
+            hand.go(self._pick_pose(0.0), _GENTLE)
+            self._enter(StitchPhase.DESCEND)
 
     def _descend(self) -> None:
         hand = self._picker
-        if self._arrived(hand, _ACCURATE):
+        if self._has_arrived(hand, _ACCURATE):
             hand.move_jaw(SHUT)
             self.state.attempts += 1
-            self._enter(Phase.CLOSE)
+            self._enter(StitchPhase.CLOSE)
 
     def _close(self) -> None:
         state, hand = self.state, self._picker
-        if not self._arrived(hand) or state.waited < _PRESSED:
+        if not self._has_arrived(hand) or state.waited < _PRESSED:
             return
         if state.holder and hand.angle > _HELD_OPEN:
             state.attempts = 0
-            self._grasped(hand)
-            if state.picked_for is Phase.LIFT:
+            self._learn_grasp(hand)
+            if state.picked_for is StitchPhase.LIFT:
                 goal = hand.line()
                 goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]
                 hand.go(goal)
@@ -248,16 +248,16 @@ class Procedure(Parts, ABC):
             raise MotionError(f"{hand.arm} could not take the needle up in {ATTEMPTS} attempts")
         else:
             hand.move_jaw(OPEN)
-            hand.go(self._pick(HOVER))
-            self._enter(Phase.HOVER)
+            hand.go(self._pick_pose(HOVER))
+            self._enter(StitchPhase.HOVER)
 
-    def _grasped(self, hand: RobotHand) -> None:
+    def _learn_grasp(self, hand: RobotHand) -> None:
         """Store the present lie of the needle in a hand's jaw as the hand's hold."""
         self.state.grip[:] = inverse_transform(self.state.needle) @ pose_to_matrix(hand.measured)
         self.state.free = False
 
     def _lift(self) -> None:
-        if not self._arrived(self._picker):
+        if not self._has_arrived(self._picker):
             return
         if self.handing.pending:
             self._to_present(self._picker)
@@ -268,40 +268,40 @@ class Procedure(Parts, ABC):
     def _to_present(self, hand: RobotHand) -> None:
         """Let the holding hand bring the needle to the next hand-over."""
         self._lead(hand, self.handing.needles[self.handing.left])
-        self._enter(Phase.PRESENT)
+        self._enter(StitchPhase.PRESENT)
 
     def _to_approach(self) -> None:
         stitch = self.stitch
         self._status.append(f"stitch {self.state.stitch}")
         self._lead(self.driver, stitch.pose(stitch.entry - BEFORE, self.params.lift))
-        self._enter(Phase.APPROACH)
+        self._enter(StitchPhase.APPROACH)
 
     def _approach(self) -> None:
-        if self._arrived(self.driver):
+        if self._has_arrived(self.driver):
             self._require_room()
             self.state.angle[0] = self.stitch.entry - BEFORE
             self._lead(self.driver, self.stitch.pose(self.state.angle[0]), _GENTLE)
-            self._enter(Phase.ALIGN)
+            self._enter(StitchPhase.ALIGN)
 
     def _require_room(self) -> None:
         """Raise MotionError if the joints cannot drive the needle with its present lie in the jaw."""
         params, hand = self.params, self.driver
-        way = driving(self.stitch, params.emerge, params.lift, self.stitch.entry - BEFORE)
-        if problem := reach(hand.chain, hand.base, np.array(way) @ self.state.grip).problem:
+        way = driving_poses(self.stitch, params.emerge, params.lift, self.stitch.entry - BEFORE)
+        if problem := best_reach(hand.chain, hand.base, np.array(way) @ self.state.grip).failure_reason:
             raise MotionError(f"the needle has turned in the jaw of {hand.arm}, whose {problem}")
 
     def _align(self) -> None:
         if self.driver.has_arrived:
-            self._track(self.driver, self.state.angle[0])
+            self._track_angle(self.driver, self.state.angle[0])
             self.state.waited += self.driver.period
             aligned = self.state.deviation[0] < _ALIGNED and self.state.waited > 0.2
             if aligned or self.state.waited > _PATIENCE:
-                self._enter(Phase.DRIVE)
+                self._enter(StitchPhase.DRIVE)
 
     def _drive(self) -> None:
         end = self.stitch.exit + self.params.emerge
         angle = min(self.state.angle[0] + self.params.drive_speed * self.driver.period, end)
-        self._track(self.driver, angle)
+        self._track_angle(self.driver, angle)
         if angle == end:
             self.state.waited += self.driver.period
             if self.state.waited <= 0.3:
@@ -309,104 +309,104 @@ class Procedure(Parts, ABC):
             if self.handing.alone:
                 self.driver.move_jaw(OPEN)
                 self.state.free = True
-                self._enter(Phase.LET_GO)
+                self._enter(StitchPhase.LET_GO)
             else:
                 self._to_come()
 
     def _let_go(self) -> None:
         self.state.waited += self.driver.period
         if self.state.waited >= OPENED:
-            self.driver.go(before(pose_to_matrix(self.driver.line()), BACK))
-            self._enter(Phase.STEP_BACK)
+            self.driver.go(approach_pose(pose_to_matrix(self.driver.line()), BACK))
+            self._enter(StitchPhase.STEP_BACK)
 
     def _step_back(self) -> None:
-        if self._arrived(self.driver):
+        if self._has_arrived(self.driver):
             self._to_come()
 
     def _to_come(self) -> None:
-        self.puller.go(self._taking(self.puller, BACK))
-        self._enter(Phase.COME)
+        self.puller.go(self._taking_pose(self.puller, BACK))
+        self._enter(StitchPhase.COME)
 
-    def _taking(self, hand: RobotHand, away: float) -> Vector:
+    def _taking_pose(self, hand: RobotHand, away: float) -> Vector:
         """Return the pose, shape (7,), of a hand taking over the needle, or so far before."""
-        handed = Phase.PRESENT <= self.state.phase <= Phase.LEAVE_BACK
+        handed = StitchPhase.PRESENT <= self.state.phase <= StitchPhase.LEAVE_BACK
         if not handed:
             grip = self.state.planned[1]
         else:
             grip = self.state.planned[0] if hand is self.driver else self.handing.between
-        return before(self.state.needle @ grip, away)
+        return approach_pose(self.state.needle @ grip, away)
 
-    def _come(self, after: Phase) -> None:
-        hand = self._taker
-        if self._arrived(hand, _ACCURATE):
-            hand.go(self._taking(hand, 0.0), _GENTLE)
+    def _come(self, after: StitchPhase) -> None:
+        hand = self._next_taker
+        if self._has_arrived(hand, _ACCURATE):
+            hand.go(self._taking_pose(hand, 0.0), _GENTLE)
             self._enter(after)
 
-    def _take(self, after: Phase) -> None:
-        hand = self._taker
+    def _take_over(self, after: StitchPhase) -> None:
+        hand = self._next_taker
         if hand.has_arrived:  # the needle may still give a little
-            hand.state.goal[:] = self._taking(hand, 0.0)
-        if self._arrived(hand, _ACCURATE):
+            hand.state.goal[:] = self._taking_pose(hand, 0.0)
+        if self._has_arrived(hand, _ACCURATE):
             hand.move_jaw(SHUT)
             self._enter(after)
 
-    def _hold(self, after: Phase) -> None:
-        hand, other = self._taker, self._giver
-        if not self._arrived(hand) or self.state.waited < _PRESSED:
+    def _hold(self, after: StitchPhase) -> None:
+        hand, other = self._next_taker, self._giver
+        if not self._has_arrived(hand) or self.state.waited < _PRESSED:
             return
-        alone = hand is self.driver and after is Phase.RELEASE
+        alone = hand is self.driver and after is StitchPhase.RELEASE
         if hand.angle <= _HELD_OPEN:
             holder = "tissue" if alone else other.arm
             raise MotionError(f"{hand.arm} has not taken hold of the needle that {holder} holds")
         if alone:
-            self._grasped(hand)
+            self._learn_grasp(hand)
             self._to_pull()
         else:
             other.move_jaw(OPEN)
             self._enter(after)
 
-    def _release(self, after: Phase) -> None:
-        hand, other = self._taker, self._giver
+    def _release(self, after: StitchPhase) -> None:
+        hand, other = self._next_taker, self._giver
         self.state.waited += hand.period
         if self.state.waited < OPENED:
             return
         if hand.angle <= _HELD_OPEN:
             raise MotionError(f"{hand.arm} has lost the needle as {other.arm} let go")
-        self._grasped(hand)
-        other.go(before(pose_to_matrix(other.line()), BACK))
+        self._learn_grasp(hand)
+        other.go(approach_pose(pose_to_matrix(other.line()), BACK))
         self._enter(after)
 
     def _leave(self) -> None:
         """Let the driver go clear, then to the resting place, and pull."""
-        if self._arrived(self.driver):
+        if self._has_arrived(self.driver):
             self._park(self.driver)
             self._to_pull()
 
     def _to_pull(self) -> None:
         self.state.angle[0] = self.stitch.angle(self.state.needle)
-        self._enter(Phase.PULL)
+        self._enter(StitchPhase.PULL)
 
     def _pull(self) -> None:
         if not self.driver.has_arrived:
             return
-        end = self.stitch.out + BEYOND
+        end = self.stitch.base_out_angle + BEYOND
         angle = min(self.state.angle[0] + _PULL_SPEED * self.puller.period, end)
-        self._track(self.puller, angle)
+        self._track_angle(self.puller, angle)
         if angle == end:
             goal = self.puller.line()
             goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]
             self.puller.go(goal)
-            self._enter(Phase.RAISE)
+            self._enter(StitchPhase.RAISE)
 
     def _present(self) -> None:
-        if self._arrived(self._giver):
-            self._taker.go(self._taking(self._taker, BACK))
-            self._enter(Phase.COME_BACK)
+        if self._has_arrived(self._giver):
+            self._next_taker.go(self._taking_pose(self._next_taker, BACK))
+            self._enter(StitchPhase.COME_BACK)
 
     def _leave_back(self) -> None:
         """Let the giver go clear, then to its place, and hand the needle back or begin the stitch."""
-        giver, taker = self._giver, self._taker
-        if self._arrived(giver):
+        giver, taker = self._giver, self._next_taker
+        if self._has_arrived(giver):
             self._park(giver)
             if self.handing.left:
                 self.handing.left -= 1

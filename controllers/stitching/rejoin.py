@@ -11,8 +11,8 @@ from enum import IntEnum
 import numpy as np
 
 from controllers.expert.hand import RobotHand
-from controllers.stitching.geometry import before
-from controllers.stitching.phase import Phase
+from controllers.stitching.geometry import approach_pose
+from controllers.stitching.phase import StitchPhase
 from controllers.stitching.way_on import WayOn
 from hub.participant import Record, array, choice, number
 from robots.transform import matrix_to_pose, pose_to_matrix
@@ -31,7 +31,7 @@ _CLEAR = 0.04
 _GENTLE = 0.35
 
 
-class Going(IntEnum):
+class RejoinPhase(IntEnum):
     """Motion of the hands."""
 
     NOWHERE = 0
@@ -43,8 +43,8 @@ class Going(IntEnum):
 class RejoinState(Record):
     """Where the hands go."""
 
-    going = choice(Going.NOWHERE)
-    then = choice(Phase.BEGIN)
+    going = choice(RejoinPhase.NOWHERE)
+    then = choice(StitchPhase.BEGIN)
     """Phase after the motion."""
     goals = array(2, 7)
     """Goals of driver and puller, the poses at the start of the phase."""
@@ -61,7 +61,7 @@ class Rejoin:
     @property
     def is_under_way(self) -> bool:
         """Whether the hands have not yet come there."""
-        return self.state.going is not Going.NOWHERE
+        return self.state.going is not RejoinPhase.NOWHERE
 
     def begin(self, plan: WayOn, grip: Vector, park: Vector) -> None:
         """Open the jaws that do not hold the needle.
@@ -79,32 +79,32 @@ class Rejoin:
             state.goals[self._hands.index(plan.holder)] = matrix_to_pose(plan.needle @ grip)
         driver = int(plan.exchanged)
         puller = driver if plan.alone else 1 - driver
-        if plan.phase is Phase.HOVER:
+        if plan.phase is StitchPhase.HOVER:
             picker = 1 - driver if len(plan.handed) % 2 else driver
             grip = plan.driver if plan.pick is None else plan.pick
-            state.goals[picker] = before(plan.needle @ grip, BACK)
-        elif plan.phase is Phase.COME:
-            state.goals[puller] = before(plan.needle @ plan.puller, BACK)
-        state.going, state.then, state.waited = Going.OPEN, plan.phase, 0.0
+            state.goals[picker] = approach_pose(plan.needle @ grip, BACK)
+        elif plan.phase is StitchPhase.COME:
+            state.goals[puller] = approach_pose(plan.needle @ plan.puller, BACK)
+        state.going, state.then, state.waited = RejoinPhase.OPEN, plan.phase, 0.0
         state.holder = 0.0 if plan.holder is None else plan.holder.number
 
     def give_up(self) -> None:
         """Go nowhere any more."""
-        self.state.going = Going.NOWHERE
+        self.state.going = RejoinPhase.NOWHERE
 
     def step(self, needle: Vector) -> None:
         """Go on; `needle`: pose of the needle, shape (4, 4)."""
         state, hands = self.state, self._hands
         state.waited += hands[0].period
-        if state.going is Going.OPEN and state.waited >= OPENED:
+        if state.going is RejoinPhase.OPEN and state.waited >= OPENED:
             for hand in hands:
                 near = float(np.linalg.norm(hand.measured[:3] - needle[:3, 3])) < _CLEAR
                 if hand.number != state.holder and near:
-                    hand.go(before(pose_to_matrix(hand.line()), BACK))
-            state.going = Going.CLEAR
-        elif state.going is Going.CLEAR and all(hand.has_arrived for hand in hands):
+                    hand.go(approach_pose(pose_to_matrix(hand.line()), BACK))
+            state.going = RejoinPhase.CLEAR
+        elif state.going is RejoinPhase.CLEAR and all(hand.has_arrived for hand in hands):
             for hand, goal in zip(hands, state.goals, strict=True):
                 hand.go(goal, _GENTLE if hand.number == state.holder else 1.0)
-            state.going = Going.GO
-        elif state.going is Going.GO and all(hand.has_arrived for hand in hands):
-            state.going = Going.NOWHERE
+            state.going = RejoinPhase.GO
+        elif state.going is RejoinPhase.GO and all(hand.has_arrived for hand in hands):
+            state.going = RejoinPhase.NOWHERE

@@ -34,14 +34,14 @@ class SceneFrames:
     def __init__(self, params: StitchParams, name: str, camera: StereoCamera) -> None:
         """Create the frames; `name`: the endoscope; `camera`: the stereo camera."""
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.driven}
+        self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.present_arms}
         self._fixed = {crtk.WORLD_FRAME: np.eye(4)}
         if params.mounting == "cart":
             self._fixed[crtk.CART_FRAME] = np.eye(4)
         self._fixed |= {crtk.base_frame(arm): base for arm, base in self._bases.items()}
         self._fixed |= {name: fixture.pose for name, fixture in params.fixtures.items()}
         self._needle, self._optical = params.needle[0], f"{name}_left_optical"
-        ecm = params.arms.driven.get("ECM")
+        ecm = params.arms.present_arms.get("ECM")
         self._left = _left_in_tip(ecm, camera.baseline) if isinstance(ecm, MountedEcm) else None
         self._camera, self._skin = camera, params.phantom.pose
         self._pictures: dict[str, Eye] = (
@@ -69,10 +69,12 @@ class SceneFrames:
         """
         point = picked.point
         if (eye := self._pictures.get(picked.header.frame_id)) is not None:
-            return self._under(eye, np.array([point.x, point.y]), self._pose(self._optical, inputs))
+            return self._point_under_pixel(
+                eye, np.array([point.x, point.y]), self._pose(self._optical, inputs)
+            )
         return (self._pose(picked.header.frame_id, inputs) @ [point.x, point.y, point.z, 1.0])[:3]
 
-    def _under(self, eye: Eye, pixel: Vector, left: Vector) -> Vector:
+    def _point_under_pixel(self, eye: Eye, pixel: Vector, left: Vector) -> Vector:
         """Return the point of the skin's plane under a pixel of an eye, m, shape (3,), in the world.
 
         `left` is the left camera's optical frame in the world, shape (4, 4).

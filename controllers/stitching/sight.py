@@ -57,7 +57,7 @@ class Sight:
         """Whether the errors have once been known well enough to go to work."""
         return self.state.known
 
-    def see(self, q: Vector, seen: tuple[PoseWithCovarianceStamped, ...], period: float) -> Vector:
+    def observe_tip(self, q: Vector, seen: tuple[PoseWithCovarianceStamped, ...], period: float) -> Vector:
         """Return where the arm seems to stand, shape (4, 4), with measured joints `q` (6,) and new sightings.
 
         Sightings are positions in the world, m, with their covariance; `period` is since the last call, s.
@@ -66,16 +66,16 @@ class Sight:
         way = there[:3, 3] - state.last
         if sqrt(float(way @ way)) <= _SLOW * period:
             for one in seen:
-                self._learn(q, one)
+                self._learn_sighting(q, one)
         state.last[:] = there[:3, 3]
-        return self._base @ self._chain.forward(self._off(q)) @ inverse_transform(there)
+        return self._base @ self._chain.forward(self._joint_offset(q)) @ inverse_transform(there)
 
-    def _off(self, q: Vector) -> Vector:
+    def _joint_offset(self, q: Vector) -> Vector:
         true = q.copy()
         true[:3] += self.state.error
         return true
 
-    def _learn(self, q: Vector, seen: PoseWithCovarianceStamped) -> None:
+    def _learn_sighting(self, q: Vector, seen: PoseWithCovarianceStamped) -> None:
         """Process a sighting, with the slope at the end of the estimate (an iterated Kalman filter).
 
         With the slope at the beginning, 5 degrees off, the first sighting would be wrong by ten times the
@@ -85,7 +85,7 @@ class Sight:
         noise, begun = seen.pose.covariance.reshape(6, 6)[:3, :3], state.error.copy()
         slope, gain = np.eye(3), np.eye(3)
         for _ in range(_ITERATIONS):
-            frames = self._chain.frames(self._off(q))
+            frames = self._chain.frames(self._joint_offset(q))
             slope = self._base[:3, :3] @ self._chain.jacobian(frames)[:3, :3]
             missing = np.array([place.x, place.y, place.z]) - (self._base @ frames[-1])[:3, 3]
             gain = state.covariance @ slope.T @ np.linalg.inv(slope @ state.covariance @ slope.T + noise)

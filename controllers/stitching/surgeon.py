@@ -7,7 +7,7 @@ from controllers.stitching.geometry import Stitch
 from controllers.stitching.handing import Handing
 from controllers.stitching.looking import Looking
 from controllers.stitching.params import StitchingParams
-from controllers.stitching.phase import Phase
+from controllers.stitching.phase import StitchPhase
 from controllers.stitching.plan import make_plan, make_stitch
 from controllers.stitching.procedure import ATTEMPTS, HOVER, Procedure
 from controllers.stitching.rejoin import OPEN
@@ -34,9 +34,9 @@ class Surgeon(Procedure):
         return make_stitch(phantom.measures, phantom.pose, self.state.stitch, self._needle)
 
     @property
-    def looks(self) -> bool:
+    def looks_at_hands(self) -> bool:
         """Whether the hands are looked at; a hand that has arrived then keeps its last command."""
-        return self.looking is not None and self.state.phase is Phase.BEGIN
+        return self.looking is not None and self.state.phase is StitchPhase.BEGIN
 
     def _begin(self) -> None:
         if self.looking is not None and not self.looking.step():
@@ -66,8 +66,8 @@ class Surgeon(Procedure):
         )
         for hand in (self.driver, self.puller):
             hand.move_jaw(OPEN)
-        self.driver.go(self._pick(HOVER))
-        self._enter(Phase.HOVER)
+        self.driver.go(self._pick_pose(HOVER))
+        self._enter(StitchPhase.HOVER)
 
     def _way_on(self) -> WayOn:
         """Return how the stitch goes on; a needle that lies badly in a jaw is handed over and taken anew."""
@@ -77,7 +77,9 @@ class Surgeon(Procedure):
         except MotionError:
             if not state.holder or is_inside(params, state.needle):
                 raise
-            plan = Handing(params, self.hands, self.stitch, state.needle, self._held, state.park).plan()
+            plan = Handing(
+                params, self.hands, self.stitch, state.needle, self._present_hold, state.park
+            ).plan()
             if plan is None:
                 raise
             return plan
@@ -85,12 +87,14 @@ class Surgeon(Procedure):
     def _recover(self, why: str) -> None:
         """Go on from the present place of the needle, if possible and not done too often."""
         state = self.state
-        if state.phase is Phase.BEGIN or state.recoveries == ATTEMPTS:
+        if state.phase is StitchPhase.BEGIN or state.recoveries == ATTEMPTS:
             self._fail(why)
             return
         state.recoveries += 1
         try:
-            is_out = state.phase in (Phase.PULL, Phase.RAISE) and not is_inside(self.params, state.needle)
+            is_out = state.phase in (StitchPhase.PULL, StitchPhase.RAISE) and not is_inside(
+                self.params, state.needle
+            )
             if is_out and self._made_the_last():
                 return
             plan = self._way_on()
@@ -103,10 +107,10 @@ class Surgeon(Procedure):
         self._follow(plan)
 
     def _raise(self) -> None:
-        if self._arrived(self.puller) and not self._made_the_last():
+        if self._has_arrived(self.puller) and not self._made_the_last():
             stitch = self.stitch
             self._lead(self.puller, stitch.pose(stitch.exit + self.params.emerge, self.params.lift))
-            self._enter(Phase.PRESENT)
+            self._enter(StitchPhase.PRESENT)
 
     def _made_the_last(self) -> bool:
         """Count a stitch, and return whether it was the last."""
@@ -115,7 +119,7 @@ class Surgeon(Procedure):
         state.recoveries = 0
         if state.made[0] >= self._row.stitches:
             state.done[0] = 1.0
-            self._enter(Phase.DONE)
+            self._enter(StitchPhase.DONE)
             return True
         state.stitch += 1
         return False

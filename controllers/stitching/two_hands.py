@@ -49,7 +49,7 @@ class TwoHands(Controller):
 
     def _hand(self, params: StitchParams, arm: ArmName) -> RobotHand:
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        held = cast("PsmParams", params.arms.driven[arm])
+        held = cast("PsmParams", params.arms.present_arms[arm])
         if held.tool.jaw is None:
             raise SessionError(f"stitching '{self.name}': {arm} holds {held.tool.name}, which has no jaw")
         return RobotHand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
@@ -75,7 +75,7 @@ class TwoHands(Controller):
             hand.roll = float(q[3])
             if self._looks:
                 seen = cast("tuple[PoseWithCovarianceStamped, ...]", inputs.events(f"{arm}/seen"))
-                hand.stand(sight.see(q, seen, hand.period))
+                hand.stand(sight.observe_tip(q, seen, hand.period))
             jaw = float(inputs[f"{arm}/jaw/measured_js"][0])
             hand.sense(inputs[f"{arm}/local/measured_cp"], jaw)
         needle = f"objects/{self._needle}"

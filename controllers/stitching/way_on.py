@@ -9,24 +9,24 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.expert.hand import RobotHand
-from controllers.stitching.feasibility import Reach
+from controllers.stitching.feasibility import ArmReach
 from controllers.stitching.geometry import Stitch
 from controllers.stitching.params import StitchParams
-from controllers.stitching.phase import Phase
+from controllers.stitching.phase import StitchPhase
 from controllers.stitching.plan import (
     BEFORE,
     DEEP,
     best_grip,
-    driving,
+    driving_poses,
     grips_of,
-    pulling,
+    pulling_poses,
     require_room,
 )
 from robots.transform import inverse_transform, pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["HandOver", "WayOn", "behind_tip", "is_inside", "raised", "way_on"]
+__all__ = ["HandOver", "WayOn", "behind_tip", "is_inside", "raise_needle", "way_on"]
 
 _UNDER = 0.5e-3
 """m; a needle with a point so far under the skin is in the tissue."""
@@ -43,14 +43,14 @@ class HandOver(NamedTuple):
     needle: Vector
     """Where the needle is given, shape (4, 4)."""
     grip: Vector
-    """Grip of the taking hand, as in a `Plan`."""
+    """Grip of the taking hand, as in a `GripPlan`."""
 
 
 @dataclass(frozen=True)
 class WayOn:
     """The first phase, with the needle's pose and the parts of the hands."""
 
-    phase: Phase
+    phase: StitchPhase
     holder: RobotHand | None
     needle: Vector
     """Where the needle is brought first, shape (4, 4)."""
@@ -58,9 +58,9 @@ class WayOn:
     """Angle of the needle's tip on its way, rad."""
     driver: Vector
     puller: Vector
-    """How the hands hold the needle, as in a `Plan`."""
+    """How the hands hold the needle, as in a `GripPlan`."""
     margin: float
-    picked_for: Phase = Phase.LIFT
+    picked_for: StitchPhase = StitchPhase.LIFT
     """Phase after the needle has been taken up: in the tissue, or not."""
     exchanged: bool = False
     """Whether the arms have exchanged their planned parts."""
@@ -74,10 +74,10 @@ class WayOn:
 
 def is_inside(params: StitchParams, needle: Vector) -> bool:
     """Return whether a needle, at a pose of shape (4, 4), is in the tissue."""
-    return _lowest(params, needle) < -_UNDER
+    return _lowest_height(params, needle) < -_UNDER
 
 
-def _lowest(params: StitchParams, needle: Vector) -> float:
+def _lowest_height(params: StitchParams, needle: Vector) -> float:
     """Return the height of the needle's lowest point over the skin, m."""
     shape, pad = params.needle[1].shape, params.phantom.pose
     wire = shape.points(np.linspace(-shape.arc / 2.0, shape.arc / 2.0, 60))
@@ -85,10 +85,10 @@ def _lowest(params: StitchParams, needle: Vector) -> float:
     return float(heights.min())
 
 
-def raised(params: StitchParams, needle: Vector) -> Vector:
+def raise_needle(params: StitchParams, needle: Vector) -> Vector:
     """Return a pose of shape (4, 4), if need be raised until all of the needle is over the skin."""
     up = needle.copy()
-    up[:3, 3] += max(0.0, params.lift - _lowest(params, needle)) * params.phantom.pose[:3, 2]
+    up[:3, 3] += max(0.0, params.lift - _lowest_height(params, needle)) * params.phantom.pose[:3, 2]
     return up
 
 
@@ -102,43 +102,43 @@ def way_on(
     holding = {driver.number: driver, puller.number: puller}.get(holder)
     if holder and holding is None:
         raise MotionError(f"PSM{holder:.0f} holds the needle, which is neither {driver.arm} nor {puller.arm}")
-    low = _lowest(params, needle)
+    low = _lowest_height(params, needle)
     inside, angle = low < -_UNDER, stitch.angle(needle)
     if inside:
         angle = _on_its_way(stitch, needle, angle)
         if holding is None:
             return _taken_again(params, driver, puller, stitch, needle, angle)
-    up = raised(params, needle)
+    up = raise_needle(params, needle)
     over = stitch.entry - BEFORE
     emerge, lift = params.emerge, params.lift
-    pull = pulling(stitch, emerge, lift)
-    if inside and holding is not None and _pulls(params, holding, driver, puller, stitch, needle):
-        grip, margin = _kept(puller, needle, [pulling(stitch, emerge, lift, angle)])
-        return WayOn(Phase.PULL, puller, stitch.pose(angle), angle, np.eye(4), grip, margin)
+    pull = pulling_poses(stitch, emerge, lift)
+    if inside and holding is not None and _can_pull(params, holding, driver, puller, stitch, needle):
+        grip, margin = _present_hold(puller, needle, [pulling_poses(stitch, emerge, lift, angle)])
+        return WayOn(StitchPhase.PULL, puller, stitch.pose(angle), angle, np.eye(4), grip, margin)
     taking, pull_margin = _from_a_side(puller, params.taken, stitch, [pull])
     if holding is driver:
         grip = inverse_transform(needle) @ pose_to_matrix(driver.measured)
         require_room(behind_tip(grip, driver, stitch), stitch, emerge)
-        drive = driving(stitch, emerge, lift, angle if inside else None)
-        grip, margin = _kept(driver, needle, [drive] if inside else [[up], drive])
+        drive = driving_poses(stitch, emerge, lift, angle if inside else None)
+        grip, margin = _present_hold(driver, needle, [drive] if inside else [[up], drive])
         if not inside:
-            return WayOn(Phase.LIFT, driver, up, over, grip, taking, min(margin, pull_margin))
-        phase = Phase.DRIVE if angle < stitch.exit + emerge else Phase.COME
+            return WayOn(StitchPhase.LIFT, driver, up, over, grip, taking, min(margin, pull_margin))
+        phase = StitchPhase.DRIVE if angle < stitch.exit + emerge else StitchPhase.COME
         return WayOn(phase, driver, stitch.pose(angle), angle, grip, taking, min(margin, pull_margin))
     require_room(params.grip, stitch, emerge)
-    drive = driving(stitch, emerge, lift)
+    drive = driving_poses(stitch, emerge, lift)
     if holding is puller:
         shown = stitch.pose(stitch.exit + emerge, lift)
-        _, kept = _kept(puller, needle, [[shown]])
+        _, kept = _present_hold(puller, needle, [[shown]])
         grip, margin = _from_a_side(driver, params.grip, stitch, [[shown], drive])
-        return WayOn(Phase.PRESENT, puller, shown, over, grip, taking, min(kept, margin, pull_margin))
+        return WayOn(StitchPhase.PRESENT, puller, shown, over, grip, taking, min(kept, margin, pull_margin))
     wrong_way_up = bool(needle[:3, 2] @ params.phantom.pose[:3, 2] > 0.0)
     grips = grips_of(driver, params.grip, stitch.needle, backwards=wrong_way_up)
-    grip, margin = _chosen(driver, grips, [[up, needle], drive])
-    return WayOn(Phase.HOVER, None, needle, over, grip, taking, min(margin, pull_margin))
+    grip, margin = _choose_hold(driver, grips, [[up, needle], drive])
+    return WayOn(StitchPhase.HOVER, None, needle, over, grip, taking, min(margin, pull_margin))
 
 
-def _pulls(
+def _can_pull(
     params: StitchParams,
     holding: RobotHand,
     driver: RobotHand,
@@ -159,13 +159,15 @@ def _taken_again(
     """Plan how a needle held by the tissue alone, the tip at `angle` (rad), is taken hold of."""
     emerge, lift = params.emerge, params.lift
     if angle > stitch.exit + emerge - _NEARLY:
-        grip, margin = _from_a_side(puller, params.taken, stitch, [pulling(stitch, emerge, lift, angle)])
-        return WayOn(Phase.COME, None, needle, angle, np.eye(4), grip, margin)
+        grip, margin = _from_a_side(
+            puller, params.taken, stitch, [pulling_poses(stitch, emerge, lift, angle)]
+        )
+        return WayOn(StitchPhase.COME, None, needle, angle, np.eye(4), grip, margin)
     require_room(params.grip, stitch, emerge)
-    taking, pull_margin = _from_a_side(puller, params.taken, stitch, [pulling(stitch, emerge, lift)])
-    grip, margin = _from_a_side(driver, params.grip, stitch, [driving(stitch, emerge, lift, angle)])
+    taking, pull_margin = _from_a_side(puller, params.taken, stitch, [pulling_poses(stitch, emerge, lift)])
+    grip, margin = _from_a_side(driver, params.grip, stitch, [driving_poses(stitch, emerge, lift, angle)])
     margin = min(margin, pull_margin)
-    return WayOn(Phase.HOVER, None, needle, angle, grip, taking, margin, Phase.ALIGN)
+    return WayOn(StitchPhase.HOVER, None, needle, angle, grip, taking, margin, StitchPhase.ALIGN)
 
 
 def _on_its_way(stitch: Stitch, needle: Vector, angle: float) -> float:
@@ -197,20 +199,20 @@ def _from_a_side(
     side, other = (
         best_grip(hand, grips_of(hand, behind, stitch.needle, backwards=each), ways) for each in (False, True)
     )
-    return _feasible(hand, other if side[1].problem and not other[1].problem else side)
+    return _feasible(hand, other if side[1].failure_reason and not other[1].failure_reason else side)
 
 
-def _kept(hand: RobotHand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
+def _present_hold(hand: RobotHand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
     """Return the hand's present hold of the needle, and the margin with this hold."""
-    return _chosen(hand, [inverse_transform(needle) @ pose_to_matrix(hand.measured)], ways)
+    return _choose_hold(hand, [inverse_transform(needle) @ pose_to_matrix(hand.measured)], ways)
 
 
-def _chosen(hand: RobotHand, grips: list[Vector], ways: list[list[Vector]]) -> tuple[Vector, float]:
+def _choose_hold(hand: RobotHand, grips: list[Vector], ways: list[list[Vector]]) -> tuple[Vector, float]:
     return _feasible(hand, best_grip(hand, grips, ways))
 
 
-def _feasible(hand: RobotHand, found: tuple[Vector, Reach, int]) -> tuple[Vector, float]:
+def _feasible(hand: RobotHand, found: tuple[Vector, ArmReach, int]) -> tuple[Vector, float]:
     grip, worst, _ = found
-    if problem := worst.problem:
+    if problem := worst.failure_reason:
         raise MotionError(f"the stitch is not feasible: of {hand.arm}, {problem}")
     return grip, worst.margin

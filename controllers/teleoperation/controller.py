@@ -7,7 +7,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from controllers.teleoperation.contact_model import ContactModelBuilder
-from controllers.teleoperation.engagement import Engagement, Phase
+from controllers.teleoperation.engagement import Engagement, EngagementPhase
 from controllers.teleoperation.jaw import JawGhost
 from controllers.teleoperation.params import TeleoperationParams
 from controllers.teleoperation.ports import teleoperation_ports
@@ -133,7 +133,7 @@ class Teleoperation(Controller):
         fresh = not inputs.stale("master") and (self._law is not None or not inputs.stale("master_twist"))
         self._engagement.step(to_base, hand, self._tip[3:], gripper, seconds, fresh=fresh)
         phase = self._engagement.phase
-        follows = phase is Phase.ENABLED
+        follows = phase is EngagementPhase.ENABLED
         if follows:
             self._lead(inputs, to_base, seconds)
         self._lead_jaw(gripper, seconds, follows=follows)
@@ -158,7 +158,9 @@ class Teleoperation(Controller):
         """
         engagement, now = self._engagement, self._now
         return (
-            now.started and engagement.arm_is_ready and (engagement.phase is Phase.ENABLED or not now.shared)
+            now.started
+            and engagement.arm_is_ready
+            and (engagement.phase is EngagementPhase.ENABLED or not now.shared)
         )
 
     def _receive(self, inputs: Inputs) -> None:
@@ -245,9 +247,9 @@ class Teleoperation(Controller):
             self._ghost.release()
         self._jaw[:1] = self._ghost.angle
 
-    def _publish(self, phase: Phase, warnings: list[str]) -> None:
+    def _publish(self, phase: EngagementPhase, warnings: list[str]) -> None:
         """Publish the phase, the commands and warnings."""
-        follows = phase is Phase.ENABLED
+        follows = phase is EngagementPhase.ENABLED
         self._goal[:] = self._law.goal if follows and self._law is not None else self._tip
         self._outputs["following"] = _FOLLOWS if follows else _HOLDS
         is_new = phase != self._now.published_phase
@@ -273,7 +275,7 @@ class Teleoperation(Controller):
             tip[:3],
             rotation.matrix(to_base),
             self._now.scale,
-            following=self._engagement.phase is Phase.ENABLED,
+            following=self._engagement.phase is EngagementPhase.ENABLED,
             tip_wrench=inputs["tip_wrench"],
             rigid_wrench=inputs["rigid_wrench"],
             elapsed=elapsed,

@@ -18,10 +18,10 @@ from schemas.crtk import OperatingState
 from schemas.ros import Joy
 from schemas.vectors import Vector
 
-__all__ = ["Engagement", "Phase"]
+__all__ = ["Engagement", "EngagementPhase"]
 
 
-class Phase(IntEnum):
+class EngagementPhase(IntEnum):
     """Phase of the engagement."""
 
     DISABLED = 0
@@ -37,7 +37,7 @@ class Phase(IntEnum):
 class EngagementState(Record):
     """State of the engagement, without the alignment gate."""
 
-    phase = choice(Phase.DISABLED)
+    phase = choice(EngagementPhase.DISABLED)
     pressed = flag()
     """The clutch button."""
     interrupted = flag()
@@ -63,7 +63,7 @@ class Engagement:
         """Warnings of the last step."""
 
     @property
-    def phase(self) -> Phase:
+    def phase(self) -> EngagementPhase:
         """Phase in this step."""
         return self._now.phase
 
@@ -113,7 +113,7 @@ class Engagement:
         phase = self._decide(to_base, hand, tip, gripper, h, fresh=fresh)
         if phase is not before:
             now.phase = phase
-        if phase is Phase.DISABLED and before is not Phase.DISABLED:
+        if phase is EngagementPhase.DISABLED and before is not EngagementPhase.DISABLED:
             reason = (
                 f"its master has been silent for more than {self._max_age / 1e6:g} ms"
                 if self.arm_is_ready
@@ -121,28 +121,30 @@ class Engagement:
             )
             self.warnings.append(f"{self._arm} holds: {reason}")
         interrupted = now.interrupted
-        self.takes_over = phase is Phase.ENABLED and (before is not Phase.ENABLED or interrupted)
+        self.takes_over = phase is EngagementPhase.ENABLED and (
+            before is not EngagementPhase.ENABLED or interrupted
+        )
         if interrupted:
             now.interrupted = False
 
     def _decide(
         self, to_base: Vector, hand: Vector, tip: Vector, gripper: float, h: float, *, fresh: bool
-    ) -> Phase:
+    ) -> EngagementPhase:
         gate = self._gate
         if not (fresh and self.arm_is_ready):
             if gate is not None:
                 gate.reset()
-            return Phase.DISABLED
+            return EngagementPhase.DISABLED
         if gate is not None and self._now.interrupted:
             gate.clutch()
         if self._is_free:
-            return Phase.CLUTCHED
+            return EngagementPhase.CLUTCHED
         if (
             gate is None
-            or (self.phase is Phase.ENABLED and not self._now.interrupted)
+            or (self.phase is EngagementPhase.ENABLED and not self._now.interrupted)
             or gate.check(rotation.product(to_base, hand), tip, gripper, h)
         ):
-            return Phase.ENABLED
+            return EngagementPhase.ENABLED
         if warning := gate.warning():
             self.warnings.append(f"{self._arm} waits: {warning}")
-        return Phase.ALIGNING
+        return EngagementPhase.ALIGNING

@@ -21,10 +21,10 @@ def _orientation(data: dict[str, Any]) -> str:
     return "follow" if data.get("law") == "velocity" else "hold"
 
 
-def _held(data: dict[str, Any]) -> str:
+def _instrument_by_arms(data: dict[str, Any]) -> str:
     """Return the led arm's instrument by `arms`, if named there."""
     arms: Arms | None = data["arms"]
-    led = None if arms is None else arms.driven.get(data["arm"])
+    led = None if arms is None else arms.present_arms.get(data["arm"])
     return led.instrument if isinstance(led, PsmTool) else DEFAULT_INSTRUMENT
 
 
@@ -59,7 +59,7 @@ class TeleoperationParams(PsmTool, _LedArm):
     open_to_pages: ClassVar[bool] = True
 
     instrument: InstrumentName = Field(
-        default_factory=_held,
+        default_factory=_instrument_by_arms,
         description=(
             "what the arm holds: name or number, such as 400006; default: as in `arms`, without them"
             f" {DEFAULT_INSTRUMENT}"
@@ -140,7 +140,7 @@ class TeleoperationParams(PsmTool, _LedArm):
     def _holds_what_the_arms_say(self) -> Self:
         if self.arms is None:
             return self
-        led = self.arms.driven.get(self.arm)
+        led = self.arms.present_arms.get(self.arm)
         if isinstance(led, PsmTool) and led.instrument != self.instrument:
             raise ValueError(
                 f"instrument '{self.instrument}', but in `arms` {self.arm} holds '{led.instrument}'; state it"
@@ -148,8 +148,8 @@ class TeleoperationParams(PsmTool, _LedArm):
             )
         if led is None and "instrument" not in self.model_fields_set:
             raise ValueError(
-                f"`arms` has {', '.join(self.arms.driven)} and not {self.arm}, which the hand leads; add it"
-                " there, or set `arm`"
+                f"`arms` has {', '.join(self.arms.present_arms)} and not {self.arm}, which the hand"
+                " leads; add it there, or set `arm`"
             )
         return self
 

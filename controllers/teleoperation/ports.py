@@ -28,7 +28,7 @@ NO_GRIPPER = -1.0
 
 def teleoperation_ports(params: TeleoperationParams) -> tuple[Port, ...]:
     """Return the ports of a hand leading an arm."""
-    return (*_hand(params), *_arm(params), *_jaw(params), *_streams(params), *_published(params))
+    return (*_hand(params), *_arm(params), *_jaw(params), *_streams(params), *_published_ports(params))
 
 
 def _hand(p: TeleoperationParams) -> tuple[Port, ...]:
@@ -103,7 +103,7 @@ def _streams(p: TeleoperationParams) -> tuple[Port, ...]:
     return tuple(event_out(name, JointState, meaning) for name in names)
 
 
-def _published(p: TeleoperationParams) -> tuple[Port, ...]:
+def _published_ports(p: TeleoperationParams) -> tuple[Port, ...]:
     contact, phases = (
         "for the hand, in the master's base frame",
         "DISABLED, CLUTCHED, ALIGNING or ENABLED: whenever it changes",

@@ -6,7 +6,7 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["kept_view", "projected", "seen_points"]
+__all__ = ["kept_view", "project_points", "seen_points"]
 
 
 def seen_points(camera: Vector, target: Vector, points: Vector) -> Vector:
@@ -18,7 +18,7 @@ def seen_points(camera: Vector, target: Vector, points: Vector) -> Vector:
     return points @ inverse[:3, :3].T + inverse[:3, 3]
 
 
-def projected(points: Vector) -> Vector:
+def project_points(points: Vector) -> Vector:
     """Return normalised coordinates, shape (n, 2), of points in the camera's frame, shape (n, 3)."""
     return points[:, :2] / points[:, 2:]
 

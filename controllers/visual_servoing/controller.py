@@ -16,10 +16,10 @@ import numpy as np
 from controllers.pictures import PictureController
 from controllers.visual_servoing.blobs import find_blobs
 from controllers.visual_servoing.camera import kept_view
-from controllers.visual_servoing.law import Limits, joint_velocities
+from controllers.visual_servoing.law import MotionLimits, joint_velocities
 from controllers.visual_servoing.params import ServoingParams
 from controllers.visual_servoing.ports import servoing_ports
-from controllers.visual_servoing.target import recognised
+from controllers.visual_servoing.target import recognise_target
 from hub.participant import (
     Inputs,
     Outputs,
@@ -40,7 +40,7 @@ from schemas.ports import Port
 from schemas.ros import CameraInfo, Float64MultiArray, Image, StringMessage
 from schemas.vectors import Vector
 
-__all__ = ["Phase", "VisualServoing"]
+__all__ = ["ServoingPhase", "VisualServoing"]
 
 _JOINTS = len(ecm.JOINT_NAMES)
 _APPROACH = 3.0
@@ -55,7 +55,7 @@ _LEAVE = 2.0
 """A reached goal is left when the error is above the tolerance by this factor."""
 
 
-class Phase(IntEnum):
+class ServoingPhase(IntEnum):
     """What it does."""
 
     WAITING = 0
@@ -90,7 +90,7 @@ class ServoingState(Record):
     picture_ns = integer(-1)
     """Stamp of the newest picture; -1 before."""
     rests_since_ns = integer(-1)
-    phase = choice(Phase.WAITING)
+    phase = choice(ServoingPhase.WAITING)
     ready = flag(start=True)
     started = flag()
 
@@ -120,7 +120,7 @@ class VisualServoing(PictureController):
         now = self._now
         now.command[0], now.goal[:] = self.params.start, self.params.goal
         now.features[:], now.pose[6] = now.goal, 1.0
-        return self._outputs(Phase.WAITING)
+        return self._outputs(ServoingPhase.WAITING)
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Look at the newest picture, and move the command on."""
@@ -133,7 +133,7 @@ class VisualServoing(PictureController):
             now.started = True
         self._look(inputs.events("left/image_raw"))
         now.phase = self._phase(t)
-        if now.phase < Phase.MOVING:
+        if now.phase < ServoingPhase.MOVING:
             now.command[1], now.camera_velocity[:], now.rests_since_ns = 0.0, 0.0, -1
         else:
             self._steer(t, h * 1e-9)
@@ -176,27 +176,27 @@ class VisualServoing(PictureController):
         now.picture_ns = image.header.stamp.ns
         intrinsics = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
         blobs = find_blobs(self._cv2, picture)
-        sight = recognised(self._cv2, blobs, intrinsics, self._points, self.params.radius, now.features)
+        sight = recognise_target(self._cv2, blobs, intrinsics, self._points, self.params.radius, now.features)
         now.seen = sight is not None
         if sight is not None:
             now.features[:] = sight.features
             now.shown[:] = sight.features * (fx, fy) + (cx, cy)
             now.pose[:3], now.pose[3:] = sight.pose[:3, 3], rotation.from_matrix(sight.pose)
 
-    def _phase(self, t: int) -> Phase:
+    def _phase(self, t: int) -> ServoingPhase:
         now = self._now
         if not (now.ready and now.started):
-            return Phase.WAITING
+            return ServoingPhase.WAITING
         if self._is_blind(t, now.picture_ns):
-            return Phase.BLIND
+            return ServoingPhase.BLIND
         if not now.seen:
-            return Phase.SEARCHING
+            return ServoingPhase.SEARCHING
         now.shown_goal[:] = now.goal * now.camera[:2] + now.camera[2:4]
         now.error = float(np.hypot(*(now.shown - now.shown_goal).T).max())
-        within = self.params.tolerance * (_LEAVE if now.phase is Phase.REACHED else 1.0)
+        within = self.params.tolerance * (_LEAVE if now.phase is ServoingPhase.REACHED else 1.0)
         if now.error <= within:
-            return Phase.REACHED
-        return Phase.SETTLED if 0 <= now.rests_since_ns <= t - _REST_NS else Phase.MOVING
+            return ServoingPhase.REACHED
+        return ServoingPhase.SETTLED if 0 <= now.rests_since_ns <= t - _REST_NS else ServoingPhase.MOVING
 
     def _steer(self, t: int, seconds: float) -> None:
         """Move the command by `seconds` of the law's velocities."""
@@ -217,16 +217,16 @@ class VisualServoing(PictureController):
         elif now.rests_since_ns < 0:
             now.rests_since_ns = t
 
-    def _limits(self, depths: Vector) -> Limits:
+    def _limits(self, depths: Vector) -> MotionLimits:
         """Return the limits, whose view leaves room for the nearest of the discs, `depths` (4,), m."""
         now, chain = self._now, self._chain
         view = kept_view(now.camera, self.params.radius / float(depths.min()), self.params.margin)
-        return Limits(chain.lower, chain.upper, chain.velocity, view, _APPROACH)
+        return MotionLimits(chain.lower, chain.upper, chain.velocity, view, _APPROACH)
 
-    def _outputs(self, before: Phase) -> Outputs:
+    def _outputs(self, before: ServoingPhase) -> Outputs:
         now = self._now
         changed = now.phase is not before
-        if changed and now.phase is Phase.SETTLED:
+        if changed and now.phase is ServoingPhase.SETTLED:
             self._warn(
                 f"at rest {now.error:.3g} px from the goal, the nearest in least squares that four joints"
                 " allow within their ranges and with all discs in view"

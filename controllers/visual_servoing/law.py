@@ -19,10 +19,10 @@ from typing import Literal, cast
 
 import numpy as np
 
-from controllers.visual_servoing.least_squares import constrained
+from controllers.visual_servoing.least_squares import solve_constrained
 from schemas.vectors import Vector
 
-__all__ = ["Law", "Limits", "interaction", "joint_velocities", "twist"]
+__all__ = ["Law", "MotionLimits", "camera_twist", "interaction_matrix", "joint_velocities"]
 
 Law = Literal["direct", "twist"]
 
@@ -31,7 +31,7 @@ _DAMPING = 1e-5
 
 
 @dataclass(frozen=True)
-class Limits:
+class MotionLimits:
     """What a motion keeps."""
 
     lower: Vector
@@ -45,7 +45,7 @@ class Limits:
     """1/s: nothing comes nearer to its limit than by this share of the way left in a second."""
 
 
-def interaction(features: Vector, depths: Vector) -> Vector:
+def interaction_matrix(features: Vector, depths: Vector) -> Vector:
     """Return L, shape (2 n, 6): velocities of `features`, shape (n, 2), by the camera's twist in its frame.
 
     The twist is velocity (m/s), then angular velocity (rad/s); `depths`, shape (n,), m, are along the axis.
@@ -58,10 +58,10 @@ def interaction(features: Vector, depths: Vector) -> Vector:
     return rows.reshape(-1, 6)
 
 
-def twist(features: Vector, goal: Vector, depths: Vector, gain: float) -> Vector:
+def camera_twist(features: Vector, goal: Vector, depths: Vector, gain: float) -> Vector:
     """Return the camera's twist, shape (6,), in its own frame, by the classical law."""
     error = (features - goal).reshape(-1)
-    solution = np.linalg.lstsq(interaction(features, depths), error, rcond=None)[0]
+    solution = np.linalg.lstsq(interaction_matrix(features, depths), error, rcond=None)[0]
     return -gain * cast("Vector", solution)
 
 
@@ -73,7 +73,7 @@ def joint_velocities(
     goal: Vector,
     depths: Vector,
     gain: float,
-    limits: Limits,
+    limits: MotionLimits,
 ) -> Vector:
     """Return dq/dt, shape (n,), rad/s and m/s, within all limits.
 
@@ -87,21 +87,21 @@ def joint_velocities(
         gain: 1/s.
         limits: what is kept.
     """
-    moved = interaction(features, depths) @ jacobian  # (2 m, n)
+    moved = interaction_matrix(features, depths) @ jacobian  # (2 m, n)
     rows, room = _constraints(q, moved, features, limits)
     if law == "direct":
         wanted = -gain * (features - goal).reshape(-1)
         joints = len(q)
         system = np.vstack([moved, _DAMPING * np.eye(joints)])
-        velocities = constrained(system, np.concatenate([wanted, np.zeros(joints)]), rows, room)
+        velocities = solve_constrained(system, np.concatenate([wanted, np.zeros(joints)]), rows, room)
     else:
-        by_twist = twist(features, goal, depths, gain)
+        by_twist = camera_twist(features, goal, depths, gain)
         unlimited = np.linalg.lstsq(jacobian, by_twist, rcond=None)[0]
-        velocities = constrained(np.eye(len(q)), cast("Vector", unlimited), rows, room)
+        velocities = solve_constrained(np.eye(len(q)), cast("Vector", unlimited), rows, room)
     return velocities / max(1.0, float(abs(velocities / limits.velocity).max()))
 
 
-def _constraints(q: Vector, moved: Vector, features: Vector, limits: Limits) -> tuple[Vector, Vector]:
+def _constraints(q: Vector, moved: Vector, features: Vector, limits: MotionLimits) -> tuple[Vector, Vector]:
     """Return rows and bounds, shapes (k, n) and (k,), of what dq/dt must keep: joint ranges and the view.
 
     What is outside already may not go farther out; no bound is below 0.

@@ -12,13 +12,13 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["constrained", "non_negative"]
+__all__ = ["non_negative", "solve_constrained"]
 
 _TOLERANCE = 1e-11
 """Tolerance of comparisons with 0, relative to numbers of the order of 1."""
 
 
-def constrained(a: Vector, b: Vector, g: Vector, h: Vector) -> Vector:
+def solve_constrained(a: Vector, b: Vector, g: Vector, h: Vector) -> Vector:
     """Return the x, shape (n,), of the least |a x - b| with g x <= h.
 
     Args:

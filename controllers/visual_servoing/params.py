@@ -69,12 +69,12 @@ class ServoingParams(Params):
     def _fits(self) -> Self:
         check_start(ecm.chain(), self.start)
         for name, corners in (("points", np.array(self.points)), ("goal", np.array(self.goal))):
-            if not np.isfinite(corners).all() or abs(_area(corners)) < 1e-9:
+            if not np.isfinite(corners).all() or abs(_signed_area(corners)) < 1e-9:
                 raise ValueError(f"{name}: {corners.tolist()} do not make a quadrangle")
         return self
 
 
-def _area(corners: np.ndarray) -> float:
+def _signed_area(corners: np.ndarray) -> float:
     """Return the area of a quadrangle, corners of shape (4, 2), with its sense of rotation as sign."""
     x, y = (corners - np.roll(corners, -1, axis=0)).T
     u, v = (corners + np.roll(corners, -1, axis=0)).T

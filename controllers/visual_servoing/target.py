@@ -15,7 +15,7 @@ import numpy as np
 from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
-__all__ = ["Sight", "recognised"]
+__all__ = ["TargetSight", "recognise_target"]
 
 _MISFIT = 1.5
 """px (root mean square) by which a rigid target may miss its blobs: their middles are up to 1 px off the
@@ -24,7 +24,7 @@ images of the discs' centres where they are seen aslant.
 
 
 @dataclass(frozen=True)
-class Sight:
+class TargetSight:
     """The target as it was recognised."""
 
     features: Vector
@@ -33,9 +33,9 @@ class Sight:
     """Pose of the target in the camera's frame, shape (4, 4)."""
 
 
-def recognised(
+def recognise_target(
     cv2: Any, blobs: Vector, intrinsics: Vector, points: Vector, radius: float, expected: Vector
-) -> Sight | None:
+) -> TargetSight | None:
     """Return which of `blobs` are the target's points; None unless four of them are.
 
     Args:
@@ -60,11 +60,11 @@ def recognised(
             order = np.roll(outline, first, axis=0)
             distance = float(((order - expected) ** 2).sum())
             if distance < least and (pose := _pose(cv2, order, points, misfit)) is not None:
-                best, least = Sight(order, pose), distance
-    return best and Sight(best.features - _aslant(best.pose, points, radius), best.pose)
+                best, least = TargetSight(order, pose), distance
+    return best and TargetSight(best.features - _ellipse_offsets(best.pose, points, radius), best.pose)
 
 
-def _aslant(pose: Vector, points: Vector, radius: float) -> Vector:
+def _ellipse_offsets(pose: Vector, points: Vector, radius: float) -> Vector:
     """Return how far the middles of the ellipses are from the images of the discs' centres, shape (4, 2).
 
     A disc's dual conic diag(r^2, r^2, -1) is seen as H diag(...) H^T, whose last column is the ellipse's

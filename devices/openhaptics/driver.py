@@ -13,7 +13,7 @@ from typing import Any
 
 from devices.haptics.contact import ZERO
 from devices.haptics.servo.driver import Driver, DriverError, Opened, Reading, StylusSpec, Unavailable
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 from devices.openhaptics.hdapi import (
     CALLBACK_CONTINUE,
     CALLBACK_DONE,
@@ -62,7 +62,7 @@ class HdapiDriver(Driver):
         handle = hd.hdInitDevice(None if spec.device is None else spec.device.encode())
         code = next((code for code, _ in errors(hd)), 0)
         if handle == INVALID_HANDLE:
-            return Unavailable(code, Phase.BUSY if Code.is_busy(code) else Phase.ABSENT)
+            return Unavailable(code, ServoPhase.BUSY if Code.is_busy(code) else ServoPhase.ABSENT)
         self._devices[handle] = _Device(hd, handle, spec)
         model, serial = (
             (hd.hdGetString(what) or b"").decode(errors="replace") for what in (Get.MODEL, Get.SERIAL_NUMBER)
@@ -210,8 +210,8 @@ class _Device:
         return not any(self._joints)
 
 
-def _phase(code: int) -> Phase:
+def _phase(code: int) -> ServoPhase:
     """Return the condition of the stylus after an error; only a fault of the device (0x3xx) ends the use."""
     if Code.is_busy(code):
-        return Phase.BUSY
-    return Phase.FAULT if Code.is_fault(code) else Phase.WARNED
+        return ServoPhase.BUSY
+    return ServoPhase.FAULT if Code.is_fault(code) else ServoPhase.WARNED

@@ -191,11 +191,11 @@ class Gateway(Device):
         arm, count = self.params.arms.shown[cast("CartArm", row.owner)], self._counters[row]
         handle = kinematics_handler(row, arm.chain, self._states[f"SUJ/{row.owner}/measured_cp"])
 
-        def counted(payload: bytes) -> bytes:
+        def count_payload(payload: bytes) -> bytes:
             count.messages += 1
             return handle(payload)
 
-        return counted
+        return count_payload
 
     def read(self, t: int) -> list[Sample]:
         """Return the messages of ROS programs since the last call, and the status once a second."""

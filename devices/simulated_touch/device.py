@@ -16,7 +16,7 @@ from devices.haptics.loop import HapticLoop
 from devices.haptics.ports import StylusPorts, StylusSamples, stylus_ports
 from devices.haptics.safety import Condition
 from devices.samples import button_sample
-from devices.simulated_touch.hand import Hand
+from devices.simulated_touch.hand import SimulatedHand
 from devices.simulated_touch.params import SimulatedStylusParams, SimulatedTouchParams
 from devices.simulated_touch.path import recorded_path, waypoint_path
 from hub.participant import Device, Params, Sample, Value
@@ -107,7 +107,7 @@ class _Stylus:
         self._loop = HapticLoop(params.safety.within(TOUCH), passivity=params.safety.passivity)
         self._dead_man = params.dead_man
         hand = params.hand
-        self._hand = Hand(
+        self._hand = SimulatedHand(
             hand.mass, hand.stiffness, hand.damping, _TICK_NS * 1e-9, self._path.position(0.0)[0]
         )
         self._ticks = 0

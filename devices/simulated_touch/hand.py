@@ -7,10 +7,10 @@ from math import cos, cosh, exp, sin, sinh, sqrt
 from devices.haptics.contact import ZERO
 from devices.vendor_axes import Vector3
 
-__all__ = ["Hand"]
+__all__ = ["SimulatedHand"]
 
 
-class Hand:
+class SimulatedHand:
     """A hand moved by the exact solution of a differential equation, with force and target held for a tick.
 
     The exact motion matters: a force held during the hand's motion makes sampled walls active, and a step of

@@ -65,7 +65,7 @@ class SuturePad(Stepped):
         self._thing, needle = params.needle
         self._shape = needle.shape
         self._channel = Channel(self._shape, params.tissue)
-        self._frame_of = ThreePoints(self._shape.bonded)
+        self._frame_of = ThreePoints(self._shape.bond_points)
         self._tip_in_needle = self._shape.marks[2]
         self._state = PadState()
         self._side: ForceSide | None = None

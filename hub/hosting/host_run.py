@@ -75,7 +75,7 @@ class HostRun:
         participants = {name: first for name, (first, _) in ready.items()}
         first = next(iter(mine.values()))
         refused = session.declare_publisher(
-            keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
+            keys.dropped_messages(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
         )
         self._refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
         wire = Wire(session, keys, reply.run, self._refusals, watched=reply.watched)

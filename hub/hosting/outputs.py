@@ -22,7 +22,7 @@ from schemas import ros
 from schemas.errors import MessageError
 from schemas.magnitudes import ABSURD
 from schemas.ports import Port
-from schemas.vectors import Vector, VectorCodec, joined
+from schemas.vectors import Vector, VectorCodec, join_parts
 
 __all__ = ["DueOutputs", "Listener", "Output", "VectorsListener"]
 
@@ -133,7 +133,7 @@ class _Vectors:
         same = len(before) == len(values) and all(map(is_, values, before))
         if not same and not self._fits(values):
             self._check(values)
-        data = joined(values)
+        data = join_parts(values)
         if data != self._bytes:
             self._bytes = data
             if len(data) != self._size or not _has_sense(data) or step == INITIAL:
@@ -155,7 +155,7 @@ class _Vectors:
 
     def _check(self, values: Sequence[Vector]) -> None:
         for codec, value in zip(self._codecs, values, strict=True):
-            codec.checked(value)
+            codec.check_vector(value)
             if codec.port.type in _PHYSICAL and (size := float(np.abs(value).max(initial=0.0))) > ABSURD:
                 raise MessageError(
                     f"output '{codec.port.name}' has a size of {size:.3g} in SI units, which has no meaning"

@@ -51,7 +51,7 @@ class VectorSample(Sample):
         Raises MessageError for another shape, or for numbers that are not finite.
         """
         if value.shape != codec.neutral.shape or not isfinite(value.dot(value)):
-            codec.checked(value)  # raises what is wrong, unless the numbers are only large
+            codec.check_vector(value)  # raises what is wrong, unless the numbers are only large
         vars(self).update(port=codec.port.name, _codec=codec, _value=value, _time_ns=time_ns)
 
     def __getattr__(self, name: str) -> Message:

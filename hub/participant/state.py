@@ -24,7 +24,7 @@ from typing import ClassVar, TypeVar, cast
 import numpy as np
 
 from schemas.errors import StateError
-from schemas.vectors import Vector, joined
+from schemas.vectors import Vector, join_parts
 
 __all__ = [
     "Record",
@@ -51,7 +51,7 @@ def state_hash(*parts: bytes | Vector) -> int:
     Examples:
         state_hash(self.position, self.velocity, b"grasped")
     """
-    return int.from_bytes(hashlib.blake2b(joined(parts), digest_size=8).digest(), "little")
+    return int.from_bytes(hashlib.blake2b(join_parts(parts), digest_size=8).digest(), "little")
 
 
 def restore_arrays(participant: str, arrays: Iterable[Vector], state: bytes) -> None:

@@ -111,7 +111,7 @@ class DeviceHost:
             )
             stack.callback(gone.undeclare)
             refused = session.declare_publisher(
-                keys.refused("device", self._name), encoding=zenoh.Encoding.APPLICATION_CDR
+                keys.dropped_messages("device", self._name), encoding=zenoh.Encoding.APPLICATION_CDR
             )
             refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
             try:

@@ -105,7 +105,12 @@ def _part(plan: Plan, keys: Keys, planned: PlannedParticipant) -> list[Rule]:
     orders = [keys.link(name)] if role == "device" else [] if planned.observer else [keys.grant]
     orders += [keys.uses(one.target, name) for one in plan.to_devices if one.source == name]
     # the hub subscribes to these of all participants at once
-    of_all = [keys.device_status("*"), keys.observer_status("*"), keys.refused("*", "*"), keys.ack("*")]
+    of_all = [
+        keys.device_status("*"),
+        keys.observer_status("*"),
+        keys.dropped_messages("*", "*"),
+        keys.ack("*"),
+    ]
     return [
         allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),
         allow("egress", ["declare_subscriber"], f"{keys.prefix}/{role}/{name}/**", *of_all),

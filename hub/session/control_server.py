@@ -174,7 +174,7 @@ class ControlServer:
         codec = PortCodec(port)
         if codec.vector is not None:
             message = codec.vector.to_message(
-                codec.vector.checked(np.atleast_1d(np.asarray(request.value, np.float64))), 0
+                codec.vector.check_vector(np.atleast_1d(np.asarray(request.value, np.float64))), 0
             )
         else:
             message = message_type(port.type).model_validate(request.value)

@@ -48,7 +48,7 @@ class RemoteReports:
         self._bookkeeping, self._failure, self._refusals = bookkeeping, failure, refusals
         self._subscribers = [
             session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._token)),
-            session.declare_subscriber(keys.refused("*", "*"), Callback(self._count_refusal)),
+            session.declare_subscriber(keys.dropped_messages("*", "*"), Callback(self._count_refusal)),
         ]
 
     def _token(self, sample: zenoh.Sample) -> None:

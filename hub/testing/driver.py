@@ -84,7 +84,7 @@ class Driver:
             raise SessionError(f"no input signal '{port}'.{did_you_mean(port, self.values)}")
         vector = codec_of(self._inputs[port]).vector
         if vector is not None:
-            value = vector.checked(np.atleast_1d(np.array(value, np.float64)))
+            value = vector.check_vector(np.atleast_1d(np.array(value, np.float64)))
         self.values[port] = value
 
     def send(self, port: str, *messages: Message) -> None:

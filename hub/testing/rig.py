@@ -138,7 +138,7 @@ class Rig:
         codec = self._codecs[port.name].vector
         if port.name in inputs:
             value = inputs[port.name]
-            return value if codec is None else codec.checked(np.atleast_1d(np.array(value, np.float64)))
+            return value if codec is None else codec.check_vector(np.atleast_1d(np.array(value, np.float64)))
         return start_value(port)
 
     def _check_outputs(self, outputs: Outputs, where: str) -> dict[str, Value]:
@@ -161,7 +161,7 @@ class Rig:
             array = isinstance(value, np.ndarray)
             require(array, f"{where} returns '{port.name}' as an array, but it is {value!r}")
             try:
-                return codec.vector.checked(value).copy()
+                return codec.vector.check_vector(value).copy()
             except MessageError as error:
                 raise AssertionError(f"{where} returns what its ports declare: {error}") from error
         if codec.is_event:

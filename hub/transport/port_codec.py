@@ -77,7 +77,7 @@ class PortCodec:
 
         Raises MessageError if the payload is invalid.
         """
-        if self.vector is not None and (found := self.vector.found(payload)) is not None:
+        if self.vector is not None and (found := self.vector.find_vector(payload)) is not None:
             return found
         message = decode(self._model, payload)
         return self.vector.from_message(message) if self.vector is not None else message

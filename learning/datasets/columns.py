@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from schemas.errors import RecordingError, did_you_mean
 from trocar import Recording, Series
 
-__all__ = ["Columns", "chosen", "commanded", "measured"]
+__all__ = ["Columns", "choose_columns", "commanded_columns", "measured_columns"]
 
 _MEASURED = re.compile(r"([A-Za-z0-9]+)/(?:(jaw|hand)/)?measured_js")
 """A port with measured joints: arm, and part of the arm. Setup joints do not match, nor do phalanges."""
@@ -39,7 +39,7 @@ class Columns:
         return self.values[newest.clip(min=0)].astype(np.float32)
 
 
-def measured(recording: Recording) -> list[Columns]:
+def measured_columns(recording: Recording) -> list[Columns]:
     """Return the measured joints of each arm, with jaw or hand, arms in alphabetical order.
 
     Raises RecordingError if there is none.
@@ -56,7 +56,7 @@ def measured(recording: Recording) -> list[Columns]:
     return found
 
 
-def commanded(recording: Recording) -> list[Columns]:
+def commanded_columns(recording: Recording) -> list[Columns]:
     """Return the commanded joints of each arm, in the order of `measured`.
 
     Columns are the arm's setpoints; without setpoints, the commands from the arm's connection. Joints
@@ -78,12 +78,12 @@ def commanded(recording: Recording) -> list[Columns]:
     return found
 
 
-def chosen(recording: Recording, names: Sequence[str]) -> list[Columns]:
+def choose_columns(recording: Recording, names: Sequence[str]) -> list[Columns]:
     """Return the numbers of `PORT` or `PORT.FIELD`, such as `tissue.probe/wrench.force`.
 
     Raises RecordingError for a port or a field not recorded or without numbers.
     """
-    return [_chosen(recording, name) for name in names]
+    return [_choose_ports(recording, name) for name in names]
 
 
 def _measured_ports(recording: Recording) -> Iterator[tuple[str, str, str, str]]:
@@ -109,7 +109,7 @@ def _joints(recording: Recording, port: str, arm: str, part: str) -> Columns:
     return _columns(recording, series, tuple(f"{prefix}.{name}" for name in names), values)
 
 
-def _chosen(recording: Recording, name: str) -> Columns:
+def _choose_ports(recording: Recording, name: str) -> Columns:
     for port in recording.ports:
         if name == port or name.startswith(f"{port}."):
             series, field = recording[port], name.removeprefix(port).removeprefix(".")

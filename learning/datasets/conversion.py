@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any, Self
 
-from learning.datasets.episode import Episode, Wanted, opened
+from learning.datasets.episode import Episode, Wanted, open_recording
 from learning.datasets.pictures import DEFAULT_SIZE, recorded_size, stereo
 from learning.datasets.writer import Writer
 from schemas.errors import RecordingError, SessionError
@@ -51,7 +51,7 @@ class Conversion:
         try:
             with TemporaryDirectory() as scratch:
                 try:
-                    recording, cut_short = opened(path, Path(scratch))
+                    recording, cut_short = open_recording(path, Path(scratch))
                 except OSError as error:
                     raise RecordingError(f"'{path}' cannot be opened: {error}") from error
                 seconds = self._add(path, recording)

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from learning.datasets.columns import Columns, chosen, commanded, measured
+from learning.datasets.columns import Columns, choose_columns, commanded_columns, measured_columns
 from schemas.errors import RecordingError
 from trocar import Recording, recover
 
-__all__ = ["Episode", "Wanted", "opened"]
+__all__ = ["Episode", "Wanted", "open_recording"]
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class Episode:
         Each frame has its action, a frame later. Raises RecordingError if the recording lacks numbers, or
         lasts for less than a frame.
         """
-        state = chosen(recording, wanted.state) if wanted.state else measured(recording)
-        action = chosen(recording, wanted.action) if wanted.action else commanded(recording)
+        state = choose_columns(recording, wanted.state) if wanted.state else measured_columns(recording)
+        action = choose_columns(recording, wanted.action) if wanted.action else commanded_columns(recording)
         for one in (*state, *action):
             if not len(one.times_ns):
                 raise RecordingError(f"'{recording.file}': nothing is recorded of '{one.port}'")
@@ -84,7 +84,7 @@ def _names(columns: Sequence[Columns]) -> tuple[str, ...]:
     return tuple(name for one in columns for name in one.names)
 
 
-def opened(path: Path, scratch: Path) -> tuple[Recording, bool]:
+def open_recording(path: Path, scratch: Path) -> tuple[Recording, bool]:
     """Open a recording; return also whether the recording was cut short and saved in `scratch`.
 
     `scratch` then has the readable part. Raises RecordingError if nothing can be read.

@@ -52,7 +52,7 @@ def stereo(recording: Recording, times_ns: NDArray[np.int64], fps: int, size: tu
         count = len(times_ns) if fits.all() else int(fits.argmin())
         if count >= len(times_ns) - 1:
             eyes = (
-                _recorded(recording, port, taken[:count], size)
+                _recorded_pictures(recording, port, taken[:count], size)
                 for port, taken in zip(ports, picked, strict=True)
             )
             return Stereo(count, recorded=True, pairs=zip(*eyes, strict=True))
@@ -86,14 +86,14 @@ def _ports(recording: Recording) -> tuple[str, ...]:
 def _newest(recording: Recording, port: str, times_ns: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return when the newest picture up to each time was taken; far in the past if there is none."""
     taken = (
-        _decoded(recording, message.topic, message.type, message.payload).header.stamp.ns
+        _decode_pictures(recording, message.topic, message.type, message.payload).header.stamp.ns
         for message in recording.messages(recording[port].topic)
     )
     taken_ns = np.array([_NEVER_NS, *taken], np.int64)
     return taken_ns[np.searchsorted(taken_ns, times_ns, side="right") - 1]
 
 
-def _recorded(
+def _recorded_pictures(
     recording: Recording, port: str, taken_ns: NDArray[np.int64], size: tuple[int, int]
 ) -> Iterator[NDArray[np.uint8]]:
     """Yield the pictures taken at `taken_ns`, each once."""
@@ -116,22 +116,24 @@ def _recorded(
 def _pictures(recording: Recording, port: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
     """Yield when each picture was taken (ns), and the picture."""
     for message in recording.messages(recording[port].topic):
-        picture = _decoded(recording, message.topic, message.type, message.payload)
+        picture = _decode_pictures(recording, message.topic, message.type, message.payload)
         try:
-            pixels = _pixels(picture)
+            pixels = _picture_pixels(picture)
         except (OSError, ValueError) as error:
             raise RecordingError(f"'{recording.file}': '{port}' has a damaged picture: {error}") from error
         yield picture.header.stamp.ns, pixels
 
 
-def _decoded(recording: Recording, topic: str, type_name: str, payload: bytes) -> Image | CompressedImage:
+def _decode_pictures(
+    recording: Recording, topic: str, type_name: str, payload: bytes
+) -> Image | CompressedImage:
     try:
         return decode(Image if type_name == Image.ros_type else CompressedImage, payload)
     except MessageError as error:
         raise RecordingError(f"'{recording.file}': topic '{topic}': {error}") from error
 
 
-def _pixels(picture: Image | CompressedImage) -> NDArray[np.uint8]:
+def _picture_pixels(picture: Image | CompressedImage) -> NDArray[np.uint8]:
     """Return a picture, shape (height, width, 3), RGB. Raises OSError or ValueError if damaged."""
     if isinstance(picture, Image):
         if picture.encoding != "rgb8":

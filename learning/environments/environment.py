@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 import trocar
 from learning.environments.exercises import Exercise
-from learning.environments.goals import Reward, bonus, reward
-from learning.environments.view import View
+from learning.environments.goals import Reward, event_bonus, reward
+from learning.environments.view import EnvironmentView
 from schemas.errors import MessageError, SessionError
 from schemas.ros import Header, Image, Point, Pose, PoseStamped, Quaternion
 from schemas.trocar_msgs import TaskEvent
@@ -105,8 +105,8 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._episode, self._seen = 0, set[str]()
         self._goal = np.zeros(exercise.goal_size)
 
-    def _new_view(self) -> View:
-        return View(self._session, self.exercise.task, self.exercise.hands)
+    def _new_view(self) -> EnvironmentView:
+        return EnvironmentView(self._session, self.exercise.task, self.exercise.hands)
 
     def _describe(self, size: int, picture: tuple[int, int, int]) -> None:
         """Set the spaces."""
@@ -152,7 +152,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._session.restart(self._next_recording())
         self._view = self._new_view() if not self._session.restores else self._view
         self._seen.clear()
-        inputs = {f"robot.{thing}/place": (_stamped(pose),) for thing, pose in starts.items()}
+        inputs = {f"robot.{thing}/place": (_stamp_pose(pose),) for thing, pose in starts.items()}
         self._session.advance(self._settling, inputs)
         observation = self._observe()
         return observation, self._info(observation, 0.0)
@@ -174,10 +174,10 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._session.advance(self._count, {"actions.action": np.clip(given, -1.0, 1.0)})
         observation = self._observe()
         events = cast("tuple[TaskEvent, ...]", self._session["task.events"])
-        extra = bonus([event.event for event in events], self._seen)
+        extra = event_bonus([event.event for event in events], self._seen)
         info = self._info(observation, extra)
         worth = float(self.compute_reward(observation["achieved_goal"], observation["desired_goal"], info))
-        terminated = self.exercise.lost(self._view) or (self._terminates and info["is_success"])
+        terminated = self.exercise.has_lost_object(self._view) or (self._terminates and info["is_success"])
         return observation, worth, terminated, False, info
 
     def _numbers(self, action: Any) -> Vector:
@@ -212,7 +212,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._view.read()
         parts = {
             "observation": self._view.vector(),
-            "achieved_goal": self.exercise.achieved(self._view),
+            "achieved_goal": self.exercise.achieved_goal(self._view),
             "desired_goal": self._goal,
         }
         found: Observation = {
@@ -223,7 +223,9 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         return found
 
     def _info(self, observation: Observation, extra: float) -> dict[str, Any]:
-        reached = self.exercise.tolerance.reached(observation["achieved_goal"], observation["desired_goal"])
+        reached = self.exercise.tolerance.is_reached(
+            observation["achieved_goal"], observation["desired_goal"]
+        )
         return {"is_success": bool(reached), "bonus": extra}
 
     def _pictures(self) -> dict[str, NDArray[np.uint8]]:
@@ -250,7 +252,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._session.close()
 
 
-def _stamped(pose: Vector) -> PoseStamped:
+def _stamp_pose(pose: Vector) -> PoseStamped:
     x, y, z, i, j, k, w = pose.tolist()
     where = Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=i, y=j, z=k, w=w))
     return PoseStamped(header=Header(frame_id="world"), pose=where)

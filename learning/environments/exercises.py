@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import Generator
 
 from learning.environments.goals import Tolerance
-from learning.environments.view import View
+from learning.environments.view import EnvironmentView
 from robots import rotation
 from robots.training.dishes import DISH, PIECE
 from schemas.vectors import Vector
@@ -61,10 +61,10 @@ class Exercise(ABC):
         """Return where things start and the goal, shape (goal_size,), of an episode."""
 
     @abstractmethod
-    def achieved(self, view: View) -> Vector:
+    def achieved_goal(self, view: EnvironmentView) -> Vector:
         """Return the achieved part of the goal, shape (goal_size,)."""
 
-    def lost(self, view: View) -> bool:
+    def has_lost_object(self, view: EnvironmentView) -> bool:
         """Return whether a thing has fallen out of the scene."""
         return bool((view.poses[:, 2] < self.floor).any())
 
@@ -79,7 +79,7 @@ class Reach(Exercise):
         """Draw a point of the workspace: 80 x 80 x 50 mm."""
         return {}, rng.uniform([-0.04, -0.04, 0.015], [0.04, 0.04, 0.065])
 
-    def achieved(self, view: View) -> Vector:
+    def achieved_goal(self, view: EnvironmentView) -> Vector:
         """Return where the tip is."""
         return view.tips[0, :3]
 
@@ -114,7 +114,7 @@ class NeedlePick(Exercise):
         gx, gy = np.clip(rng.normal(0.0, _SPREAD, 2), -0.035, 0.035)
         return {"needle": _needle_at(x, y, yaw)}, np.array([gx, gy, 0.04])
 
-    def achieved(self, view: View) -> Vector:
+    def achieved_goal(self, view: EnvironmentView) -> Vector:
         """Return where the middle of the needle is."""
         return _middle(view.poses[0])
 
@@ -134,7 +134,7 @@ class NeedleHandOver(Exercise):
         gx, gy = rng.uniform([0.02, -0.015], [0.04, 0.015])
         return {"needle": _needle_at(x, y, yaw)}, np.array([gx, gy, 0.04, 1.0])
 
-    def achieved(self, view: View) -> Vector:
+    def achieved_goal(self, view: EnvironmentView) -> Vector:
         """Return the middle of the needle, and whether PSM2 holds the needle."""
         return np.append(_middle(view.poses[0]), view.held[0, 1])
 
@@ -160,7 +160,7 @@ class PegTransfer(Exercise):
         """The starting posts of rings."""
         return self.task.params.board.measures.starts
 
-    def achieved(self, view: View) -> Vector:
+    def achieved_goal(self, view: EnvironmentView) -> Vector:
         """Return where the ring's middle is."""
         return view.poses[0, :3]
 
@@ -190,7 +190,7 @@ class PickAndPlace(Exercise):
         dish = np.array(dishes[str(rng.choice(sorted(dishes)))].position)
         return {"piece": np.concatenate([[x, y, height], turn])}, dish + np.array([0.0, 0.0, height])
 
-    def achieved(self, view: View) -> Vector:
+    def achieved_goal(self, view: EnvironmentView) -> Vector:
         """Return where the piece's middle is."""
         return view.poses[0, :3]
 
@@ -207,6 +207,6 @@ class Retraction(Exercise):
         """Draw how far the edge is to be lifted: 12 to 25 mm."""
         return {}, rng.uniform(0.012, 0.025, 1)
 
-    def achieved(self, view: View) -> Vector:
+    def achieved_goal(self, view: EnvironmentView) -> Vector:
         """Return the lifted height of the held tissue, 0 while nothing is held."""
         return view.tissue[1:] * view.tissue[0]

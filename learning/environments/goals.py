@@ -13,7 +13,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Reward", "Tolerance", "bonus", "reward"]
+__all__ = ["Reward", "Tolerance", "event_bonus", "reward"]
 
 Reward = Literal["sparse", "shaped"]
 
@@ -34,7 +34,7 @@ class Tolerance:
     along: float | None = None
     """Along z."""
 
-    def reached(self, achieved: NDArray[Any], desired: NDArray[Any]) -> NDArray[np.bool_]:
+    def is_reached(self, achieved: NDArray[Any], desired: NDArray[Any]) -> NDArray[np.bool_]:
         """Return whether goals of shape (..., size) are reached, shape (...)."""
         off = np.abs(achieved - desired)
         if self.along is None:
@@ -63,7 +63,7 @@ def reward(
     `bonus` in `info`.
     """
     if kind == "sparse":
-        return np.where(tolerance.reached(achieved, desired), 0.0, -1.0)
+        return np.where(tolerance.is_reached(achieved, desired), 0.0, -1.0)
     if isinstance(info, Mapping):
         extra: Any = info.get("bonus", 0.0)
     else:
@@ -72,7 +72,7 @@ def reward(
     return np.asarray(extra - distance(achieved, desired) / LENGTH, np.float64)
 
 
-def bonus(events: Sequence[str], seen: set[str]) -> float:
+def event_bonus(events: Sequence[str], seen: set[str]) -> float:
     """Return the value of a step's kinds of events, and add the kinds to those `seen` in the episode."""
     total = 0.0
     for kind in events:

@@ -15,10 +15,10 @@ from schemas.vectors import Vector
 from tasks.instant import base_pose
 from tasks.task import Task
 
-__all__ = ["View"]
+__all__ = ["EnvironmentView"]
 
 
-class View:
+class EnvironmentView:
     """Reads the newest outputs of a session's robot, and of its tissue if present."""
 
     def __init__(self, session: trocar.SteppedSession, task: Task, arms: Sequence[str]) -> None:

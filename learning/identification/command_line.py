@@ -99,7 +99,7 @@ def identify(
     from learning.identification.measurements import has_jaw, measurements
     from robots.identification.fit import fit
     from robots.identification.result import own_dynamics
-    from robots.identification.signals import filtered
+    from robots.identification.signals import filter_signals
 
     paths = recordings or []
     for file in (output, plot):
@@ -108,7 +108,7 @@ def identify(
     jaw = tool is not None and tool.jaw is not None and all(has_jaw(path, arm) for path in paths)
     moving = of_ecm() if tool is None else of_psm(tool, jaw=jaw)
     joints = [joint.name for joint in moving.joints]
-    samples = [filtered(measurements(path, arm, joints, owner), cutoff, rate) for path in paths]
+    samples = [filter_signals(measurements(path, arm, joints, owner), cutoff, rate) for path in paths]
     found = fit(samples, moving, gravity=_gravity(up), stribeck=stribeck)
     output.write_text(own_dynamics(found, cutoff, [path.name for path in paths]).text(), "utf-8")
     _print(found, joints)

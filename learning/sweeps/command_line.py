@@ -71,7 +71,7 @@ def sweep(
     for package, extra in needed.items():
         if find_spec(package) is None:
             raise MissingExtraError("'trocar sweep'", extra, package)
-    from learning.own_directory import claimed
+    from learning.own_directory import claim_directory
     from learning.sweeps.sweep import Sweep
     from learning.sweeps.variation import parse
 
@@ -85,7 +85,7 @@ def sweep(
         recorded=record,
     )
     made.check()
-    with claimed(output, "sweep"):
+    with claim_directory(output, "sweep"):
         made.open()
         _run(made, jobs or os.cpu_count() or 1, ray)
 

@@ -10,7 +10,7 @@ from typing import Any
 from learning.own_directory import whole_file
 from learning.sweeps.variation import Variation, number_and_unit
 
-__all__ = ["flat", "write_plots", "write_table"]
+__all__ = ["flatten_row", "write_plots", "write_table"]
 
 _ABOUT_THE_RUN = {
     "trial", "repetition", "scenario_hash", "attempts", "node", "recording", "state", "error", "ending",
@@ -23,7 +23,7 @@ _LARGEST = 1e300
 """Absolute value of a number drawn; a damaged row may hold any."""
 
 
-def flat(row: Mapping[str, Any], variations: Sequence[Variation]) -> dict[str, Any]:
+def flatten_row(row: Mapping[str, Any], variations: Sequence[Variation]) -> dict[str, Any]:
     """Return a row without mappings in it, and varied values as numbers if their unit is common."""
     units = {variation.path: variation.unit for variation in variations}
     made: dict[str, Any] = {}
@@ -31,7 +31,7 @@ def flat(row: Mapping[str, Any], variations: Sequence[Variation]) -> dict[str, A
         if units.get(name) is not None and (found := number_and_unit(value)) is not None:
             made[name] = found[0]
         elif isinstance(value, Mapping):
-            made |= {f"{name}.{key}": each for key, each in flat(value, ()).items()}  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
+            made |= {f"{name}.{key}": each for key, each in flatten_row(value, ()).items()}  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
         else:
             made[name] = json.dumps(value) if isinstance(value, list) else value
     return made
@@ -42,7 +42,7 @@ def write_table(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variatio
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    made = [flat(row, variations) for row in rows]
+    made = [flatten_row(row, variations) for row in rows]
     units = {variation.path: variation.unit for variation in variations}
     fields: list[Any] = []
     columns: list[Any] = []
@@ -68,7 +68,7 @@ def write_plots(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variatio
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    made = [flat(row, variations) for row in rows]
+    made = [flatten_row(row, variations) for row in rows]
     varied = [each for each in variations if len(each.values) > 1]
     measures = [
         name

@@ -22,7 +22,7 @@ from typing import Any, cast
 
 import trocar
 from learning.own_directory import MARKER, whole_file
-from learning.sweeps.trial import Trial, planned, run_trial
+from learning.sweeps.trial import Trial, plan_trials, run_trial
 from learning.sweeps.variation import Variation
 from schemas.errors import ScenarioError
 
@@ -50,7 +50,7 @@ class Sweep:
     @property
     def trials(self) -> list[Trial]:
         """All trials, in order."""
-        return planned(self.variations, self.repeat, self.seed)
+        return plan_trials(self.variations, self.repeat, self.seed)
 
     def check(self) -> None:
         """Raise ScenarioError if a parameter is varied twice, or if a value is not valid in the scenario."""
@@ -63,7 +63,7 @@ class Sweep:
         for variation in self.variations:
             for value in variation.values:
                 trocar.load_scenario(
-                    self.scenario, set=self._fixed() | _texts(first | {variation.path: value})
+                    self.scenario, set=self._fixed_settings() | _texts(first | {variation.path: value})
                 )
 
     @cached_property
@@ -72,7 +72,7 @@ class Sweep:
 
         Raises ScenarioError if the scenario is not valid.
         """
-        first = self._fixed() | _texts(self.trials[0].settings)
+        first = self._fixed_settings() | _texts(self.trials[0].settings)
         scenario = trocar.load_scenario(self.scenario, set=first).scenario
         return hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()
 
@@ -82,7 +82,7 @@ class Sweep:
         Raises ScenarioError if the directory holds another sweep or something else, or if the scenario has
         changed.
         """
-        file, described = self.directory / "sweep.json", self._described()
+        file, described = self.directory / "sweep.json", self._describe_sweep()
         if file.exists():
             now, there = described.pop("scenario_hash"), _read(file)
             if there.pop("scenario_hash", now) != now and there == described:
@@ -141,10 +141,10 @@ class Sweep:
             for trial in trials
         ]
 
-    def _fixed(self) -> dict[str, str]:
+    def _fixed_settings(self) -> dict[str, str]:
         return {path: value for path, _, value in (each.partition("=") for each in self.overrides)}
 
-    def _described(self) -> dict[str, Any]:
+    def _describe_sweep(self) -> dict[str, Any]:
         """Return the settings of the sweep for `sweep.json`."""
         return {
             "scenario": self.scenario,
@@ -165,7 +165,7 @@ def _here(jobs: int, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str, An
 
     # threads: a trial is a process already, and one that dies takes no worker with it
     parallel = Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered", batch_size=1)
-    yield from parallel(delayed(_numbered)(number, call) for number, call in enumerate(calls))
+    yield from parallel(delayed(_call_numbered)(number, call) for number, call in enumerate(calls))
 
 
 def _on_ray(address: str, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -174,7 +174,7 @@ def _on_ray(address: str, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[st
     # joblib's own backend for Ray gives results only when all are there, which an interruption would lose
     ray.init(address=address, log_to_driver=False)
     try:
-        run = ray.remote(num_cpus=1)(_numbered)
+        run = ray.remote(num_cpus=1)(_call_numbered)
         pending = [run.remote(number, call) for number, call in enumerate(calls)]
         while pending:
             done, pending = ray.wait(pending)
@@ -183,7 +183,7 @@ def _on_ray(address: str, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[st
         ray.shutdown()
 
 
-def _numbered(number: int, call: _Call) -> tuple[int, dict[str, Any]]:
+def _call_numbered(number: int, call: _Call) -> tuple[int, dict[str, Any]]:
     return number, run_trial(*call)
 
 

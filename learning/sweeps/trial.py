@@ -15,7 +15,7 @@ from typing import Any
 
 from learning.sweeps.variation import Variation
 
-__all__ = ["Trial", "planned", "run_trial"]
+__all__ = ["Trial", "plan_trials", "run_trial"]
 
 _ATTEMPTS = 2
 _LAST_LINES = 3
@@ -38,7 +38,7 @@ class Trial:
         return f"{self.number:05d}"
 
 
-def planned(variations: Sequence[Variation], repeat: int, seed: str | None) -> list[Trial]:
+def plan_trials(variations: Sequence[Variation], repeat: int, seed: str | None) -> list[Trial]:
     """Return all trials: each combination of values, `repeat` times, the last variation changing fastest.
 
     `seed` is the path of a parameter set to the number of the repetition, from 0.

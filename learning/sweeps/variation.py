@@ -65,15 +65,15 @@ def parse(text: str) -> Variation:
             " PATH=VALUE,VALUE"
         )
     if found := _RANGE.fullmatch(values.strip()):
-        return Variation(path.strip(), _spaced(text, *found.groups()))
+        return Variation(path.strip(), _space_values(text, *found.groups()))
     if ".." in values:
         raise ScenarioError(
             f"--vary {text}: '{values}' is not a range: expected FIRST..LAST:COUNT, such as 5 kPa..50 kPa:10"
         )
-    return Variation(path.strip(), _listed(text, values))
+    return Variation(path.strip(), _list_values(text, values))
 
 
-def _spaced(
+def _space_values(
     text: str, first: str, unit: str | None, last: str, last_unit: str | None, count: str
 ) -> tuple[Any, ...]:
     if unit and unit != last_unit:
@@ -90,7 +90,7 @@ def _spaced(
     return tuple(int(number) if whole else number for number in numbers)
 
 
-def _listed(text: str, values: str) -> tuple[Any, ...]:
+def _list_values(text: str, values: str) -> tuple[Any, ...]:
     yaml: Any = YAML(typ="safe", pure=True)
     try:
         found: Any = yaml.load(f"[{values}]")

@@ -111,7 +111,7 @@ def fit(
     Raises RecordingError if the motion does not excite the arm enough.
     """
     rows = _Rows.of(LinearModel(arm, gravity), [*recorded, *([judged] if judged else [])], stribeck=stribeck)
-    unseen = judged.kept if judged else round((1.0 - _TRAINED) * len(rows.time))
+    unseen = judged.kept_count if judged else round((1.0 - _TRAINED) * len(rows.time))
     trained = len(rows.time) - unseen
     seen, test = slice(None, trained), slice(trained, None)
     published = rows.regressor @ rows.model.nominal + rows.carried

@@ -66,7 +66,7 @@ def choose_shape(
     normal, goal = every.T @ every, every.T @ effort.ravel()
     first = fixed.shape[-1] + np.arange(len(dry)) * rubbing * kinds
 
-    def explained(picks: list[int]) -> float:
+    def explained_share(picks: list[int]) -> float:
         columns = list(range(fixed.shape[-1]))
         for i, pick in enumerate(picks):
             columns += [int(first[pick]) + kind * rubbing + i for kind in range(kinds)]
@@ -78,7 +78,7 @@ def choose_shape(
     for _ in range(_ROUNDS):
         before = picks.copy()
         for alike in groups:
-            trials = [explained(np.where(alike, pick, picks).tolist()) for pick in range(len(dry))]
+            trials = [explained_share(np.where(alike, pick, picks).tolist()) for pick in range(len(dry))]
             picks[alike] = int(np.argmax(trials))
         if (picks == before).all():
             break

@@ -61,8 +61,8 @@ def _how(found: Fit, cutoff: float, recordings: Sequence[str]) -> dict[str, Any]
         "cutoff_hz": cutoff,
         "samples": len(found.time),
         "condition_number": float(f"{found.condition:.3g}"),
-        "relative_residual": _rounded(model.joints, found.residual),
-        "relative_residual_of_published": _rounded(model.joints, found.published_residual),
+        "relative_residual": _round_values(model.joints, found.residual),
+        "relative_residual_of_published": _round_values(model.joints, found.published_residual),
         "base_parameters": {
             model.names[column]: {
                 "value": float(f"{value:.5g}"),
@@ -90,5 +90,5 @@ def _body(pseudo: Vector) -> BodyInertia:
     return BodyInertia.model_validate({"mass": mass, "centre": centre.tolist(), "tensor": rows.tolist()})
 
 
-def _rounded(joints: Sequence[str], values: Vector) -> dict[str, float]:
+def _round_values(joints: Sequence[str], values: Vector) -> dict[str, float]:
     return {joint: round(value, 4) for joint, value in zip(joints, values.tolist(), strict=True)}

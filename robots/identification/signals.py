@@ -18,7 +18,7 @@ from scipy.signal import butter, sosfiltfilt
 from schemas.errors import RecordingError
 from schemas.vectors import Vector
 
-__all__ = ["LEAST_DURATION", "ORDER", "Measured", "Samples", "filtered"]
+__all__ = ["LEAST_DURATION", "ORDER", "Measured", "Samples", "filter_signals"]
 
 ORDER = 4
 """Order of the Butterworth low-pass in each direction."""
@@ -61,12 +61,12 @@ class Samples(NamedTuple):
         return slice(edge, len(self.time) - edge)
 
     @property
-    def kept(self) -> int:
+    def kept_count(self) -> int:
         """Return how many these are."""
         return max(0, self.inner.stop - self.inner.start)
 
 
-def filtered(measured: Measured, cutoff: float, rate: float) -> Samples:
+def filter_signals(measured: Measured, cutoff: float, rate: float) -> Samples:
     """Return `measured` below the frequency `cutoff` (Hz), at most `rate` samples per second.
 
     Raises RecordingError for numbers not finite, times not increasing, and a recording too short or too slow
@@ -76,7 +76,7 @@ def filtered(measured: Measured, cutoff: float, rate: float) -> Samples:
     step = float(np.median(np.diff(measured.time)))
     clock = np.arange(measured.time[0], measured.time[-1], step)
     q, effort = (
-        _low_passed(_resampled(clock, measured.time, values), step, cutoff)
+        _low_passed(_resample_signals(clock, measured.time, values), step, cutoff)
         for values in (measured.position, measured.effort)
     )
     dq, ddq = np.zeros_like(q), np.zeros_like(q)
@@ -86,7 +86,7 @@ def filtered(measured: Measured, cutoff: float, rate: float) -> Samples:
     return Samples(clock[kept], q[kept], dq[kept], ddq[kept], effort[kept], cutoff)
 
 
-def _resampled(clock: Vector, time: Vector, values: Vector) -> Vector:
+def _resample_signals(clock: Vector, time: Vector, values: Vector) -> Vector:
     result = np.empty((len(clock), values.shape[1]))
     for i in range(values.shape[1]):
         result[:, i] = np.interp(clock, time, values[:, i])

@@ -60,7 +60,7 @@ class NeedleShape:
         return {name: _frame(self.radius, angle) for name, angle in angles.items()}
 
     @property
-    def bonded(self) -> Vector:
+    def bond_points(self) -> Vector:
         """Points of a bond: base, half way and tip, m in the needle's frame, shape (3, 3)."""
         return self.points(np.array([-self.arc / 2.0, 0.0, self.arc / 2.0]))
 

@@ -40,7 +40,7 @@ def test_an_action_of_1_is_ten_millimetres_and_thirty_degrees():
     angle = 2.0 * np.arccos(abs(moved["PSM1/goal_cp"][3:] @ start[3:]))
     assert angle == pytest.approx(radians(30.0))
     assert moved["PSM1/jaw/servo_jp"] == pytest.approx([0.0], abs=1e-12)
-    tip = actions.params.arms.driven["PSM1"].chain.frames(moved["PSM1/servo_jp"])[-1]
+    tip = actions.params.arms.present_arms["PSM1"].chain.frames(moved["PSM1/servo_jp"])[-1]
     assert tip[:3, 3] + [0.0, 0.0, 0.2] == pytest.approx(moved["PSM1/goal_cp"][:3], abs=1e-9)
 
 

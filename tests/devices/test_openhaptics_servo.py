@@ -35,7 +35,7 @@ from devices.haptics.servo.exchange import (
     model_doubles,
     servo_ends,
 )
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 from devices.haptics.servo.servo import Servo
 from devices.haptics.servo.stylus import Stylus
 from devices.openhaptics import hdapi
@@ -148,9 +148,9 @@ def test_a_stylus_is_ready_after_three_clean_frames_and_gives_no_force_before_it
     rig: Callable[..., Rig],
 ) -> None:
     one = rig()
-    assert Phase(one.run(2).phase) is Phase.SETTLING
+    assert ServoPhase(one.run(2).phase) is ServoPhase.SETTLING
     state = one.run(1)
-    assert (Phase(state.phase), state.code) == (Phase.READY, 0)
+    assert (ServoPhase(state.phase), state.code) == (ServoPhase.READY, 0)
     one.world.devices[0].buttons = 1
     assert one.run(1500, touching=True).force == (0.0, 0.0, 0.0)
     assert not any(one.sent)
@@ -192,11 +192,11 @@ def test_a_warning_takes_the_force_and_lets_it_come_back(rig: Callable[..., Rig]
     device = one.world.devices[0]
     device.error, device.error_frames = code, 1
     state = one.run(2, touching=True)
-    assert (Phase(state.phase), state.code, state.force) == (Phase.WARNED, code, (0.0, 0.0, 0.0))
-    assert Phase(one.state(1).phase) is Phase.READY  # the other hand keeps its force
+    assert (ServoPhase(state.phase), state.code, state.force) == (ServoPhase.WARNED, code, (0.0, 0.0, 0.0))
+    assert ServoPhase(one.state(1).phase) is ServoPhase.READY  # the other hand keeps its force
     assert math.hypot(*one.world.motors(1)) > 1.0
     device.target[1] = 0.03
-    assert Phase(one.run(1100, touching=True).phase) is Phase.READY
+    assert ServoPhase(one.run(1100, touching=True).phase) is ServoPhase.READY
     device.target[1] = -0.005
     assert one.run(2000, touching=True).force[2] > 1.0
     assert max(np.diff(one.sent)) < 0.1 + 1e-9
@@ -208,23 +208,27 @@ def test_a_storm_of_warnings_keeps_the_force_away(rig: Callable[..., Rig]) -> No
     one.world.devices[0].error, one.world.devices[0].error_frames = Code.EXCEEDED_MAX_FORCE, 10_000
     one.run(2, touching=True)
     calm = len(one.sent)
-    assert Phase(one.run(3000, touching=True).phase) is Phase.WARNED
+    assert ServoPhase(one.run(3000, touching=True).phase) is ServoPhase.WARNED
     assert not any(one.sent[calm:])
 
 
 @pytest.mark.parametrize(
     ("code", "phase"),
-    [(Code.COMM_ERROR, Phase.FAULT), (Code.DEVICE_FAULT, Phase.FAULT), (Code.TIMER_ERROR, Phase.BUSY)],
+    [
+        (Code.COMM_ERROR, ServoPhase.FAULT),
+        (Code.DEVICE_FAULT, ServoPhase.FAULT),
+        (Code.TIMER_ERROR, ServoPhase.BUSY),
+    ],
 )
 def test_a_fault_ends_the_schedule_with_a_frame_without_force(
-    rig: Callable[..., Rig], code: Code, phase: Phase
+    rig: Callable[..., Rig], code: Code, phase: ServoPhase
 ) -> None:
     one = rig()
     one.press()
     one.world.devices[0].error, one.world.devices[0].error_frames = code, 1
     state = one.run(2, touching=True)
     assert one.answer == CALLBACK_DONE
-    assert (Phase(state.phase), state.code) == (phase, code)
+    assert (ServoPhase(state.phase), state.code) == (phase, code)
     assert [math.hypot(*one.world.motors(i)) for i in (0, 1)] == [0.0, 0.0]
 
 
@@ -232,8 +236,10 @@ def test_the_placeholder_pose_means_that_another_program_has_the_device(rig: Cal
     one = rig()
     one.run()
     one.world.devices[0].placeholder = 1
-    assert Phase(one.run(1).phase) is Phase.SETTLING  # from the first such frame on there is no pose
-    assert Phase(one.run(2).phase) is Phase.BUSY
+    assert (
+        ServoPhase(one.run(1).phase) is ServoPhase.SETTLING
+    )  # from the first such frame on there is no pose
+    assert ServoPhase(one.run(2).phase) is ServoPhase.BUSY
     one.run(1)
     assert one.answer == CALLBACK_DONE
 
@@ -244,14 +250,14 @@ def test_inkwell(rig: Callable[..., Rig]) -> None:
     device.calibration, device.buttons = NEEDS_MANUAL_INPUT, 1
     one.allow()
     state = one.run(200, touching=True)
-    assert (Phase(state.phase), state.code, state.force, device.force_output) == (
-        Phase.UNCALIBRATED,
+    assert (ServoPhase(state.phase), state.code, state.force, device.force_output) == (
+        ServoPhase.UNCALIBRATED,
         INKWELL,
         (0.0, 0.0, 0.0),
         0,
     )
     device.inkwell = 1
-    assert Phase(one.run(5).phase) is Phase.READY
+    assert ServoPhase(one.run(5).phase) is ServoPhase.READY
     assert (device.updates, device.force_output) == (1, 1)
 
 
@@ -273,9 +279,13 @@ def test_an_encoder_reset_waits_for_the_person_who_holds_the_stylus_in_its_place
     device = one.world.devices[0]
     device.styles = ENCODER_RESET
     state = one.run(200)
-    assert (Phase(state.phase), state.code, device.updates) == (Phase.UNCALIBRATED, ENCODER_RESET, 0)
+    assert (ServoPhase(state.phase), state.code, device.updates) == (
+        ServoPhase.UNCALIBRATED,
+        ENCODER_RESET,
+        0,
+    )
     device.buttons = 1
-    assert Phase(one.run(5).phase) is Phase.READY
+    assert ServoPhase(one.run(5).phase) is ServoPhase.READY
     assert device.updates == 1
 
 
@@ -284,7 +294,7 @@ def test_a_stylus_that_loses_its_calibration_gives_neither_pose_nor_force(rig: C
     one.press()
     one.world.devices[0].calibration = NEEDS_MANUAL_INPUT
     state = one.run(200, touching=True)
-    assert not Phase(state.phase).has_pose
+    assert not ServoPhase(state.phase).has_pose
     assert (state.force, one.world.devices[0].force_output) == ((0.0, 0.0, 0.0), 0)
 
 
@@ -297,7 +307,7 @@ def test_a_stylus_that_waits_for_its_calibration_does_not_hide_what_another_comp
     # asks, tick by tick, and is refused
     one.world.devices[1].calibration, one.world.devices[1].styles = NEEDS_UPDATE, 0
     assert one.run(200, touching=True).force[2] > 1.0
-    assert Phase(one.state(1).phase) is Phase.UNCALIBRATED
+    assert ServoPhase(one.state(1).phase) is ServoPhase.UNCALIBRATED
     one.world.devices[0].error, one.world.devices[0].error_frames = code, 1
     state = one.run(2, touching=True)
     assert (state.code, state.force) == (code, (0.0, 0.0, 0.0))
@@ -308,7 +318,7 @@ def test_a_stylus_that_is_unplugged_while_it_is_not_calibrated_is_lost(rig: Call
     one.world.devices[0].calibration, one.world.devices[0].styles = NEEDS_UPDATE, 0
     one.run()
     one.world.devices[0].error, one.world.devices[0].error_frames = Code.COMM_ERROR, 1
-    assert Phase(one.run(2).phase) is Phase.FAULT
+    assert ServoPhase(one.run(2).phase) is ServoPhase.FAULT
 
 
 def test_a_complaint_of_a_stylus_that_is_not_calibrated_leaves_what_to_do_about_that(
@@ -333,8 +343,8 @@ def test_a_warning_is_no_letting_go_for_a_hand_that_was_too_fast(rig: Callable[.
     one.run(1200, touching=True)
     device.target[1] = -0.005
     state = one.run(1500, touching=True)
-    assert (Phase(state.phase), tuple(Condition)[state.cause], state.force) == (
-        Phase.READY,
+    assert (ServoPhase(state.phase), tuple(Condition)[state.cause], state.force) == (
+        ServoPhase.READY,
         Condition.TOO_FAST,
         (0.0, 0.0, 0.0),
     )
@@ -380,15 +390,15 @@ def test_a_watcher_without_a_sign_of_life_takes_the_force_and_returns_it_slowly(
     one.watched = False
     assert one.run(99, touching=True).force[2] > 1.0
     state = one.run(1, touching=True)
-    assert (Phase(state.phase), state.force) == (Phase.UNWATCHED, (0.0, 0.0, 0.0))
-    assert Phase(state.phase).has_pose
+    assert (ServoPhase(state.phase), state.force) == (ServoPhase.UNWATCHED, (0.0, 0.0, 0.0))
+    assert ServoPhase(state.phase).has_pose
     assert diagnoses.present(state, Touch.words, "") == (
         Level.WARN,
         "no force: the process that watches the servo process is late; is the machine busy?",
     )
     one.watched = True
     calm = len(one.sent)
-    assert Phase(one.run(200, touching=True).phase) is Phase.READY
+    assert ServoPhase(one.run(200, touching=True).phase) is ServoPhase.READY
     assert not any(one.sent[calm:])  # the hand has not left the contact
     one.world.devices[0].target[1] = 0.03
     one.run(500, touching=True)
@@ -402,7 +412,7 @@ def test_a_watcher_that_does_not_return_ends_the_schedule(rig: Callable[..., Rig
     one.press()
     one.watched = False
     state = one.run(1001, touching=True)
-    assert (one.answer, Phase(state.phase)) == (CALLBACK_DONE, Phase.FAULT)
+    assert (one.answer, ServoPhase(state.phase)) == (CALLBACK_DONE, ServoPhase.FAULT)
     assert one.servo.failure == "the process that watches the servo process has ended or stands still"
     assert [math.hypot(*one.world.motors(i)) for i in (0, 1)] == [0.0, 0.0]
 
@@ -419,7 +429,7 @@ def test_an_exception_in_the_callback_ends_in_a_frame_without_force_on_every_han
     monkeypatch.setattr(one.styluses[1], "frame", fails)
     state = one.run(2, touching=True)
     assert (one.answer, one.servo.failure) == (CALLBACK_DONE, "ValueError: a bug")
-    assert Phase(state.phase) is Phase.FAULT
+    assert ServoPhase(state.phase) is ServoPhase.FAULT
     assert [math.hypot(*one.world.motors(i)) for i in (0, 1)] == [0.0, 0.0]
 
 
@@ -470,8 +480,8 @@ def test_whatever_happens_the_force_keeps_its_limits(
 
 def test_a_clean_run_leaves_no_error_in_the_library(rig: Callable[..., Rig]) -> None:
     one = rig(dead_man="safety-switch")
-    assert Phase(one.run(300).phase) is Phase.READY
-    assert Phase(one.state(1).phase) is Phase.READY
+    assert ServoPhase(one.run(300).phase) is ServoPhase.READY
+    assert ServoPhase(one.state(1).phase) is ServoPhase.READY
     assert hdapi.errors(one.hd) == []
 
 

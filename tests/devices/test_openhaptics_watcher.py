@@ -23,7 +23,7 @@ import pytest
 
 from devices.haptics.safety import Condition
 from devices.haptics.servo.exchange import RingWriter, beat, device_ends, memory_size, servo_ends
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 from devices.haptics.servo.watcher import PERIOD, Watch
 from tests.devices.standins import build, host
 from tests.devices.standins.hd import VARIABLE, HdWorld, Row
@@ -50,7 +50,7 @@ class Frames:
 
     def tick(self, now: float, *causes: int) -> None:
         for states, cause in zip(self.states, causes, strict=True):
-            states.write([now, Phase.READY, 0, 0, 0, cause, *([0.0] * 21)])
+            states.write([now, ServoPhase.READY, 0, 0, 0, cause, *([0.0] * 21)])
 
     def killed_after(self, since: float, until: float = 1.0) -> float | None:
         """Look in the watcher's period; return how long after `since` the servo is to be killed."""

@@ -61,7 +61,7 @@ MESSAGES = {
     KEYS.signals("teleop", "keys"): "std_msgs/msg/Float64",
     KEYS.uses("keys", "teleop"): "std_msgs/msg/String",
     KEYS.device_status("keys"): "trocar_msgs/msg/DeviceStatus",
-    KEYS.refused("engine", "teleop"): "std_msgs/msg/String",
+    KEYS.dropped_messages("engine", "teleop"): "std_msgs/msg/String",
     KEYS.link("keys"): "std_msgs/msg/String",
 }
 PATIENCE_S = 300.0

@@ -64,7 +64,7 @@ def test_a_changed_byte_is_a_changed_number_or_refused(
         decoded = codec.decode(bytes(payload))
     except MessageError:
         return
-    assert codec.checked(decoded) is decoded
+    assert codec.check_vector(decoded) is decoded
     again = bytearray(codec.encode(decoded, 0))
     if "header" in codec.model.model_fields:
         again[4:12] = payload[4:12]
@@ -81,7 +81,7 @@ def test_numbers_that_are_not_finite_are_refused(
     with pytest.raises(MessageError):
         codec.decode(codec.encode(value, 0))
     with pytest.raises(MessageError):
-        codec.checked(value)
+        codec.check_vector(value)
 
 
 @given(st.permutations(JOINTS.names), st.lists(st.floats(-9, 9), min_size=6, max_size=6))
@@ -144,7 +144,7 @@ def test_a_message_without_a_frame_is_taken() -> None:
 )
 def test_values_of_another_shape_or_type_are_refused(value: np.ndarray) -> None:
     with pytest.raises(MessageError, match="'pose'"):
-        VectorCodec(POSE).checked(value)
+        VectorCodec(POSE).check_vector(value)
 
 
 def test_bytes_of_another_frame_are_refused() -> None:

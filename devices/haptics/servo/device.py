@@ -17,7 +17,7 @@ from devices.haptics.ports import StylusSamples, stylus_ports
 from devices.haptics.servo import diagnoses
 from devices.haptics.servo.exchange import State, model_doubles
 from devices.haptics.servo.params import ServoStylusParams
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 from devices.haptics.servo.process import DriverChoice, ServoProcess
 from devices.haptics.servo.supervisor import Lost, Supervisor
 from devices.samples import button_sample
@@ -195,14 +195,14 @@ class _Stylus:
 
     def _buttons(self, state: State, offset_ns: int) -> list[Sample]:
         pressed = tuple(bool(state.buttons >> i & 1) for i in range(self._button_count))
-        if pressed == self._pressed or not Phase(state.phase).has_pose:
+        if pressed == self._pressed or not ServoPhase(state.phase).has_pose:
             return []
         self._pressed = pressed
         return [button_sample(self._ports.buttons, self._time_ns(state, offset_ns), pressed)]
 
     def _newest(self, state: State, offset_ns: int) -> list[Sample]:
-        phase = Phase(state.phase)
-        if phase is not Phase.SETTLING:
+        phase = ServoPhase(state.phase)
+        if phase is not ServoPhase.SETTLING:
             self._settling = None
         elif self._settling is None:
             self._settling = state.time

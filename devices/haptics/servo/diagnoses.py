@@ -6,7 +6,7 @@ from devices.diagnosis import Level
 from devices.haptics.diagnoses import FORCE_DIAGNOSES
 from devices.haptics.safety import Condition
 from devices.haptics.servo.exchange import State
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 
 __all__ = ["FOUND", "Words", "describe_loss", "present"]
 
@@ -33,7 +33,7 @@ class Words:
 FOUND = Level.WARN, "it is back, and is used as soon as no other hand of this host holds its dead-man"
 
 
-def describe_loss(phase: Phase, error: str, cause: str, device: str | None) -> tuple[Level, str]:
+def describe_loss(phase: ServoPhase, error: str, cause: str, device: str | None) -> tuple[Level, str]:
     """Return the diagnosis of a lost stylus.
 
     Args:
@@ -43,7 +43,7 @@ def describe_loss(phase: Phase, error: str, cause: str, device: str | None) -> t
         device: name of the device in the vendor's configuration.
     """
     why = cause or error or "no cause is known"
-    if phase is Phase.ABSENT:
+    if phase is ServoPhase.ABSENT:
         known = (
             f"that the vendor's setup program knows it as '{device}'"
             if device
@@ -53,7 +53,7 @@ def describe_loss(phase: Phase, error: str, cause: str, device: str | None) -> t
             Level.ERROR,
             f"it cannot be opened ({why}): see that it is plugged in and switched on, and {known}; {_AGAIN}",
         )
-    if phase is Phase.BUSY:
+    if phase is ServoPhase.BUSY:
         return (
             Level.ERROR,
             f"another program uses it{f' ({why})' if error else ''}: end that program; {_AGAIN}",
@@ -63,14 +63,14 @@ def describe_loss(phase: Phase, error: str, cause: str, device: str | None) -> t
 
 def present(state: State, words: Words, refusal: str) -> tuple[Level, str]:
     """Return the diagnosis of an open stylus; `refusal`: why the limits were refused, or empty."""
-    phase = Phase(state.phase)
-    if phase is Phase.SETTLING:
+    phase = ServoPhase(state.phase)
+    if phase is ServoPhase.SETTLING:
         return Level.STALE, "it gives no valid frames; if that lasts, switch it off and on"
-    if phase is Phase.UNCALIBRATED:
+    if phase is ServoPhase.UNCALIBRATED:
         return Level.WARN, f"it is not calibrated: {words.calibration(state.code)}"
-    if phase is Phase.WARNED:
+    if phase is ServoPhase.WARNED:
         return Level.WARN, f"no force: the device warns of {words.warning(state.code)}"
-    if phase is Phase.UNWATCHED:
+    if phase is ServoPhase.UNWATCHED:
         return (
             Level.WARN,
             "no force: the process that watches the servo process is late; is the machine busy?",

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from devices.haptics.contact import ZERO
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 from devices.haptics.servo.timed_loop import TimedLoop
 from devices.vendor_axes import Vector3
 
@@ -56,7 +56,7 @@ class Unavailable(NamedTuple):
 
     code: int = 0
     """Error code of the library, or 0."""
-    phase: Phase = Phase.ABSENT
+    phase: ServoPhase = ServoPhase.ABSENT
     """ABSENT or BUSY."""
 
 
@@ -90,7 +90,7 @@ class DriverError(NamedTuple):
     code: int
     handle: int
     """The stylus; a number of no open stylus means all."""
-    phase: Phase
+    phase: ServoPhase
     """WARNED: no force for a second; BUSY or FAULT: the stylus is lost."""
 
 

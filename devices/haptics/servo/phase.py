@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["Phase"]
+__all__ = ["ServoPhase"]
 
 
-class Phase(IntEnum):
+class ServoPhase(IntEnum):
     """The condition of a stylus."""
 
     ABSENT = 0
@@ -36,5 +36,5 @@ class Phase(IntEnum):
         return self in _POSED
 
 
-_LOST = {Phase.ABSENT, Phase.BUSY, Phase.FAULT}
-_POSED = {Phase.READY, Phase.WARNED, Phase.UNWATCHED}
+_LOST = {ServoPhase.ABSENT, ServoPhase.BUSY, ServoPhase.FAULT}
+_POSED = {ServoPhase.READY, ServoPhase.WARNED, ServoPhase.UNWATCHED}

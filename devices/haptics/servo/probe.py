@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from devices.haptics.servo.exchange import State
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 from devices.haptics.servo.process import ServoProcess
 
 __all__ = ["Finding", "Probe", "absence"]
@@ -17,7 +17,7 @@ _LOOKING, _ENDING = 10.0, 1.0
 class Finding(NamedTuple):
     """The condition of a stylus."""
 
-    phase: Phase
+    phase: ServoPhase
     code: int
 
 
@@ -40,8 +40,8 @@ class Probe:
                 self._found[message["stylus"]] = absence(message)
         for name, ring in process.states.items():
             for state in map(State.of, ring.read()):
-                if state.phase != Phase.SETTLING:
-                    self._found[name] = Finding(Phase(state.phase), state.code)
+                if state.phase != ServoPhase.SETTLING:
+                    self._found[name] = Finding(ServoPhase(state.phase), state.code)
         if self._found.keys() == process.states.keys() or now > self._until:
             process.end()
             self._until = min(self._until, now)
@@ -59,4 +59,4 @@ class Probe:
 
 def absence(message: dict[str, Any]) -> Finding:
     """Return the condition of an unopened stylus, by the message of the servo process."""
-    return Finding(Phase(message["phase"]), message["absent"])
+    return Finding(ServoPhase(message["phase"]), message["absent"])

@@ -6,7 +6,7 @@ import contextlib
 import threading
 
 from devices.haptics.servo.driver import Driver
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 from devices.haptics.servo.stylus import Stylus
 from schemas.errors import DeviceError
 
@@ -67,7 +67,7 @@ class Servo:
         except BaseException as error:  # noqa: BLE001
             self.failure = failure_text(error)
             for stylus in self._styluses:
-                stylus.phase = Phase.FAULT
+                stylus.phase = ServoPhase.FAULT
             self._release(now)  # styluses that had their frame of this tick get the last one at the next
             self._ending = True
         return True

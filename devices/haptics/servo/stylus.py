@@ -13,7 +13,7 @@ from devices.haptics.loop import HapticLoop
 from devices.haptics.safety import Condition
 from devices.haptics.servo.driver import Driver, Reading, StylusSpec
 from devices.haptics.servo.exchange import RingReader, RingWriter, planes_in
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 from devices.vendor_axes import Vector3
 
 __all__ = ["Stylus"]
@@ -22,7 +22,7 @@ _CLEAN_FRAMES = 3
 """A driver's loop may start before the first frame of a device exists (hopezzzz/3dtouch, touch_hd.py)."""
 _WARNING = 1.0
 """Time without a warning of the device until force may come back, s."""
-_READY, _SETTLING = Phase.READY, Phase.SETTLING
+_READY, _SETTLING = ServoPhase.READY, ServoPhase.SETTLING
 """Plain names: Python 3.11 takes 0.25 us to look up a member of an enumeration."""
 _UNMOVED = Reading(ZERO, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), ZERO, valid=False)
 
@@ -35,7 +35,7 @@ class Stylus:
     ) -> None:
         """Start without force; there is none before `allow`."""
         self.handle = handle
-        self.phase = Phase.SETTLING
+        self.phase = ServoPhase.SETTLING
         self._driver, self._spec, self._models, self._states = driver, spec, models, states
         self._reading = _UNMOVED
         self._loop: HapticLoop | None = None
@@ -58,7 +58,7 @@ class Stylus:
         self._judge(now, reading, watched=watched)
         self._driver.write(self.handle, self._render(now))
 
-    def on_error(self, code: int, phase: Phase, now: float) -> None:
+    def on_error(self, code: int, phase: ServoPhase, now: float) -> None:
         """Handle an error reported by the driver after the tick at `now`.
 
         Only the loss of the device ends the use of the stylus. Any lesser error switches the force off for a
@@ -92,15 +92,15 @@ class Stylus:
         self._placeholders = 0 if reading.owned else self._placeholders + 1
         self._clean = self._clean + 1 if reading.valid and reading.owned else 0
         if self._placeholders >= _CLEAN_FRAMES:
-            self.phase, self._code = Phase.BUSY, 0
+            self.phase, self._code = ServoPhase.BUSY, 0
         elif self._clean < _CLEAN_FRAMES:
             self.phase = _SETTLING
         elif not reading.calibrated:
-            self.phase, self._code = Phase.UNCALIBRATED, reading.style
+            self.phase, self._code = ServoPhase.UNCALIBRATED, reading.style
         elif now - self._warned < _WARNING:
-            self.phase = Phase.WARNED
+            self.phase = ServoPhase.WARNED
         elif not watched:
-            self.phase, self._code = Phase.UNWATCHED, 0
+            self.phase, self._code = ServoPhase.UNWATCHED, 0
         elif phase is not _READY:
             self.phase, self._code = _READY, 0
 

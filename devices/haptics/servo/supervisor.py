@@ -15,7 +15,7 @@ from typing import Any
 
 from devices.haptics.servo.driver import StylusSpec
 from devices.haptics.servo.exchange import State
-from devices.haptics.servo.phase import Phase
+from devices.haptics.servo.phase import ServoPhase
 from devices.haptics.servo.probe import Finding, Probe, absence
 from devices.haptics.servo.process import DriverChoice, ServoProcess
 from schemas.errors import DeviceError
@@ -43,7 +43,7 @@ _NO_PRIORITY = (
 class Lost:
     """Why a stylus is not available."""
 
-    phase: Phase
+    phase: ServoPhase
     code: int
     cause: str
     retry: float
@@ -129,8 +129,8 @@ class Supervisor:
             self._last_frame, self._has_ticked = now, True
             last = new[-1]
             self._held[name] = bool(last.permitted)
-            if Phase(last.phase).is_lost:
-                self._lose(name, Phase(last.phase), last.code, "", now)
+            if ServoPhase(last.phase).is_lost:
+                self._lose(name, ServoPhase(last.phase), last.code, "", now)
                 self._end(process, now)
             elif name not in self.lost:
                 states[name] = new
@@ -146,7 +146,7 @@ class Supervisor:
             self._opened(process, message)
         elif "failed" in message:
             for name in process.names:
-                self._lose(name, Phase.FAULT, 0, message["failed"], now)
+                self._lose(name, ServoPhase.FAULT, 0, message["failed"], now)
         elif message.get("priority") == "normal" and not self._warned:
             self._warned = True
             log.warning(_NO_PRIORITY)
@@ -157,7 +157,7 @@ class Supervisor:
         if not ended and self._ending is None and now - self._last_frame > patience:
             self._end(process, now)
             for name in process.names:
-                self._lose(name, Phase.FAULT, 0, f"no frame for {patience:g} s", now)
+                self._lose(name, ServoPhase.FAULT, 0, f"no frame for {patience:g} s", now)
         if not ended and self._ending is not None and now - self._ending > _ENDING:
             process.kill()
         if ended:
@@ -165,7 +165,7 @@ class Supervisor:
             if self._ending is None:
                 cause = _STOOD_STILL if process.was_killed_by_watcher else "the servo process has ended"
                 for name in process.names:
-                    self._lose(name, Phase.FAULT, 0, cause, now)
+                    self._lose(name, ServoPhase.FAULT, 0, cause, now)
             self._process = None
 
     def _end(self, process: ServoProcess, now: float) -> None:
@@ -173,7 +173,7 @@ class Supervisor:
             self._ending = now
             process.end()
 
-    def _lose(self, name: str, phase: Phase, code: int, cause: str, now: float) -> None:
+    def _lose(self, name: str, phase: ServoPhase, code: int, cause: str, now: float) -> None:
         if name in self.lost:
             self.lost[name].cause = self.lost[name].cause or cause
             return

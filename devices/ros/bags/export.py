@@ -17,7 +17,7 @@ from devices.ros.topics.publications import MessageSource, State
 from devices.ros.topics.row import Row
 from devices.ros.topics.stamps import Stamps
 from devices.ros.topics.whole_robot import periods_between, robot_description, whole_robot_sources
-from devices.samples import stamped
+from devices.samples import stamp_sample
 from hub.planning import registry
 from hub.planning.foreign_code import names_class
 from hub.planning.plan import Plan
@@ -175,7 +175,7 @@ class _RowWriter:
 
     def write(self, row: Row, time_ns: int, message: Message) -> None:
         """Stamp and write a message. Raises RecordingError if the bag cannot be written."""
-        self.write_cdr(row, time_ns, encode(stamped(message, self.stamp_ns(row, time_ns))))
+        self.write_cdr(row, time_ns, encode(stamp_sample(message, self.stamp_ns(row, time_ns))))
 
     def write_cdr(self, row: Row, time_ns: int, payload: bytes) -> None:
         """Write a stamped and encoded message."""

@@ -17,7 +17,7 @@ from schemas.errors import RecordingError, did_you_mean
 from schemas.files import find_file
 from schemas.quantity import Duration
 
-__all__ = ["BagParams", "listed"]
+__all__ = ["BagParams", "listed_topics"]
 
 _NAMED = 6
 """Most topics named in a message."""
@@ -64,8 +64,8 @@ class BagParams(TopicParams):
                 or "none: `arms` and `listen` are empty"
             )
             raise ValueError(
-                f"'{self.bag}' has nothing that could be played here. Its topics: {listed(topics) or 'none'}."
-                f" Topics that are subscribed to: {subscribed}"
+                f"'{self.bag}' has nothing that could be played here. Its topics:"
+                f" {listed_topics(topics) or 'none'}. Topics that are subscribed to: {subscribed}"
             )
         return self
 
@@ -90,7 +90,7 @@ class BagParams(TopicParams):
         }
 
 
-def listed(topics: Mapping[str, BagTopic]) -> str:
+def listed_topics(topics: Mapping[str, BagTopic]) -> str:
     """Return a list of topics with their types and numbers of messages, cut after the first six."""
     named = [f"{topic} ({its.type}, {its.messages})" for topic, its in sorted(topics.items())]
     return ", ".join(named[:_NAMED]) + (f" and {len(named) - _NAMED} more" if len(named) > _NAMED else "")

@@ -12,15 +12,15 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
-from devices.ros.bags.params import BagParams, listed
+from devices.ros.bags.params import BagParams, listed_topics
 from devices.ros.topics.row import Row
 from devices.ros.topics.state_commands import RepeatedStateCommands
 from devices.ros.topics.validation import as_signal, validate
-from devices.samples import Playback, clock_of, stamp_of, stamped
+from devices.samples import Playback, clock_of, stamp_of, stamp_sample
 from hub.participant import Device, Sample
 from hub.recording.ros_bag_reader import RosBag
 from hub.transport.refusals import Refusals
-from schemas.codec import message_type, validated
+from schemas.codec import message_type, validate_message
 from schemas.errors import MessageError
 from schemas.message import Message
 from schemas.ports import Port
@@ -84,7 +84,7 @@ class BagPlayer(Device):
                 "device '%s': topics of '%s' that no port here takes are ignored: %s",
                 self.name,
                 bag.path,
-                listed(ignored),
+                listed_topics(ignored),
             )
         self._refusals = Refusals()
         self._playback = Playback(self._play(bag, played))
@@ -112,7 +112,7 @@ class BagPlayer(Device):
                 self._refusals.refuse(f"'{self.name}': {topic}", f"{error} (at {time_ns / 1e9:g} s)")
                 continue
             if row.port is not None:
-                yield time_ns, Sample(row.port.name, stamped(message, time_ns))
+                yield time_ns, Sample(row.port.name, stamp_sample(message, time_ns))
 
 
 class _Filter:
@@ -126,7 +126,7 @@ class _Filter:
         """Return a recorded message in the row's type. Raises MessageError for a refused message."""
         if isinstance(raw, Exception):
             raise MessageError(f"no such message ({type(raw).__name__}: {raw})")
-        message = validated(self._model, raw)
+        message = validate_message(self._model, raw)
         validate(message, self._row)
         stamp_ns, port = stamp_of(message), self._row.port
         if self._row.name == "state_command" and stamp_ns:

@@ -122,7 +122,7 @@ class DdsTransport(Transport):
     ) -> DataWriter[Payload]:
         self._topics.add(topic)
         return DataWriter(
-            self._participant, Topic(self._participant, topic, type_), quality + _hashed(ros_type)
+            self._participant, Topic(self._participant, topic, type_), quality + _hash_type(ros_type)
         )
 
     def _announce(self) -> None:
@@ -132,7 +132,7 @@ class DdsTransport(Transport):
         self._info.write(self._info.data_type(entities_info(self._guid, NODE, readers, writers)))
 
 
-def _hashed(ros_type: str) -> Qos:
+def _hash_type(ros_type: str) -> Qos:
     return Qos(Policy.Userdata(_typehash(ros_type).encode())) if ros_type else Qos()
 
 

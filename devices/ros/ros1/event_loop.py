@@ -74,7 +74,7 @@ class EventLoop:
                 else:
                     self._serve(key.data, events)
             while self._calls:
-                self._guarded(self._calls.popleft())
+                self._guard_call(self._calls.popleft())
 
     def _drain(self) -> None:
         with suppress(BlockingIOError):
@@ -82,11 +82,11 @@ class EventLoop:
 
     def _serve(self, handler: SocketHandler, events: int) -> None:
         if events & selectors.EVENT_WRITE:
-            self._guarded(handler.writable)
+            self._guard_call(handler.writable)
         if events & selectors.EVENT_READ:
-            self._guarded(handler.readable)
+            self._guard_call(handler.readable)
 
-    def _guarded(self, do: Callable[[], None]) -> None:
+    def _guard_call(self, do: Callable[[], None]) -> None:
         """Call `do`; an unforeseen error with a program must not end the loop for all others."""
         try:
             do()
@@ -96,7 +96,7 @@ class EventLoop:
     def _end(self) -> None:
         for key in tuple(self._selector.get_map().values()):
             if key.fileobj is not self._woken:
-                self._guarded(key.data.close)
+                self._guard_call(key.data.close)
         self._ending = True
 
     def close(self) -> None:

@@ -57,11 +57,12 @@ def checksum(type_: str) -> str:
 def service_checksum(type_: str) -> str:
     """Return the MD5 sum of a service: over the texts of request and response (genmsg, gentools.py)."""
     return md5(
-        (_summed(f"{type_}_Request") + _summed(f"{type_}_Response")).encode(), usedforsecurity=False
+        (_sum_definition(f"{type_}_Request") + _sum_definition(f"{type_}_Response")).encode(),
+        usedforsecurity=False,
     ).hexdigest()
 
 
-def _summed(type_: str) -> str:
+def _sum_definition(type_: str) -> str:
     """Return the text for the sum: the definition, with sums in place of message types."""
     lines = definition(type_).partition("=" * 80)[0].strip().splitlines()
     return "\n".join(_summed_line(*line.split(" ", 1)) for line in lines)
@@ -89,7 +90,7 @@ class Wire:
         message = (
             self._store.cdr_to_ros1(memoryview(cdr), self._type)
             if self._is_same
-            else self._migrated(cdr, to_ros2=False)
+            else self._migrate_definition(cdr, to_ros2=False)
         )
         frame = bytearray(_LENGTH.size + len(message))
         frame[_LENGTH.size :] = message
@@ -107,14 +108,14 @@ class Wire:
         try:
             if not self._is_same:
                 check_first_sequence(message_type(self._type), message[:4], "little")
-                return bytes(self._migrated(message, to_ros2=True))
+                return bytes(self._migrate_definition(message, to_ros2=True))
             return bytes(self._store.ros1_to_cdr(message, self._type))
         except (SerdeError, AssertionError, IndexError, struct.error, ValueError) as error:
             raise MessageError(
                 f"{self._type}: {len(message)} bytes are no such message of ROS 1 ({error})"
             ) from error
 
-    def _migrated(self, message: bytes, *, to_ros2: bool) -> memoryview:
+    def _migrate_definition(self, message: bytes, *, to_ros2: bool) -> memoryview:
         """Return a message in the layout of the far side, field by field: far slower than as bytes."""
         source, target = (_noetic(), self._store) if to_ros2 else (self._store, _noetic())
         return migrate_bytes(

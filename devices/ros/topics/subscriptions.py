@@ -82,10 +82,10 @@ class SubscribedTopic:
         if self._signal is not None and stamp_ns == 0:
             return f"marked invalid by {client} (stamp 0)"
         if self._row.name == "state_command" and stamp_ns:
-            return self._latched(stamp_ns, client)
+            return self._latched_reason(stamp_ns, client)
         return self._arbiter.refusal(client) if self._arbiter is not None else None
 
-    def _latched(self, stamp_ns: int, client: str) -> str | None:
+    def _latched_reason(self, stamp_ns: int, client: str) -> str | None:
         """Return why a state command counts as a repeated delivery; None: a new command."""
         now_ns = time_ns()
         # by the wall clock of now: it may have been set since then

@@ -62,7 +62,7 @@ class TransformTree:
         edges = tuple((parent, child) for parent, child, _ in known)
         if edges != self._template.edges:
             self._template = _Template(edges)
-        return self._template.filled(stamp_ns, [pose for _, _, pose in known])
+        return self._template.fill_transforms(stamp_ns, [pose for _, _, pose in known])
 
 
 class _Template:
@@ -86,7 +86,7 @@ class _Template:
         self._stamps = [self._bytes.index(_STAMP.pack(stamp.sec, stamp.nanosec)) for stamp in stamps]
         self._poses = [self._bytes.index(pose.tobytes()) for pose in marks]
 
-    def filled(self, stamp_ns: int, poses: Sequence[Vector]) -> bytes:
+    def fill_transforms(self, stamp_ns: int, poses: Sequence[Vector]) -> bytes:
         """Return the message with this stamp and these poses."""
         buffer, stamp = bytearray(self._bytes), _STAMP.pack(*divmod(stamp_ns, 10**9))
         for at, start, pose in zip(self._stamps, self._poses, poses, strict=True):

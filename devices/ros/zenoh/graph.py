@@ -37,7 +37,7 @@ class Graph:
 
     def add(self, key: str) -> None:
         """Add the token with this key."""
-        token = GraphToken.parsed(key)
+        token = GraphToken.parse_token(key)
         if token is None or token.session == self._own:
             return
         with self._changing:

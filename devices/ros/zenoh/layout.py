@@ -66,7 +66,7 @@ def _dds_name(type_: str) -> str:
     return f"{package}::{group}::dds_::{name}_"
 
 
-def _mangled(name: str) -> str:
+def _mangle_name(name: str) -> str:
     return name.replace("/", "%") or "%"
 
 
@@ -98,15 +98,15 @@ class GraphToken:
             str(self.number),
             self.kind,
             "%",
-            _mangled(namespace),
+            _mangle_name(namespace),
             name,
         ]
         if self.kind != "NN":
-            parts += [_mangled(self.topic), _dds_name(self.type), self.hash, self.quality]
+            parts += [_mangle_name(self.topic), _dds_name(self.type), self.hash, self.quality]
         return "/".join(parts)
 
     @classmethod
-    def parsed(cls, key: str) -> GraphToken | None:
+    def parse_token(cls, key: str) -> GraphToken | None:
         """Return the token with this key; None: a key of unknown form."""
         parts = key.split("/")
         if (

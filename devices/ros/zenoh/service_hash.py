@@ -44,14 +44,14 @@ def service_hash(name: str, request: str, response: str) -> str:
     }
     for part, text in parts.items():
         (definition,) = get_types_from_msg(text, part).values()
-        store.fielddefs[part] = _renamed(definition)
+        store.fielddefs[part] = _rename_type(definition)
     return store.hash_rihs01(name)
 
 
-def _renamed(definition: Any) -> Any:
+def _rename_type(definition: Any) -> Any:
     """Return a definition of rosbags with ROS's names of a service's types: rosbags inserts `msg`."""
     if isinstance(definition, str):
         return definition.replace("/srv/msg/", "/srv/")
     if isinstance(definition, list | tuple):
-        return type(definition)(_renamed(part) for part in definition)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        return type(definition)(_rename_type(part) for part in definition)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
     return definition

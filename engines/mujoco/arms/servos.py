@@ -21,7 +21,7 @@ from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from robots.serial_chain import Joint
 from schemas.errors import SessionError
-from schemas.vectors import Vector, joined
+from schemas.vectors import Vector, join_parts
 
 __all__ = ["Servos"]
 
@@ -179,7 +179,7 @@ class Servos:
         Raises SessionError for an unknown mode.
         """
         taken = [inputs[port] for port in self._ports]
-        asked = joined(taken)
+        asked = join_parts(taken)
         if asked == self._at_rest:
             return
         np.concatenate(taken, out=self._taken)

@@ -114,7 +114,7 @@ class WireBond:
 
 def _marks(params: NeedleParams) -> Vector:
     """Return the bonded points in the needle's frame, m, shape (3, 3)."""
-    return NeedleShape(params.radius, params.arc, params.wire_radius).bonded
+    return NeedleShape(params.radius, params.arc, params.wire_radius).bond_points
 
 
 def _drag(params: NeedleParams) -> Vector:

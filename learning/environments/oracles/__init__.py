@@ -10,11 +10,11 @@ from types import MappingProxyType
 
 from learning.environments.environment import Environment
 from learning.environments.oracles import needles, others, rings
-from learning.environments.oracles.waypoints import Oracle, Plan
+from learning.environments.oracles.waypoints import Oracle, WaypointPlan
 
 __all__ = ["ORACLES", "Oracle", "oracle"]
 
-ORACLES: Mapping[str, Callable[[Environment], Plan]] = MappingProxyType(
+ORACLES: Mapping[str, Callable[[Environment], WaypointPlan]] = MappingProxyType(
     {
         "Reach": others.reach,
         "NeedlePick": needles.needle_pick,

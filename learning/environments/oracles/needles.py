@@ -8,7 +8,7 @@ from math import atan2, cos, sin
 import numpy as np
 
 from learning.environments.environment import Environment
-from learning.environments.oracles.waypoints import Plan, Seen, Waypoint, yaw_of
+from learning.environments.oracles.waypoints import Seen, Waypoint, WaypointPlan, yaw_of
 from schemas.vectors import Vector
 
 __all__ = ["hand_over", "needle_pick"]
@@ -31,24 +31,24 @@ def _to_needle(
     return lambda seen: Waypoint(*_needle(seen, height), closed, wait, near)
 
 
-def _carried(seen: Seen, arm: str) -> Waypoint:
+def _carry_to_goal(seen: Seen, arm: str) -> Waypoint:
     """Bring the needle's middle to the goal."""
     place, _ = _needle(seen, 0.0)
     place[2] = (seen["needle/position"] + seen.matrix("needle")[:, 0] * _NEEDLE)[2]
     return Waypoint(seen[f"{arm}/tip/position"] + seen.goal[:3] - place, None, True)
 
 
-def needle_pick(_: Environment) -> Plan:
+def needle_pick(_: Environment) -> WaypointPlan:
     """Return a plan to take a needle by the middle and bring the middle to the goal."""
     return [
         (0, _to_needle(_HIGH, closed=False, near=4e-3)),
         (0, _to_needle(_BITE, closed=False)),
         (0, _to_needle(_BITE, closed=True, wait=2, near=4e-3)),
-        (0, lambda seen: _carried(seen, "PSM1")),
+        (0, lambda seen: _carry_to_goal(seen, "PSM1")),
     ]
 
 
-def hand_over(_: Environment) -> Plan:
+def hand_over(_: Environment) -> WaypointPlan:
     """Return a plan: PSM1 takes a needle by the middle, and PSM2 the needle's end from PSM1."""
 
     def meeting(_: Seen) -> Waypoint:
@@ -81,5 +81,5 @@ def hand_over(_: Environment) -> Plan:
         (1, to_end(8.6e-3, 0.0, closed=True, wait=3, near=4e-3)),
         (0, lambda seen: Waypoint(seen["PSM1/tip/position"], None, False, wait=1)),
         (0, lambda _: Waypoint(np.array([-0.02, 0.0, 0.079]), None, False, near=0.03)),
-        (1, lambda seen: _carried(seen, "PSM2")),
+        (1, lambda seen: _carry_to_goal(seen, "PSM2")),
     ]

@@ -8,7 +8,15 @@ from math import sqrt
 import numpy as np
 
 from learning.environments.environment import Environment
-from learning.environments.oracles.waypoints import Plan, Seen, Waypoint, high, moved, over, yaw_of
+from learning.environments.oracles.waypoints import (
+    Seen,
+    Waypoint,
+    WaypointPlan,
+    high,
+    move_object,
+    over,
+    yaw_of,
+)
 from robots.training.dishes import DISH, PIECE
 
 __all__ = ["piece", "reach", "retraction"]
@@ -21,7 +29,7 @@ of 1 ms lose the piece.
 """
 
 
-def reach(_: Environment) -> Plan:
+def reach(_: Environment) -> WaypointPlan:
     """Return how to bring the tip to the goal."""
     return [(0, lambda seen: Waypoint(seen.goal, None, False))]
 
@@ -32,7 +40,7 @@ _LIFT = np.array([-0.4, 0.0, 0.93])
 """Direction of yielding of the edge, upwards."""
 
 
-def retraction(_: Environment) -> Plan:
+def retraction(_: Environment) -> WaypointPlan:
     """Return a plan to take the edge of the lobe and lift the edge to the goal's height."""
     return [
         (0, lambda _: Waypoint(_EDGE, None, False, near=1.5e-3)),
@@ -46,7 +54,7 @@ def retraction(_: Environment) -> Plan:
     ]
 
 
-def piece(_: Environment) -> Plan:
+def piece(_: Environment) -> WaypointPlan:
     """Return how to carry the piece into the goal's dish."""
     half = PIECE.size[2] / 2.0
     fingers = _FORCEPS - _BITE_PIECE
@@ -63,9 +71,9 @@ def piece(_: Environment) -> Plan:
         (0, to(above + 0.03, closed=False, near=4e-3)),
         (0, to(above, closed=False)),
         (0, to(above, closed=True, wait=2, near=4e-3)),
-        (0, moved("piece", "PSM1", lambda seen: high(seen, "piece", travel), near=4e-3)),
-        (0, moved("piece", "PSM1", lambda seen: over(seen, travel), near=4e-3)),
-        (0, moved("piece", "PSM1", lambda seen: over(seen, half + 1e-3), near=2e-3)),
+        (0, move_object("piece", "PSM1", lambda seen: high(seen, "piece", travel), near=4e-3)),
+        (0, move_object("piece", "PSM1", lambda seen: over(seen, travel), near=4e-3)),
+        (0, move_object("piece", "PSM1", lambda seen: over(seen, half + 1e-3), near=2e-3)),
         (0, lambda seen: Waypoint(seen["PSM1/tip/position"], None, False, wait=1)),
         (0, lambda seen: Waypoint(over(seen, travel + 0.04), None, False)),
     ]

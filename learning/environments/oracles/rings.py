@@ -10,7 +10,16 @@ import numpy as np
 
 from learning.environments.environment import Environment
 from learning.environments.exercises import PegTransfer
-from learning.environments.oracles.waypoints import REACH, Plan, Seen, Waypoint, high, moved, over, remaining
+from learning.environments.oracles.waypoints import (
+    REACH,
+    Seen,
+    Waypoint,
+    WaypointPlan,
+    high,
+    move_object,
+    over,
+    remaining,
+)
 from robots.training.boards import Ring
 from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
@@ -36,7 +45,7 @@ def _walls(ring: Ring, seen: Seen) -> list[tuple[Vector, float]]:
     return found
 
 
-def _ring_plan(env: Environment, hand: int, side: Vector) -> Plan:
+def _ring_plan(env: Environment, hand: int, side: Vector) -> WaypointPlan:
     """Return a hand's grasp of the ring: by the wall of least turn of the jaw, or on the hand's `side`."""
     arm = env.exercise.hands[hand]
     ring = cast("PegTransfer", env.exercise).task.params.board.measures.ring
@@ -72,21 +81,21 @@ def _ring_plan(env: Environment, hand: int, side: Vector) -> Plan:
     ]
 
 
-def peg_transfer(env: Environment) -> Plan:
+def peg_transfer(env: Environment) -> WaypointPlan:
     """Return a plan to carry the ring with a single hand to the goal's post."""
     board = cast("PegTransfer", env.exercise).task.params.board
     travel = board.position[2] + board.measures.post_height + board.measures.ring.height / 2.0 + 4e-3
     return [
         *_ring_plan(env, 0, np.zeros(2)),
-        (0, moved("ring", "PSM1", lambda seen: high(seen, "ring", travel), near=4e-3)),
-        (0, moved("ring", "PSM1", lambda seen: over(seen, travel), near=1.2e-3)),
-        (0, moved("ring", "PSM1", lambda seen: over(seen, seen.goal[2]), near=1.5e-3)),
+        (0, move_object("ring", "PSM1", lambda seen: high(seen, "ring", travel), near=4e-3)),
+        (0, move_object("ring", "PSM1", lambda seen: over(seen, travel), near=1.2e-3)),
+        (0, move_object("ring", "PSM1", lambda seen: over(seen, seen.goal[2]), near=1.5e-3)),
         (0, lambda seen: Waypoint(seen["PSM1/tip/position"], None, False, wait=1)),
         (0, lambda seen: Waypoint(over(seen, travel + 0.03), None, False)),
     ]
 
 
-def bi_peg_transfer(env: Environment) -> Plan:
+def bi_peg_transfer(env: Environment) -> WaypointPlan:
     """Return how PSM2 takes the ring over the wall, and PSM1 to the goal's post."""
     board = cast("PegTransfer", env.exercise).task.params.board
     pose, measures = board.pose, board.measures
@@ -99,15 +108,15 @@ def bi_peg_transfer(env: Environment) -> Plan:
     left = np.array([1.0, 0.0])
     return [
         *_ring_plan(env, 1, left),
-        (1, moved("ring", "PSM2", lambda seen: high(seen, "ring", travel), near=4e-3)),
-        (1, moved("ring", "PSM2", lambda _: meeting, near=2e-3)),
+        (1, move_object("ring", "PSM2", lambda seen: high(seen, "ring", travel), near=4e-3)),
+        (1, move_object("ring", "PSM2", lambda _: meeting, near=2e-3)),
         *_ring_plan(env, 0, -left),
         (1, lambda seen: Waypoint(seen["PSM2/tip/position"], None, False, wait=1)),
         (1, lambda _: Waypoint(meeting + np.array([0.02, 0.0, 0.05]), None, False, near=0.02)),
         (1, lambda _: Waypoint(meeting + np.array([0.06, 0.0, 0.03]), None, False, near=0.02)),
-        (0, moved("ring", "PSM1", lambda seen: over(seen, travel), near=2e-3)),
-        (0, moved("ring", "PSM1", lambda seen: over(seen, low), near=1.2e-3)),
-        (0, moved("ring", "PSM1", lambda seen: over(seen, seen.goal[2]), near=1.5e-3)),
+        (0, move_object("ring", "PSM1", lambda seen: over(seen, travel), near=2e-3)),
+        (0, move_object("ring", "PSM1", lambda seen: over(seen, low), near=1.2e-3)),
+        (0, move_object("ring", "PSM1", lambda seen: over(seen, seen.goal[2]), near=1.5e-3)),
         (0, lambda seen: Waypoint(seen["PSM1/tip/position"], None, False, wait=1)),
         (0, lambda seen: Waypoint(over(seen, low + 0.03), None, False)),
     ]

@@ -15,7 +15,18 @@ from learning.environments.environment import Environment, Observation
 from robots import rotation
 from schemas.vectors import Vector
 
-__all__ = ["REACH", "Oracle", "Plan", "Seen", "Waypoint", "high", "moved", "over", "remaining", "yaw_of"]
+__all__ = [
+    "REACH",
+    "Oracle",
+    "Seen",
+    "Waypoint",
+    "WaypointPlan",
+    "high",
+    "move_object",
+    "over",
+    "remaining",
+    "yaw_of",
+]
 
 _STEP, _TURN = 10e-3, pi / 6.0
 """Displacement and turn of an action of 1."""
@@ -55,14 +66,14 @@ class Seen:
         return rotation.matrix(self[f"{thing}/orientation"])
 
 
-Plan = list[tuple[int, Callable[[Seen], Waypoint]]]
+WaypointPlan = list[tuple[int, Callable[[Seen], Waypoint]]]
 """Hands and their waypoints, in turn."""
 
 
 class Oracle:
     """Follows the waypoints of a hand or, in turns, of two; the second hand then stays."""
 
-    def __init__(self, env: Environment, plan: Callable[[Environment], Plan]) -> None:
+    def __init__(self, env: Environment, plan: Callable[[Environment], WaypointPlan]) -> None:
         self._layout, self._hands = env.layout, env.exercise.hands
         self._plan = plan(env)
         self.at = self._waited = self._spent = 0
@@ -103,7 +114,7 @@ def yaw_of(matrix: Vector, axis: int = 0) -> float:
     return atan2(matrix[1, axis], matrix[0, axis])
 
 
-def moved(
+def move_object(
     thing: str, arm: str, place: Callable[[Seen], Vector], *, closed: bool = True, near: float = NEAR
 ) -> Callable[[Seen], Waypoint]:
     """Bring a held thing's middle to a place."""

@@ -164,7 +164,9 @@ def test_a_ring_is_put_down_clear_of_those_beside_it():
         carried[:3, 3] = place
         ring = params.board.measures.ring
         assert (
-            outlines.gap(outlines.outline_of_ring(ring, carried), outlines.outline_of_ring(ring, beside))
+            outlines.outline_gap(
+                outlines.outline_of_ring(ring, carried), outlines.outline_of_ring(ring, beside)
+            )
             >= 1e-3
         )
 

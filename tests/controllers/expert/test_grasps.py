@@ -104,7 +104,7 @@ def test_the_finger_outside_keeps_clear_of_a_ring_beside():
         outwards = np.sign(tip[:2, 1] @ (tip[:2, 3] - pose[:2, 3])) * tip[:2, 1]
         end = tip[:2, 3] + outwards * (DRIVER * np.sin(0.1) + 0.7e-3)
         finger = end + 0.5e-3 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        assert outlines.gap(beside, finger) > 0.0
+        assert outlines.outline_gap(beside, finger) > 0.0
 
 
 @given(ANGLES, st.sampled_from(sorted(BOARDS)), st.integers(0, 29))
@@ -117,13 +117,13 @@ def test_a_second_hand_finds_room_beside_the_fingers_of_the_first(angle, name, w
     for tip in found.poses:
         both = [tip[:2, 3] + side * (DRIVER * np.sin(0.1) + 0.7e-3) * tip[:2, 1] for side in (-1, 1)]
         square = 0.5e-3 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        assert min(outlines.gap(first, end + square) for end in both) > 0.0
+        assert min(outlines.outline_gap(first, end + square) for end in both) > 0.0
 
 
 def test_the_room_between_outlines():
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float64)
-    assert outlines.gap(square, square + np.array([3, 0.5])) == pytest.approx(2)
-    assert outlines.gap(square, square + np.array([0.75, 0.5])) == pytest.approx(-0.25)
+    assert outlines.outline_gap(square, square + np.array([3, 0.5])) == pytest.approx(2)
+    assert outlines.outline_gap(square, square + np.array([0.75, 0.5])) == pytest.approx(-0.25)
 
 
 @given(ANGLES, st.sampled_from(sorted(BOARDS)), st.floats(0, 0.55))

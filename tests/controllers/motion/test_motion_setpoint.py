@@ -200,7 +200,7 @@ def test_a_saved_state_goes_on_with_the_same_bits(goal, other, steps, order):
     ]()
     run(made, 20)
     again.state.values[:] = made.state.values
-    again.restored()
+    again.recompute_derived()
     assert (run(made, 300) == run(again, 300)).all()
 
 

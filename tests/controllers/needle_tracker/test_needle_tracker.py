@@ -10,8 +10,8 @@ from pydantic import ValidationError
 from controllers.needle_tracker.arc_fit import Arc
 from controllers.needle_tracker.controller import _TIP_AHEAD, NeedleTracker
 from controllers.needle_tracker.params import TrackerParams
-from controllers.needle_tracker.pose import difference, moved
-from controllers.needle_tracker.segmentation import Region, detected, region_about
+from controllers.needle_tracker.pose import move_pose, pose_error
+from controllers.needle_tracker.segmentation import Region, detect_needle, region_about
 from controllers.needle_tracker.tracking_error import TrackingError, TrackingErrorParams
 from engines.mujoco.pictures.endoscope import camera_info
 from hub.participant import Inputs, Setup
@@ -32,7 +32,7 @@ ARC = Arc(NEEDLE, _TIP_AHEAD)
 def drawn(projection, needle, *, covered=False):
     """A picture of a needle with `pose` in the frame that `projection` is from, (288, 320, 3)."""
     picture = np.full((CAMERA.height, CAMERA.width, 3), (190, 90, 80), np.uint8)
-    line, _, depth = ARC.seen(projection, needle)
+    line, _, depth = ARC.project_line(projection, needle)
     corners = [np.round(line * 16).astype(np.int32)]
     cv2.polylines(picture, corners, False, (10, 200, 20), round(ARC.width(projection, depth)), cv2.LINE_AA, 4)
     if not covered:
@@ -50,15 +50,15 @@ class Session:
         self.tracker = NeedleTracker("tracker", self.params)
         self.outputs = self.tracker.configure(Setup(H, Path()))
         self.joints = np.array(self.params.holder.start)
-        self.camera_joints = np.array(self.params.arms.driven["ECM"].start)
-        self.grasp = moved(
+        self.camera_joints = np.array(self.params.arms.present_arms["ECM"].start)
+        self.grasp = move_pose(
             pose_to_matrix(np.array([*self.params.grasp.position, *self.params.grasp.orientation])),
             np.array([1e-3, -1e-3, 1.5e-3, 0.05, -0.1, 0.08]),
         )
         self.t, self.states, self.warnings, self.before = 0, [], [], self.in_camera()
 
     def in_camera(self):
-        ecm, psm = self.params.arms.driven["ECM"], self.params.holder
+        ecm, psm = self.params.arms.present_arms["ECM"], self.params.holder
         chain = left_camera(ecm.endoscope, self.params.baseline)
         camera = pose_to_matrix(np.array([*ecm.position, *ecm.orientation])) @ chain.forward(
             self.camera_joints
@@ -94,7 +94,7 @@ class Session:
         """Of the estimate in the camera's frame: mm along, and degrees about, the axes of the needle."""
         estimate = np.eye(4)
         estimate[:3] = self.outputs["Tcn_hat"].reshape(3, 4)
-        return difference(estimate, self.before) * ([1e3] * 3 + [57.3] * 3)
+        return pose_error(estimate, self.before) * ([1e3] * 3 + [57.3] * 3)
 
 
 def test_it_starts_follows_and_says_where_the_needle_is():
@@ -129,7 +129,7 @@ def test_without_pictures_it_goes_on_by_kinematics_and_says_that_it_is_less_sure
 def test_a_slip_is_found_and_said():
     session = Session().step(15)
     held = NEEDLE.points(np.array([-0.2]))[0]
-    turn = moved(np.eye(4), np.array([0, 0, 0, -0.25, 0.2, 0.15]))
+    turn = move_pose(np.eye(4), np.array([0, 0, 0, -0.25, 0.2, 0.15]))
     turn[:3, 3] = held - turn[:3, :3] @ held
     session.grasp = session.grasp @ turn
     session.step(20)
@@ -168,18 +168,18 @@ def test_colours_are_found_where_they_are():
     needle = Session().before
     projection = CAMERA.projection("left")
     picture = drawn(projection, needle)
-    line, _, depth = ARC.seen(projection, needle)
+    line, _, depth = ARC.project_line(projection, needle)
     region = region_about(projection, needle[:3, 3], 2.0 * NEEDLE.radius, CAMERA.width, CAMERA.height)
     assert region is not None
     assert (line.min(axis=0) > (region.left, region.top)).all()
     assert (line.max(axis=0) < (region.right, region.bottom)).all()
-    seen = detected(cv2, picture, region, ARC.width(projection, depth))
+    seen = detect_needle(cv2, picture, region, ARC.width(projection, depth))
     assert np.linalg.norm(seen.tips - line[-1], axis=1).min() < 0.3
     away = np.linalg.norm(seen.points[:, None] - line[None], axis=2).min(axis=1)
     assert np.percentile(away, 95) < 3.0
     length = np.hypot(*np.diff(line, axis=0).T).sum()
     assert seen.lengths.sum() == pytest.approx(length, rel=0.7)
-    nothing = detected(cv2, np.zeros_like(picture), Region(0, 0, 320, 288), 2.0)
+    nothing = detect_needle(cv2, np.zeros_like(picture), Region(0, 0, 320, 288), 2.0)
     assert nothing.points.shape == (0, 2)
     assert nothing.tips.shape == (0, 2)
     assert region_about(projection, np.array([0.0, 0.0, -0.1]), 0.02, 320, 288) is None
@@ -218,7 +218,7 @@ def test_the_error_is_what_lies_between_truth_and_estimate():
         H,
         Inputs(
             {
-                "truth": matrix_to_pose(base @ moved(estimate, off)),
+                "truth": matrix_to_pose(base @ move_pose(estimate, off)),
                 "estimate": matrix_to_pose(estimate),
                 "covariance": covariance.reshape(-1),
             }

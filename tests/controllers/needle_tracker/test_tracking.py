@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.vision_needle import ARC, AUTHORS, NEEDLE, OURS, Carried, Trouble, track
-from controllers.needle_tracker.arc_fit import Detection, fit
-from controllers.needle_tracker.filter import Estimate, View, predicted, updated
+from controllers.needle_tracker.arc_fit import Detection, fit_arc
+from controllers.needle_tracker.filter import Estimate, NeedleView, predict_estimate, update_estimate
 from controllers.needle_tracker.noise import Noise
-from controllers.needle_tracker.pose import difference, moved, turned_about
-from controllers.needle_tracker.tracking import Belief, Settings, followed, mirrored
+from controllers.needle_tracker.pose import move_pose, pose_error, turned_about
+from controllers.needle_tracker.tracking import NeedleBelief, TrackerSettings, follow_needle, mirror_pose
 from robots import rotation
 from robots.dvrk.endoscope import EYES
 from robots.transform import inverse_transform
@@ -30,10 +30,10 @@ def pose(rng, depth=0.09):
 @given(seeds)
 def test_differences_undo_motions(rng):
     at, error = pose(rng), rng.uniform(-0.5, 0.5, 6)
-    assert np.allclose(difference(at, moved(at, error)), error, atol=1e-9)
+    assert np.allclose(pose_error(at, move_pose(at, error)), error, atol=1e-9)
     assert np.allclose(inverse_transform(at) @ at, np.eye(4), atol=1e-12)
     point = rng.normal(size=3)
-    turn = moved(np.eye(4), 1e-6 * turned_about(point) @ rng.normal(size=3))
+    turn = move_pose(np.eye(4), 1e-6 * turned_about(point) @ rng.normal(size=3))
     assert np.allclose(turn[:3, :3] @ point + turn[:3, 3], point, atol=1e-10)
 
 
@@ -41,10 +41,10 @@ def test_differences_undo_motions(rng):
 def test_the_slopes_are_those_of_the_image(rng):
     at, h = pose(rng), 1e-6
     projection = OURS.projection("right")
-    _, slopes, _ = ARC.seen(projection, at)
+    _, slopes, _ = ARC.project_line(projection, at)
     for axis in range(6):
         step = h * np.eye(6)[axis]
-        ahead, behind = (ARC.seen(projection, moved(at, way * step))[0] for way in (1.0, -1.0))
+        ahead, behind = (ARC.project_line(projection, move_pose(at, way * step))[0] for way in (1.0, -1.0))
         assert np.allclose(slopes[:, :, axis], (ahead - behind) / (2.0 * h), rtol=1e-4, atol=1e-3)
 
 
@@ -52,19 +52,19 @@ def test_the_slopes_are_those_of_the_image(rng):
 def test_a_mirrored_needle_is_seen_alike_and_mirroring_twice_is_nothing(rng):
     at = pose(rng)
     projection = AUTHORS.projection("left")
-    other = mirrored(at, projection)
-    assert np.allclose(mirrored(other, projection), at, atol=1e-12)
+    other = mirror_pose(at, projection)
+    assert np.allclose(mirror_pose(other, projection), at, atol=1e-12)
     assert np.linalg.det(other[:3, :3]) == pytest.approx(1.0)
-    image, also = ARC.seen(projection, at)[0], ARC.seen(projection, other)[0]
+    image, also = ARC.project_line(projection, at)[0], ARC.seen(projection, other)[0]
     assert abs(image - also).max() < 0.3 * abs(image - image.mean(axis=0)).max()
 
 
 def test_what_is_far_from_the_needle_does_not_belong_to_it():
     at = pose(np.random.default_rng(1))
     projection = OURS.projection("left")
-    image = ARC.seen(projection, at)[0]
+    image = ARC.project_line(projection, at)[0]
     seen = Detection(image + 120.0, np.ones(len(image)), image[-1:] + 120.0)
-    found = fit(ARC, projection, at, seen, Noise(), 1e-8 * np.eye(6), 4.0)
+    found = fit_arc(ARC, projection, at, seen, Noise(), 1e-8 * np.eye(6), 4.0)
     assert found.residuals.size == 0
     assert found.explained == 0.0
     assert found.unexplained == pytest.approx(len(image))
@@ -73,13 +73,13 @@ def test_what_is_far_from_the_needle_does_not_belong_to_it():
 
 
 def test_without_pictures_the_estimate_stays_and_grows_unsure():
-    belief = Belief(Estimate(np.eye(4), 1e-6 * np.eye(6)))
-    later = followed(ARC, belief, (), 4.0, Settings(drift=(1e-3, 0.01)))
+    belief = NeedleBelief(Estimate(np.eye(4), 1e-6 * np.eye(6)))
+    later = follow_needle(ARC, belief, (), 4.0, TrackerSettings(drift=(1e-3, 0.01)))
     assert (later.estimate.pose == np.eye(4)).all()
     assert np.allclose(np.diag(later.estimate.covariance), 1e-6 + 4.0 * np.array([1e-6] * 3 + [1e-4] * 3))
     assert not later.seen
     assert np.allclose(
-        predicted(predicted(belief.estimate, 1.0, (1e-3, 0.01)), 3.0, (1e-3, 0.01)).covariance,
+        predict_estimate(predict_estimate(belief.estimate, 1.0, (1e-3, 0.01)), 3.0, (1e-3, 0.01)).covariance,
         later.estimate.covariance,
     )
 
@@ -122,7 +122,12 @@ def test_a_wire_that_is_always_seen_aside_does_not_make_it_too_sure():
         share: np.mean(
             [
                 track(
-                    AUTHORS, 2, seed, pictures=35, trouble=trouble, settings=Settings(Noise(shading=share))
+                    AUTHORS,
+                    2,
+                    seed,
+                    pictures=35,
+                    trouble=trouble,
+                    settings=TrackerSettings(Noise(shading=share)),
                 ).nees[25:]
                 for seed in range(3)
             ]
@@ -160,11 +165,11 @@ def test_one_picture_of_an_arc_alone_leaves_the_turn_about_its_axis_open():
     rng = np.random.default_rng(2)
     carried = Carried(OURS, 2, rng, (0.0, 0.0))
     views = [
-        View(view.projection, Detection(view.seen.points, view.seen.lengths, np.zeros((0, 2))))
+        NeedleView(view.projection, Detection(view.seen.points, view.seen.lengths, np.zeros((0, 2))))
         for view in carried.views(0, 0.3, 0.5, 0.75, Trouble())
     ]
     prior = Estimate(carried.needle, np.diag(np.repeat([1e-3, 0.1], 3) ** 2))
-    after = np.sqrt(np.diag(updated(ARC, prior, views, Noise(), 4.0).estimate.covariance))
+    after = np.sqrt(np.diag(update_estimate(ARC, prior, views, Noise(), 4.0).estimate.covariance))
     assert after[5] == pytest.approx(0.1, rel=0.2)
     assert after[3:5].max() < 0.05
     assert len(EYES) == len(carried.projections)

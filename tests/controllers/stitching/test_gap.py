@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.stitching.gap import gap
+from controllers.stitching.gap import instrument_gap
 from robots import rotation
 from robots.transform import pose_to_matrix
 from tests.controllers.stitching.test_guided import Guided
@@ -30,7 +30,7 @@ def test_the_gap_is_that_of_the_nearest_points(first, second):
     one, other = framed_tip(first), framed_tip(second)
     a, b = points(HANDS[0], one), points(HANDS[1], other)
     sampled = np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2)).min()
-    found = gap(HANDS[0], one[None], HANDS[1], other[None])[0]
+    found = instrument_gap(HANDS[0], one[None], HANDS[1], other[None])[0]
     assert found <= sampled + 1e-12
     assert found >= sampled - 1.2e-3  # points on a shaft are up to 1.1 mm apart
 
@@ -39,4 +39,4 @@ def test_instruments_that_cross_have_no_gap():
     middle = (HANDS[0].base[:3, 3] + HANDS[1].base[:3, 3]) / 2.0
     beyond = np.eye(4)
     beyond[:3, 3] = middle - HANDS[0].base[:3, 3] + middle  # the other arm's remote centre
-    assert gap(HANDS[0], beyond[None], HANDS[1], framed_tip((0.0,) * 6)[None])[0] < 1e-9
+    assert instrument_gap(HANDS[0], beyond[None], HANDS[1], framed_tip((0.0,) * 6)[None])[0] < 1e-9

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.expert.hand import RobotHand
-from controllers.stitching.feasibility import reach
+from controllers.stitching.feasibility import best_reach
 from controllers.stitching.geometry import Grip, grip_pose, stitch_between
 from controllers.stitching.plan import make_plan, make_stitch, stitch_through
 from robots.dvrk.instruments import instrument
@@ -35,7 +35,7 @@ def test_the_needle_turns_in_one_circle_through_both_holes(bite, heading, name):
     forward = np.cross(stitch.pose(1.0)[:3, 2], stitch.pose(pi / 2)[:3, :3] @ needle.marks[2])
     assert forward @ along > 0.0
     assert np.linalg.det(stitch.axes) == pytest.approx(1.0)
-    base = stitch.pose(stitch.out)[:3, :3] @ needle.marks[0] + stitch.centre
+    base = stitch.pose(stitch.base_out_angle)[:3, :3] @ needle.marks[0] + stitch.centre
     assert base == pytest.approx(along * bite / 2, abs=1e-9)
 
 
@@ -114,7 +114,7 @@ def test_the_reach_is_that_of_the_joints():
     hand = hands()[0]
     q = np.array([[0.1, 0.2, 0.12, 0.3 * i, 0.2, -0.1] for i in range(4)])
     tips = hand.base @ np.array([hand.chain.forward(each) for each in q])
-    found = reach(hand.chain, hand.base, tips)
-    assert not found.problem
+    found = best_reach(hand.chain, hand.base, tips)
+    assert not found.failure_reason
     free = 2 * np.minimum(q - hand.chain.lower, hand.chain.upper - q) / (hand.chain.upper - hand.chain.lower)
     assert found.margin >= free.min() - 1e-9

@@ -8,7 +8,7 @@ import pytest
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import MotionParams
 from controllers.stitching.guided_controller import GuidedStitching, GuidedStitchingParams
-from controllers.stitching.phase import Phase
+from controllers.stitching.phase import StitchPhase
 from controllers.stitching.stage import Stage
 from hub.planning.scenario_file import load
 from robots import rotation
@@ -122,9 +122,9 @@ def test_a_stitch_goes_in_any_direction(degrees, way, ends_with):
     world.pick(*entry[:2]).pick(*leave[:2]).consent()
     while world.stage is Stage.RUNNING and world.t < 60e9:
         world.step()
-        if world.phase is Phase.APPROACH and takers != (held := list(world.grips)):
+        if world.phase is StitchPhase.APPROACH and takers != (held := list(world.grips)):
             takers = held
-        if world.phase in (Phase.DRIVE, Phase.PULL):
+        if world.phase in (StitchPhase.DRIVE, StitchPhase.PULL):
             tips.append(world.needle[:3, :3] @ NEEDLES["sh-plus"].marks[2] + world.needle[:3, 3])
     assert world.lead._surgeon.state.made[0] == 1.0, world.said
     assert takers == (way or ["PSM1"])
@@ -140,7 +140,7 @@ def test_a_needle_that_lies_the_wrong_way_up_is_turned_over_by_the_other_hand():
     world.step()
     assert world.consented().stage is Stage.RUNNING, world.said
     world.until("PULL", 60)
-    assert world.phase is Phase.PULL, world.said
+    assert world.phase is StitchPhase.PULL, world.said
 
 
 @pytest.mark.parametrize(
@@ -294,7 +294,7 @@ def test_a_saved_stitch_goes_on_with_the_same_bits():
     other.jaws, other.grips = dict(world.jaws), dict(world.grips)
     other.joints = dict(world.joints)
     other.needle, other.t = world.needle.copy(), world.t
-    assert other.phase is world.phase is not Phase.DONE
+    assert other.phase is world.phase is not StitchPhase.DONE
     world.run(1, until=lambda _: False)
     other.run(1, until=lambda _: False)
     assert world.lead.state_hash() == other.lead.state_hash()

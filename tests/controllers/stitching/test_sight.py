@@ -48,13 +48,13 @@ def test_a_resting_tip_is_known_after_some_pictures_and_the_arm_stands_where_it_
     while not sight.is_known:
         pictures += 1
         seen = look(eyes, pictures * PERIOD, tip[:3, 3])
-        stands = sight.see(true - OFF, seen, PERIOD * 1e-9)
+        stands = sight.observe_tip(true - OFF, seen, PERIOD * 1e-9)
     assert 2 < pictures < 100
     found = stands @ hand.chain.forward(true - OFF)
     assert np.linalg.norm(found[:3, 3] - over[:3, 3]) < 4 * 0.3e-3
     assert np.abs(found[:3, :3] - over[:3, :3]).max() < 0.01  # 0.09 without
     before = sight.state.error.copy()
-    sight.see(true - OFF + 0.01, look(eyes, 0, tip[:3, 3] + 0.05), PERIOD * 1e-9)
+    sight.observe_tip(true - OFF + 0.01, look(eyes, 0, tip[:3, 3] + 0.05), PERIOD * 1e-9)
     assert (sight.state.error == before).all()  # of a tip on its way nothing is learnt
 
 

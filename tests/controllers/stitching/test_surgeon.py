@@ -7,7 +7,7 @@ import pytest
 
 from controllers.stitching.controller import Stitching
 from controllers.stitching.params import StitchingParams
-from controllers.stitching.phase import Phase
+from controllers.stitching.phase import StitchPhase
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
 from robots import rotation
@@ -101,7 +101,7 @@ def test_two_stitches_are_made_through_their_holes_one_after_the_other():
     world, tips = World(stitches=2), []
     while not world.lead.ended and world.t < 90e9:
         world.step()
-        if world.phase in (Phase.DRIVE, Phase.PULL):
+        if world.phase in (StitchPhase.DRIVE, StitchPhase.PULL):
             tips.append(world.needle[:3, :3] @ NEEDLES["sh-plus"].marks[2] + world.needle[:3, 3])
     assert world.lead.ended == "all stitches are made"
     assert world.said[0].startswith("2 stitches are feasible")
@@ -133,7 +133,7 @@ def test_a_needle_that_is_dropped_in_the_tissue_is_said_to_be_there_and_taken_ag
 
 
 def test_a_needle_that_has_turned_in_the_jaw_is_handed_over_and_taken_anew():
-    world = World(stitches=1).run(60, until=lambda w: w.phase is Phase.APPROACH)
+    world = World(stitches=1).run(60, until=lambda w: w.phase is StitchPhase.APPROACH)
     turn, contact = np.eye(4), np.eye(4)
     turn[:3, :3] = rotation.matrix(rotation.exp(np.array([0.0, np.radians(40.0), 0.0])))
     contact[2, 3] = 9.2e-3
@@ -146,7 +146,7 @@ def test_a_needle_that_has_turned_in_the_jaw_is_handed_over_and_taken_anew():
 
 
 def test_a_needle_that_nobody_can_take_ends_it_with_where_it_is_and_why():
-    world = World(stitches=1).run(60, until=lambda w: w.phase is Phase.APPROACH)
+    world = World(stitches=1).run(60, until=lambda w: w.phase is StitchPhase.APPROACH)
     drop(world, "PSM1")
     world.needle[:3, 3] = 0.4, 0.0, 0.0
     world.run(2)
@@ -157,9 +157,9 @@ def test_a_needle_that_nobody_can_take_ends_it_with_where_it_is_and_why():
 def test_a_needle_that_is_always_dropped_is_given_up():
     world = World(stitches=1)
     for _ in range(4):
-        world.run(60, until=lambda w: w.phase is Phase.DRIVE and w.needle[2, 3] < 0.01)
+        world.run(60, until=lambda w: w.phase is StitchPhase.DRIVE and w.needle[2, 3] < 0.01)
         drop(world, "PSM1")
-        world.run(1, until=lambda w: w.phase is not Phase.DRIVE)
+        world.run(1, until=lambda w: w.phase is not StitchPhase.DRIVE)
     assert world.lead.ended == "a stitch has failed"
 
 

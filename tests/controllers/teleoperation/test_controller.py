@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.teleoperation.controller import Teleoperation
-from controllers.teleoperation.engagement import Phase
+from controllers.teleoperation.engagement import EngagementPhase
 from controllers.teleoperation.params import TeleoperationParams
 from hub.testing import check_engine
 from robots import rotation
@@ -23,7 +23,7 @@ def test_every_output_fits_its_port_from_the_start():
     for _ in range(2):
         for port in session.teleoperation.ports:
             if port.causality == "output" and port.variability == "signal" and has_vector(port.type):
-                VectorCodec(port).checked(session.outputs[port.name])
+                VectorCodec(port).check_vector(session.outputs[port.name])
         session.step()
 
 
@@ -152,7 +152,7 @@ def test_the_command_never_jumps(moves, orientation):
         if away or move in ("press", "both", "silent"):
             assert np.linalg.norm(session.tip - tip) < 1e-9
         away = move in ("press", "silent") or (
-            away and session.teleoperation._engagement.phase is Phase.CLUTCHED
+            away and session.teleoperation._engagement.phase is EngagementPhase.CLUTCHED
         )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controllers.visual_servoing.camera import projected, seen_points
+from controllers.visual_servoing.camera import project_points, seen_points
 from robots.dvrk.endoscope import StereoCamera
 from robots.training.targets import BOX, DISC_RADIUS, DISCS
 
@@ -29,10 +29,10 @@ def picture(cv2, camera, target, covered=()):
 def _fill(cv2, image, camera, target, outline, colour):
     seen = seen_points(camera, target, outline)
     if (seen[:, 2] > 0.01).all():
-        corners = CAMERA.focal_length * projected(seen) + CAMERA.intrinsics()[:2, 2]
+        corners = CAMERA.focal_length * project_points(seen) + CAMERA.intrinsics()[:2, 2]
         cv2.fillPoly(image, [np.round(corners * 16).astype(np.int32)], colour, cv2.LINE_AA, 4)
 
 
 def features(camera, target):
     """Where the points are, normalised, shape (4, 2)."""
-    return projected(seen_points(camera, target, POINTS))
+    return project_points(seen_points(camera, target, POINTS))

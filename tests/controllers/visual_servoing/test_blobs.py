@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.visual_servoing.blobs import find_blobs
-from controllers.visual_servoing.target import recognised
+from controllers.visual_servoing.target import recognise_target
 from robots import rotation
 from robots.training.targets import DISC_RADIUS
 from tests.controllers.visual_servoing.discs import CAMERA, POINTS, features, picture
@@ -41,7 +41,7 @@ def test_discs_are_found_and_recognised_whichever_way_the_camera_is_rolled(depth
         assert (abs(expected * F).max(axis=0) > (130, 94)).any()
         return
     before = expected + 0.03
-    sight = recognised(cv2, blobs, K, POINTS, DISC_RADIUS, before)
+    sight = recognise_target(cv2, blobs, K, POINTS, DISC_RADIUS, before)
     assert sight is not None
     assert abs(sight.features - expected).max() * F < 0.25  # centroids are up to 1 px off
     assert np.allclose(sight.pose[:3, 3], target[:3, 3], atol=4e-3)
@@ -73,7 +73,7 @@ def test_a_fifth_disc_is_left_out():
     blobs = find_blobs(cv2, image)
     assert len(blobs) == 5
     expected = features(np.eye(4), target)
-    sight = recognised(cv2, blobs, K, POINTS, DISC_RADIUS, expected)
+    sight = recognise_target(cv2, blobs, K, POINTS, DISC_RADIUS, expected)
     assert sight is not None
     assert abs(sight.features - expected).max() * F < 0.3
 
@@ -81,7 +81,7 @@ def test_a_fifth_disc_is_left_out():
 @pytest.mark.parametrize("count", range(4))
 def test_fewer_than_four_are_no_target(count):
     assert (
-        recognised(
+        recognise_target(
             cv2, np.random.default_rng(0).uniform(50, 200, (count, 2)), K, POINTS, DISC_RADIUS, POINTS[:, :2]
         )
         is None

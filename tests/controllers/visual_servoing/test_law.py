@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares, minimize
 
 from bench.vision_goals import depths, features, limits, random_goal, servo
-from controllers.visual_servoing.camera import projected, seen_points
-from controllers.visual_servoing.law import interaction, joint_velocities
-from controllers.visual_servoing.least_squares import constrained
+from controllers.visual_servoing.camera import project_points, seen_points
+from controllers.visual_servoing.law import interaction_matrix, joint_velocities
+from controllers.visual_servoing.least_squares import solve_constrained
 from robots import rotation
 from robots.dvrk.endoscope import BASELINE, left_camera
 
@@ -21,7 +21,7 @@ seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 def test_constrained_least_squares_is_the_least_there_is(rng):
     a, b = rng.normal(size=(6, 3)), rng.normal(size=6)
     g, h = rng.normal(size=(8, 3)), np.maximum(rng.normal(size=8), 0.0)
-    x = constrained(a, b, g, h)
+    x = solve_constrained(a, b, g, h)
     assert (g @ x <= h + 1e-7).all()
     # nothing that is allowed is nearer: the objective is convex, so a way of descent would be seen nearby
     reference = minimize(
@@ -41,10 +41,10 @@ def test_the_interaction_matrix_is_the_derivative_of_the_projection(rng):
 
     def after(seconds):
         turn = rotation.matrix(rotation.exp(twist[3:] * seconds))
-        return projected((points - twist[:3] * seconds) @ turn)
+        return project_points((points - twist[:3] * seconds) @ turn)
 
     expected = (after(h) - after(-h)) / (2.0 * h)
-    found = interaction(projected(points), points[:, 2]) @ twist
+    found = interaction_matrix(project_points(points), points[:, 2]) @ twist
     assert np.allclose(found, expected.ravel(), rtol=0.0, atol=1e-6)
 
 

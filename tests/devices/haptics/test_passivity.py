@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from devices.haptics.contact import ZERO
 from devices.haptics.passivity import Passivity
-from devices.simulated_touch.hand import Hand
+from devices.simulated_touch.hand import SimulatedHand
 from devices.vendor_axes import Vector3
 
 TICK = 0.001
@@ -53,7 +53,7 @@ def _swing(watch: Passivity | None) -> float:
     """Return the hand's motion, peak to peak, in the last of three seconds at a wall of 1 kN/m that is
     sampled at 50 Hz: too seldom by far.
     """
-    hand = Hand(0.15, 200.0, 4.0, TICK, (0.0, 0.0, 0.01))
+    hand = SimulatedHand(0.15, 200.0, 4.0, TICK, (0.0, 0.0, 0.01))
     heights: list[float] = []
     held = 0.0
     for i in range(3000):

@@ -27,7 +27,7 @@ class IdealRobot(Stepped):
         sensed = [port for port in controller.ports if port.name.startswith("sense/")]
         self._measured = {port.name.removeprefix("sense/"): port for port in sensed}
         self._state = {name: np.zeros(3 * len(port.names)) for name, port in self._measured.items()}
-        starts = controller.params.arms.driven
+        starts = controller.params.arms.present_arms
         for name, state in self._state.items():
             arm, _, part = name.partition("/")
             start = starts[arm].start if part == "measured_js" else starts[arm].gripper.start

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from devices.haptics.contact import ZERO
-from devices.simulated_touch.hand import Hand
+from devices.simulated_touch.hand import SimulatedHand
 
 numbers = st.floats(-1.0, 1.0)
 
@@ -24,7 +24,7 @@ def test_it_moves_as_the_differential_equation_says(
     weak, critical and strong damping.
     """
     for c in (damping, 2.0 * (stiffness * mass) ** 0.5):
-        hand = Hand(mass, stiffness, c, tick, start)
+        hand = SimulatedHand(mass, stiffness, c, tick, start)
         exact = np.array([start, (0.0, 0.0, 0.0)])
         matrix = expm(tick * np.array([[0.0, 1.0], [-stiffness / mass, -c / mass]]))
         for force, target, velocity in (
@@ -44,7 +44,7 @@ def test_a_wall_sampled_too_seldom_makes_it_swing_and_one_within_the_rule_does_n
     """Colgate and Schenkel: b > K T / 2. With 4 N s/m and 20 ms that is 400 N/m; exact motion shows it."""
 
     def swing(stiffness: float, hold: int) -> float:
-        hand, force, heights = Hand(0.15, 200.0, 4.0, 1e-3, ZERO), 0.0, []
+        hand, force, heights = SimulatedHand(0.15, 200.0, 4.0, 1e-3, ZERO), 0.0, []
         for i in range(4000):
             if i % hold == 0:
                 force = max(0.0, -stiffness * hand.position[2])

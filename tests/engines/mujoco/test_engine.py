@@ -63,7 +63,7 @@ def test_every_declared_output_is_there_from_the_start_and_fits_its_port():
     for _ in range(2):
         assert set(run.outputs) == {port.name for port in outputs} | {"PSM1/probe/work"}
         for port in outputs:
-            VectorCodec(port).checked(run.outputs[port.name])
+            VectorCodec(port).check_vector(run.outputs[port.name])
         run.steps(1)
 
 

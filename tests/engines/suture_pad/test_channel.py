@@ -151,8 +151,8 @@ def test_three_points_carry_every_wrench_and_frame(seed):
     axes = rotation.matrix(rotation.exp(drawn.uniform(-2, 2, 3)))
     origin = drawn.uniform(-0.1, 0.1, 3)
     for needle in NEEDLES.values():
-        points = needle.bonded @ axes.T + origin
-        turned, placed = ThreePoints(needle.bonded).frame(points)
+        points = needle.bond_points @ axes.T + origin
+        turned, placed = ThreePoints(needle.bond_points).frame(points)
         assert turned == pytest.approx(axes, abs=1e-9)
         assert placed == pytest.approx(origin, abs=1e-12)
         force, moment = drawn.uniform(-1, 1, 3), drawn.uniform(-0.02, 0.02, 3)

@@ -37,7 +37,7 @@ def needle_at(angle, row=0, needle=NEEDLE):
     height = (needle.radius**2 - x**2) ** 0.5
     turn = angle - needle.arc / 2
     axes = np.array([[np.cos(turn), -np.sin(turn), 0], [0, 0, 1], [-np.sin(turn), -np.cos(turn), 0]])
-    return needle.bonded @ axes.T + [0.0, y, height]
+    return needle.bond_points @ axes.T + [0.0, y, height]
 
 
 def driven(engine, angles, row=0):

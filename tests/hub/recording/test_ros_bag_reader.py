@@ -8,7 +8,7 @@ import zstandard
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from hub.recording.ros_bag_reader import BagTopic, RosBag
-from schemas.codec import message_type, validated
+from schemas.codec import message_type, validate_message
 from schemas.crtk import StringStamped
 from schemas.errors import RecordingError
 from schemas.ros import EmptyMessage, Header, JointState, Time
@@ -28,7 +28,7 @@ RECORDED = [
 
 def read(bag, topics, start):
     return [
-        (topic, (time_ns - EPOCH) / SECOND, validated(message_type(bag.topics[topic].type), raw))
+        (topic, (time_ns - EPOCH) / SECOND, validate_message(message_type(bag.topics[topic].type), raw))
         for topic, time_ns, raw in bag.messages(topics, EPOCH + round(start * SECOND))
     ]
 

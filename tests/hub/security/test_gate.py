@@ -201,7 +201,7 @@ def test_a_device_does_its_part(hub, told, caplog):
         for key in (
             KEYS.output("device", "touch", "pose"),
             KEYS.device_status("touch"),
-            KEYS.refused("device", "touch"),
+            KEYS.dropped_messages("device", "touch"),
         ):
             touch.put(key, b"x")
             until(lambda key=key: key in hub.heard)

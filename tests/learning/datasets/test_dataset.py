@@ -22,7 +22,7 @@ from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.recorded_scene import RecordedScene
 from learning.datasets.command_line import app
 from learning.datasets.writer import Writer
-from learning.own_directory import claimed
+from learning.own_directory import claim_directory
 from schemas.errors import TrocarError
 from trocar import Recording
 
@@ -224,14 +224,14 @@ def test_each_frame_has_its_action(recordings: Path, tmp_path: Path) -> None:
 
 
 def test_of_two_into_one_directory_the_second_is_refused(recordings: Path, tmp_path: Path) -> None:
-    with claimed(tmp_path / "set.part", "data set"):
+    with claim_directory(tmp_path / "set.part", "data set"):
         done = run(recordings / "unseen", "-o", tmp_path / "set", "--size", "64x64")
     assert (done.exit_code, str(done.exception)[:22]) == (1, "another process uses '")
     assert not (tmp_path / "set").exists()
 
 
 def test_what_a_killed_one_has_left_is_replaced(recordings: Path, tmp_path: Path) -> None:
-    with claimed(tmp_path / "set.part", "data set"):
+    with claim_directory(tmp_path / "set.part", "data set"):
         (tmp_path / "set.part/meta").mkdir()
         (tmp_path / "set.part/left").touch()
     done = run(recordings / "unseen", "-o", tmp_path / "set", "--size", "64x64")

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from hub.command_line.app import main
-from learning.own_directory import MARKER, claimed
+from learning.own_directory import MARKER, claim_directory
 from learning.sweeps import sweep as sweep_module
 from learning.sweeps.sweep import Sweep
 from learning.sweeps.variation import parse
@@ -190,7 +190,7 @@ def test_a_directory_without_the_mark_is_left_alone(begun, command):
 
 def test_of_two_sweeps_in_one_directory_the_second_is_refused(begun, command):
     words, directory = begun
-    with claimed(directory, "sweep"):
+    with claim_directory(directory, "sweep"):
         code, said = command(*words)
     assert (code, "another process uses" in said) == (2, True)
     assert command(*words)[0] == 0

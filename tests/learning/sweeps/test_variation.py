@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from learning.sweeps.trial import planned
+from learning.sweeps.trial import plan_trials
 from learning.sweeps.variation import Variation, number_and_unit, parse
 from schemas.errors import ScenarioError
 
@@ -67,7 +67,7 @@ def test_a_range_is_evenly_spaced(first, last, count, unit):
 
 
 def test_all_combinations_with_repetitions():
-    trials = planned([parse("a=1,2"), parse("b=x,y,z")], 2, "seed")
+    trials = plan_trials([parse("a=1,2"), parse("b=x,y,z")], 2, "seed")
     assert [trial.number for trial in trials] == list(range(12))
     assert [tuple(trial.settings.values()) for trial in trials[:4]] == [
         (1, "x", 0),

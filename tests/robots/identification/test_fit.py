@@ -10,7 +10,7 @@ from robots.identification.arms import of_ecm, of_psm
 from robots.identification.fit import fit
 from robots.identification.linear_model import FrictionShape, LinearModel, pseudo_inertias
 from robots.identification.result import own_dynamics
-from robots.identification.signals import Measured, filtered
+from robots.identification.signals import Measured, filter_signals
 from schemas.errors import MotionError, RecordingError
 
 TOOL = instrument("400006")
@@ -56,7 +56,7 @@ def recorded(model, truth, seed=3):
     time, q = motion(20.0, seed, model.arm)
     effort = efforts(truth, q, model)
     effort += 0.005 * effort.std(axis=0) * np.random.default_rng(seed).normal(size=effort.shape)
-    return filtered(Measured(time, q, effort), CUTOFF, RATE)
+    return filter_signals(Measured(time, q, effort), CUTOFF, RATE)
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def found():
     time, q = motion(30.0, seed=3)
     effort = efforts(truth, q)
     effort += 0.02 * effort.std(axis=0) * random.normal(size=effort.shape)
-    return truth, fit([filtered(Measured(time, q, effort), CUTOFF, RATE)], ARM)
+    return truth, fit([filter_signals(Measured(time, q, effort), CUTOFF, RATE)], ARM)
 
 
 def test_what_is_told_is_within_two_percent(found):
@@ -130,14 +130,14 @@ def test_the_regressor_is_the_inertia_matrix_and_keeps_the_energy():
 def test_spoilt_recordings_are_refused(spoil, reason):
     time, q = motion(6.0, seed=5)
     with pytest.raises(RecordingError, match=reason):
-        filtered(spoil(Measured(time, q, np.zeros_like(q))), CUTOFF, RATE)
+        filter_signals(spoil(Measured(time, q, np.zeros_like(q))), CUTOFF, RATE)
 
 
 def test_a_motion_that_excites_little_is_refused():
     time, q = motion(6.0, seed=6)
     q[:, 1:] = 0.1
     with pytest.raises(RecordingError, match="condition number"):
-        fit([filtered(Measured(time, q, np.zeros_like(q)), CUTOFF, RATE)], ARM)
+        fit([filter_signals(Measured(time, q, np.zeros_like(q)), CUTOFF, RATE)], ARM)
 
 
 def test_the_jaw_is_a_joint_that_shares_the_discs_of_the_wrist():

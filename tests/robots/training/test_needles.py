@@ -34,5 +34,5 @@ def test_needles_have_the_measures_of_their_sources():
 @pytest.mark.parametrize("name", NEEDLES)
 def test_what_is_bonded_is_half_way_where_the_rules_frame_need_not_be(name):
     needle = NEEDLES[name]
-    assert needle.bonded[[0, 2]] == pytest.approx(needle.marks[[0, 2]])
-    assert needle.bonded[1] == pytest.approx([needle.radius, 0.0, 0.0])
+    assert needle.bond_points[[0, 2]] == pytest.approx(needle.marks[[0, 2]])
+    assert needle.bond_points[1] == pytest.approx([needle.radius, 0.0, 0.0])

@@ -24,7 +24,7 @@ from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
-from schemas.codec import message_type, validated
+from schemas.codec import message_type, validate_message
 from schemas.errors import MessageError, RecordingError
 from schemas.vectors import VectorCodec
 from tests.devices.ros.helpers import until
@@ -241,7 +241,7 @@ def test_states_are_what_the_gateway_would_have_written(driven, bag):
         header = getattr(last, "header", None)
         assert header is None or header.frame_id == port.frame
         assert (
-            VectorCodec(port).from_message(validated(message_type(port.type), last)).tolist()
+            VectorCodec(port).from_message(validate_message(message_type(port.type), last)).tolist()
             == recorded[-1].tolist()
         )
 

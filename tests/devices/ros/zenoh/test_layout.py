@@ -31,10 +31,10 @@ that, and a publisher in a namespace.
 
 
 def test_tokens_are_those_of_a_real_node():
-    node = GraphToken.parsed(NODE)
+    node = GraphToken.parse_token(NODE)
     assert node == GraphToken("914ec2c920f5151f26394cf0ba959999", 0, "NN", "/p_tl")
     assert node.key(0) == NODE
-    publisher = GraphToken.parsed(PUBLISHER)
+    publisher = GraphToken.parse_token(PUBLISHER)
     assert (publisher.number, publisher.kind, publisher.node, publisher.topic) == (
         4,
         "MP",
@@ -54,8 +54,8 @@ def test_tokens_are_those_of_a_real_node():
         ).key(0)
         == PUBLISHER
     )
-    assert GraphToken.parsed(NAMESPACED).node == "/cell4/gw"
-    assert GraphToken.parsed(NAMESPACED).topic == "/cell4/chatter"
+    assert GraphToken.parse_token(NAMESPACED).node == "/cell4/gw"
+    assert GraphToken.parse_token(NAMESPACED).topic == "/cell4/chatter"
 
 
 def test_ids_and_attachments_are_those_of_a_real_node():
@@ -76,7 +76,7 @@ def test_ids_and_attachments_are_those_of_a_real_node():
     ],
 )
 def test_other_tokens_are_left_alone(token):
-    assert GraphToken.parsed(token) is None
+    assert GraphToken.parse_token(token) is None
 
 
 @given(st.binary(max_size=64))
