@@ -308,7 +308,7 @@ def plans(args: argparse.Namespace) -> None:
     surgeon, thing = lead._surgeon, file.params["robot"].objects["needle"]
     surgeon.sense(np.array([*thing.position, *thing.orientation]), 0.0)
     for number, hand in enumerate(surgeon.hands):
-        start = np.array(file.params["lead"].arms.driven[hand.arm].start)
+        start = np.array(file.params["lead"].arms.present_arms[hand.arm].start)
         hand.measured[:] = surgeon.state.park[number] = matrix_to_pose(hand.base @ hand.chain.forward(start))
     rng, took, plain = np.random.default_rng(0), list[float](), 0
     found: Counter[tuple[bool, bool, int]] = Counter()

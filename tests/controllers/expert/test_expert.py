@@ -38,7 +38,9 @@ class World:
         self.held, self.jaws, self.tips, self.grips, self.t = {}, {}, {}, {}, 0
         for each in self.expert._team.hands:
             hand = each.hand
-            self.tips[hand.arm] = hand.base @ hand.chain.forward(np.array(given.arms.driven[hand.arm].start))
+            self.tips[hand.arm] = hand.base @ hand.chain.forward(
+                np.array(given.arms.present_arms[hand.arm].start)
+            )
             self.jaws[hand.arm] = 0.5
 
     def step(self, **events):

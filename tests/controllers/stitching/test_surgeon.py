@@ -31,11 +31,11 @@ class World:
         thing = file.params["robot"].objects["needle"]
         self.needle = pose_to_matrix(np.array([*thing.position, *thing.orientation]))
         self.tips = {
-            hand.arm: hand.base @ hand.chain.forward(np.array(given.arms.driven[hand.arm].start))
+            hand.arm: hand.base @ hand.chain.forward(np.array(given.arms.present_arms[hand.arm].start))
             for hand in self.lead._hands
         }
         self.joints = {
-            hand.arm: np.array(given.arms.driven[hand.arm].start, float) for hand in self.lead._hands
+            hand.arm: np.array(given.arms.present_arms[hand.arm].start, float) for hand in self.lead._hands
         }
         self.jaws, self.grips, self.t, self.said = dict.fromkeys(self.tips, 0.5), {}, 0, []
         self.fastest = 0.0
