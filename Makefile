@@ -32,6 +32,7 @@ check: $(VENV)/.dev
 	python docs/tools/wrap.py --check
 	python docs/tools/decisions.py
 	python docs/tools/addresses.py
+	python docs/tools/words.py
 
 format: $(VENV)/.dev
 	ruff check --fix .

@@ -1,1 +1,1 @@
-"""Scenarios that come with Trocar, and the data they need."""
+"""Installed scenarios and their data."""
