@@ -169,7 +169,7 @@ class EcmMasters(Controller):
         if follows:
             left, right = (inputs[f"{master}/measured_cp"] for master in _MASTERS)
             if not before:
-                self._engage(left, right, inputs["measured_js"])
+                self._engage_masters(left, right, inputs["measured_js"])
                 for master in _MASTERS:
                     outputs |= {
                         f"{master}/{name}": (_FOLLOWS,)
@@ -179,7 +179,7 @@ class EcmMasters(Controller):
             outputs |= self._hold_together(left[:3], right[:3], inputs)
         return outputs
 
-    def _engage(self, left: Vector, right: Vector, endoscope: Vector) -> None:
+    def _engage_masters(self, left: Vector, right: Vector, endoscope: Vector) -> None:
         """Set the reference to the present poses."""
         self._middle[:], self._up[:], side = _picture_axes(left[:3], right[:3])
         between = right[:3] - left[:3]
@@ -192,9 +192,9 @@ class EcmMasters(Controller):
         """Return the command to the endoscope, and the orientations at which the masters are held."""
         middle, up, _ = _picture_axes(left, right)
         a, b, r = (
-            -_angle(_Y, self._middle, middle),
-            _angle(_X, self._middle, middle),
-            -_angle(_Z, self._up, up),
+            -_angle_about(_Y, self._middle, middle),
+            _angle_about(_X, self._middle, middle),
+            -_angle_about(_Z, self._up, up),
         )
         i = self.params.scale * float(np.linalg.norm(self._middle) - np.linalg.norm(middle))
         cos, sin = np.cos(self._start[3] + r), np.sin(self._start[3] + r)
@@ -248,7 +248,7 @@ def _picture_axes(left: Vector, right: Vector) -> tuple[Vector, Vector, Vector]:
     return middle, up, side / np.linalg.norm(side)
 
 
-def _angle(axis: Vector, one: Vector, other: Vector) -> float:
+def _angle_about(axis: Vector, one: Vector, other: Vector) -> float:
     """Return the angle (rad) about `axis` from `one` to `other`."""
     one, other = one - (axis @ one) * axis, other - (axis @ other) * axis
     return float(np.arctan2(axis @ np.cross(one, other), one @ other))

@@ -95,11 +95,11 @@ class TipTracker(Controller):
         eye = self._stand @ self._eye.forward(inputs["ECM/measured_js"][:n])
         for number, (arm, base) in enumerate(self._bases.items()):
             tip = (base @ [*inputs[f"{arm}/measured_cp"][:3], 1.0])[:3]
-            seen = self._see(eye[:3, :3].T @ (tip - eye[:3, 3]), t, number)
+            seen = self._see_tip(eye[:3, :3].T @ (tip - eye[:3, 3]), t, number)
             self._outputs[f"{arm}/seen"] = () if seen is None else (_message(eye, *seen, t),)
         return self._outputs
 
-    def _see(self, tip: Vector, t: int, arm: int) -> tuple[Vector, Vector] | None:
+    def _see_tip(self, tip: Vector, t: int, arm: int) -> tuple[Vector, Vector] | None:
         """Return where a tip at (3,) in the left eye is seen, (3,), and its covariance, (3, 3); None: not."""
         camera, noise = self._camera, self.params.noise
         x, y, z = tip.tolist()

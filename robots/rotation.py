@@ -27,10 +27,10 @@ _ROWS = np.array([[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]])
 
 def product(a: Vector, b: Vector) -> Vector:
     """Return the quaternion a * b, shape (4,): first the rotation b, then a."""
-    return np.array(_product(a.tolist(), b.tolist()))
+    return np.array(_hamilton_product(a.tolist(), b.tolist()))
 
 
-def _product(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
+def _hamilton_product(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
     ax, ay, az, aw = a
     bx, by, bz, bw = b
     return (
@@ -98,7 +98,7 @@ def turn_to(goal: Vector, r: Vector) -> tuple[float, float, float]:
     conjugate(from_matrix(r)))), at half of its cost.
     """
     x, y, z, w = _from_rows(*r[:3, :3].tolist())
-    return _log(*_product(goal.tolist(), (-x, -y, -z, w)))
+    return _log(*_hamilton_product(goal.tolist(), (-x, -y, -z, w)))
 
 
 def _from_rows(

@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 
-def _empty() -> NDArray[np.float64]:
+def _empty_values() -> NDArray[np.float64]:
     return np.zeros(0)
 
 
@@ -102,7 +102,7 @@ class ForwardKinematicsRequest(Message):
     """Asks for the pose of an arm's tip at joint positions `jp`; `cp` is ignored."""
 
     ros_type: ClassVar[str] = "crtk_msgs/srv/QueryForwardKinematics_Request"
-    jp: Float64Array = Field(default_factory=_empty)
+    jp: Float64Array = Field(default_factory=_empty_values)
     cp: Pose = Pose()
 
 
@@ -120,13 +120,13 @@ class InverseKinematicsRequest(Message):
 
     ros_type: ClassVar[str] = "crtk_msgs/srv/QueryInverseKinematics_Request"
     cp: Pose = Pose()
-    jp: Float64Array = Field(default_factory=_empty)
+    jp: Float64Array = Field(default_factory=_empty_values)
 
 
 class InverseKinematicsResponse(Message):
     """The joint positions, unless `result` is false: then `message` has the reason."""
 
     ros_type: ClassVar[str] = "crtk_msgs/srv/QueryInverseKinematics_Response"
-    jp: Float64Array = Field(default_factory=_empty)
+    jp: Float64Array = Field(default_factory=_empty_values)
     result: Bool = False
     message: String = ""

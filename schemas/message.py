@@ -55,7 +55,7 @@ class RosType:
         if self.dtype is None:
             return handler(source)
         return core_schema.no_info_plain_validator_function(
-            partial(self._array, self.dtype),
+            partial(self._validate_array, self.dtype),
             serialization=core_schema.plain_serializer_function_ser_schema(lambda a: a.tolist()),
         )
 
@@ -63,7 +63,7 @@ class RosType:
         """Arrays are JSON arrays of numbers."""
         return handler(schema) if self.dtype is None else {"type": "array", "items": {"type": "number"}}
 
-    def _array(self, dtype: np.dtype[Any], value: Any) -> NDArray[Any]:
+    def _validate_array(self, dtype: np.dtype[Any], value: Any) -> NDArray[Any]:
         try:
             # Python's integers are longer than any of numpy's
             exact = dtype.kind != "f" and not isinstance(value, np.ndarray)

@@ -25,7 +25,7 @@ geostationary satellite is 35 786 km above the equator.
 """
 
 
-def _preset(value: int) -> int:
+def _preset_values(value: int) -> int:
     if value not in PRESETS:
         raise ValueError(
             f"{value / 1e6:g} ms is no preset; these are {', '.join(f'{ns // 10**6} ms' for ns in PRESETS)}."
@@ -36,7 +36,7 @@ def _preset(value: int) -> int:
 
 _MEANINGS = "; ".join(f"{ns // 10**6} ms: {meaning}" for ns, meaning in PRESETS.items())
 
-Preset = Annotated[Duration, AfterValidator(_preset)]
+Preset = Annotated[Duration, AfterValidator(_preset_values)]
 
 
 class Outage(BaseModel):

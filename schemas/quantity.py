@@ -129,7 +129,7 @@ def same_unit(one: str, other: str) -> bool:
         return False
 
 
-def _quantity(unit: str, example: str) -> Any:
+def _quantity_type(unit: str, example: str) -> Any:
     schema = {
         "anyOf": [{"type": "number"}, {"type": "string"}],
         "description": f"a number in {unit}, or a text with its unit",
@@ -139,7 +139,7 @@ def _quantity(unit: str, example: str) -> Any:
     return BeforeValidator(lambda value: require_magnitude(to_si(value, unit), unit)), WithJsonSchema(schema)
 
 
-def _nanoseconds(value: Any) -> int:
+def _to_nanoseconds(value: Any) -> int:
     nanoseconds = to_si(value, "s") * 1e9
     if abs(nanoseconds) >= 2**63:
         raise ValueError(f"'{value}' is longer than 64 bits of nanoseconds can represent, 292 years")
@@ -149,19 +149,19 @@ def _nanoseconds(value: Any) -> int:
     return whole
 
 
-Length = Annotated[float, *_quantity("m", "80 mm")]
-Mass = Annotated[float, *_quantity("kg", "20 g")]
-Pressure = Annotated[float, *_quantity("Pa", "10 kPa")]
-Density = Annotated[float, *_quantity("kg/m^3", "1000 kg/m^3")]
-Force = Annotated[float, *_quantity("N", "2 N")]
-Stiffness = Annotated[float, *_quantity("N/m", "1000 N/m")]
-Damping = Annotated[float, *_quantity("N*s/m", "5 N*s/m")]
-Angle = Annotated[float, *_quantity("rad", "30 deg")]
-Speed = Annotated[float, *_quantity("m/s", "50 mm/s")]
-Acceleration = Annotated[float, *_quantity("m/s^2", "9.81 m/s^2")]
+Length = Annotated[float, *_quantity_type("m", "80 mm")]
+Mass = Annotated[float, *_quantity_type("kg", "20 g")]
+Pressure = Annotated[float, *_quantity_type("Pa", "10 kPa")]
+Density = Annotated[float, *_quantity_type("kg/m^3", "1000 kg/m^3")]
+Force = Annotated[float, *_quantity_type("N", "2 N")]
+Stiffness = Annotated[float, *_quantity_type("N/m", "1000 N/m")]
+Damping = Annotated[float, *_quantity_type("N*s/m", "5 N*s/m")]
+Angle = Annotated[float, *_quantity_type("rad", "30 deg")]
+Speed = Annotated[float, *_quantity_type("m/s", "50 mm/s")]
+Acceleration = Annotated[float, *_quantity_type("m/s^2", "9.81 m/s^2")]
 Duration = Annotated[
     int,
-    BeforeValidator(_nanoseconds),
+    BeforeValidator(_to_nanoseconds),
     PlainSerializer(lambda ns: f"{ns} ns", when_used="json"),
     WithJsonSchema(
         {

@@ -68,7 +68,7 @@ __all__ = [
 ]
 
 
-def _empty() -> NDArray[np.float64]:
+def _empty_values() -> NDArray[np.float64]:
     return np.zeros(0)
 
 
@@ -152,7 +152,7 @@ class Float64MultiArray(Message):
 
     ros_type: ClassVar[str] = "std_msgs/msg/Float64MultiArray"
     layout: MultiArrayLayout = MultiArrayLayout()
-    data: Float64Array = Field(default_factory=_empty)
+    data: Float64Array = Field(default_factory=_empty_values)
 
 
 class Vector3(Message):
@@ -311,9 +311,9 @@ class JointState(Message):
     ros_type: ClassVar[str] = "sensor_msgs/msg/JointState"
     header: Header = Header()
     name: StringArray = Field(default_factory=list[str])
-    position: Float64Array = Field(default_factory=_empty)
-    velocity: Float64Array = Field(default_factory=_empty)
-    effort: Float64Array = Field(default_factory=_empty)
+    position: Float64Array = Field(default_factory=_empty_values)
+    velocity: Float64Array = Field(default_factory=_empty_values)
+    effort: Float64Array = Field(default_factory=_empty_values)
 
 
 class Joy(Message):
@@ -372,7 +372,7 @@ class CameraInfo(Message):
     height: UInt32 = 0
     width: UInt32 = 0
     distortion_model: String = ""
-    d: Float64Array = Field(default_factory=_empty)
+    d: Float64Array = Field(default_factory=_empty_values)
     k: Annotated[NDArray[np.float64], fixed_float64(9)] = Field(default_factory=lambda: np.zeros(9))
     r: Annotated[NDArray[np.float64], fixed_float64(9)] = Field(default_factory=lambda: np.zeros(9))
     p: Annotated[NDArray[np.float64], fixed_float64(12)] = Field(default_factory=lambda: np.zeros(12))

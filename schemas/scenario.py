@@ -45,7 +45,7 @@ class PortReference(_Part):
 
     @model_validator(mode="before")
     @classmethod
-    def _parse(cls, value: Any) -> Any:
+    def _parse_text(cls, value: Any) -> Any:
         if isinstance(value, str):
             participant, dot, port = value.strip().partition(".")
             if not (dot and participant and port):
@@ -103,7 +103,7 @@ class Connection(_Part):
 
     @model_validator(mode="before")
     @classmethod
-    def _parse(cls, value: Any) -> Any:
+    def _parse_text(cls, value: Any) -> Any:
         if isinstance(value, str):
             source, arrow, target = value.partition("->")
             if not arrow:

@@ -90,7 +90,7 @@ class VectorCodec:
         if self._is_pose:
             self.neutral[6] = 1.0
         self._has_stamp = "header" in self.model.model_fields
-        self._compile()
+        self._compile_layout()
 
     def _layout(self) -> Iterator[tuple[str, tuple[str, ...], slice]]:
         port, at = self.port, 0
@@ -106,7 +106,7 @@ class VectorCodec:
             yield path, names, block
             at += count
 
-    def _compile(self) -> None:
+    def _compile_layout(self) -> None:
         """Find the positions of the stamp and the blocks in the CDR bytes, by encoding unique numbers."""
         marks: Vector = np.random.default_rng(0).random(self.size)
         template = bytearray(encode(self.to_message(marks, 0)))

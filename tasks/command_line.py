@@ -34,7 +34,7 @@ def score(
     """Score a recorded session, or a ROS bag of a real arm: metrics, events, and the rules of others."""
     from hub.recording.scores import score_numbers
 
-    found = _scored(recording, rules or [], trust=trust)
+    found = _score_file(recording, rules or [], trust=trust)
     scores = {name: score_numbers(one.card) for name, one in found.items()}
     if as_json:
         events = {name: [_numbers(event) for event in one.events] for name, one in found.items()}
@@ -48,7 +48,7 @@ def score(
             console.print(table(rows, f"{name}, at (s)", "event", "object", "arm", "place", "value", "unit"))
 
 
-def _scored(path: Path, rules: list[str], *, trust: bool) -> dict[str, Scored]:
+def _score_file(path: Path, rules: list[str], *, trust: bool) -> dict[str, Scored]:
     from hub.recording.bag import bag_file
     from hub.recording.recording import Recording
     from schemas.errors import RecordingError

@@ -78,7 +78,7 @@ class ObjectWatch:
         for i, (was, holder) in enumerate(zip(state.holder.astype(int), now.holders, strict=True)):
             height = float(now.poses[i, 2])
             if holder != was:
-                yield from self._change(i, was, holder, height)
+                yield from self._holder_change(i, was, holder, height)
             if holder >= 0:
                 raised = height - state.base[i]
                 if not state.lifted[i] and raised >= self._params.lift:
@@ -88,9 +88,9 @@ class ObjectWatch:
                 yield from self._settle(i, now)
             yield from self._leave(i, now)
         state.before[:] = now.poses[:, :3]
-        yield from self._touch(now)
+        yield from self._instrument_contacts(now)
 
-    def _change(self, i: int, was: int, holder: int, height: float) -> Iterator[Event]:
+    def _holder_change(self, i: int, was: int, holder: int, height: float) -> Iterator[Event]:
         state = self.state
         state.holder[i] = holder
         if holder < 0:
@@ -133,7 +133,7 @@ class ObjectWatch:
             yield Event("out of view", i)
         state.unseen[i] = unseen
 
-    def _touch(self, now: Instant) -> Iterator[Event]:
+    def _instrument_contacts(self, now: Instant) -> Iterator[Event]:
         """Check for contact between instruments."""
         state, more = self.state, now.impulse - self.state.impulse
         state.contact_gap += now.period_s

@@ -51,10 +51,10 @@ def load_scenario(
     Raises:
         ScenarioError: The scenario is not valid; a line for each problem, with file, line and column.
     """
-    return load(str(scenario), _overrides(set))
+    return load(str(scenario), _to_overrides(set))
 
 
-def _overrides(values: Mapping[str, Any] | None) -> list[str]:
+def _to_overrides(values: Mapping[str, Any] | None) -> list[str]:
     return [
         f"{path}={value if isinstance(value, str) else json.dumps(value, default=str)}"
         for path, value in (values or {}).items()
@@ -169,7 +169,7 @@ def fork(
     made = Fork(
         opened,
         round(at * 1e9),
-        _overrides(set),
+        _to_overrides(set),
         record=None if record is None else Path(record),
         trust=trust,
         directory=None if directory is None else Path(directory),

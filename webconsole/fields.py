@@ -43,7 +43,7 @@ class Field(NamedTuple):
     def override(self, value: Scalar) -> str:
         """Return `path=value` as on the command line; raises ScenarioError for a value of another type."""
         text = f"{self.path}={json.dumps(value)}"
-        if value is None or self._allows(value):
+        if value is None or self._allows_value(value):
             return text
         expected = {
             "number": f"a number in {self.unit}" if self.unit else "a number",
@@ -53,7 +53,7 @@ class Field(NamedTuple):
         }
         raise ScenarioError(f"--set {safe_text(text)}: {self.path}: expected {expected[self.control]}")
 
-    def _allows(self, value: bool | float | str) -> bool:
+    def _allows_value(self, value: bool | float | str) -> bool:
         match self.control:
             case "switch":
                 return isinstance(value, bool)
@@ -87,7 +87,7 @@ def _fields(model: type[BaseModel], prefix: str) -> Iterator[Field]:
     described = model.model_json_schema()["properties"]
     for name, info in model.model_fields.items():
         schema = described[info.alias or name]
-        control = _control(schema)
+        control = _form_control(schema)
         if control is None:
             continue
         field = Field(
@@ -103,7 +103,7 @@ def _fields(model: type[BaseModel], prefix: str) -> Iterator[Field]:
         yield field._replace(limits={name: field.in_unit(bound) for name, bound in _limits(info)})
 
 
-def _control(schema: dict[str, Any]) -> Control | None:
+def _form_control(schema: dict[str, Any]) -> Control | None:
     """Return the control of a value; None for words, paths, lists, mappings and a single choice."""
     if "const" in schema:
         return None

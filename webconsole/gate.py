@@ -98,10 +98,10 @@ class Gate:
         if scope["type"] == "websocket" and scope["path"] in self._links:
             await self._admit_by_link(token, headers, scope, receive, send)
             return
-        problem = self._foreign(scope, headers)
+        problem = self._foreign_request(scope, headers)
         role = self._role(headers)
         if not problem and token and scope["type"] == "http" and scope["method"] == "GET":
-            await self._admit(token, role, scope, receive, send)
+            await self._admit_browser(token, role, scope, receive, send)
             return
         if problem or role is None:
             why = problem or "not let in: open the link that the server has printed"
@@ -134,7 +134,7 @@ class Gate:
         host = headers.get("host", "")
         return "" if host in self._hosts else f"host {host[:80]!r} is not this server's"
 
-    def _foreign(self, scope: Scope, headers: Mapping[str, str]) -> str:
+    def _foreign_request(self, scope: Scope, headers: Mapping[str, str]) -> str:
         """Return why a request does not come from this server's page; else empty."""
         if elsewhere := self._not_this_host(headers):
             return elsewhere
@@ -156,7 +156,7 @@ class Gate:
                 return _find_role(self._in, value)
         return None
 
-    async def _admit(
+    async def _admit_browser(
         self, token: str, known: Role | None, scope: Scope, receive: Receive, send: Send
     ) -> None:
         """Admit a browser by its token; an admitted browser only gets the page."""

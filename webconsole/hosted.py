@@ -63,7 +63,7 @@ class HostedDevices:
         hand_of(name).served = True
         request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
         host = DeviceHost(name, lambda: reach(self._endpoints[name], name), Keys("*"), request, None)
-        host.joined = partial(self._pilots.offer, name, partial(_give, name))
+        host.joined = partial(self._pilots.offer, name, partial(_give_hand, name))
         try:
             host.serve(self._check)
         except TrocarError as error:
@@ -82,7 +82,7 @@ class HostedDevices:
             thread.join(_PATIENCE_S)
 
 
-def _give(device: str, hand: Hand | None) -> None:
+def _give_hand(device: str, hand: Hand | None) -> None:
     """Hand a page's wish to the device; None: no page leads. Raises MessageError for an invalid pose."""
     if hand is None:
         hand_of(device).release()

@@ -153,7 +153,7 @@ class Live:
         """Subscribe to these outlets, and to no others."""
         with self._lock:
             self._wanted = names
-            self._subscribe()
+            self._subscribe_keys()
 
     def newest(self, name: str, time_ns: int | None) -> Value | None:
         """Return the newest value received; at a simulated time, the recorded value."""
@@ -181,7 +181,7 @@ class Live:
         self._links[reply.device] = reply.link
         status = self._status
         at = 0.0 if status is None else status.sim_time_ns / 1e9
-        self._note(Entry(at, "info", reply.device, f"network link: {reply.description or 'none'}"))
+        self._note_entry(Entry(at, "info", reply.device, f"network link: {reply.description or 'none'}"))
 
     def entries_after(self, number: int) -> tuple[int, list[Entry]]:
         """Return the lines of the log after the line with this number, and the number of the last."""
@@ -296,10 +296,10 @@ class Live:
         self._session = session
         self._trouble = f"session '{described.session}' gives no status yet"
         self.generation += 1
-        self._note(Entry(0.0, "info", "session", f"'{described.session}' is shown"))
-        self._subscribe()
+        self._note_entry(Entry(0.0, "info", "session", f"'{described.session}' is shown"))
+        self._subscribe_keys()
 
-    def _subscribe(self) -> None:
+    def _subscribe_keys(self) -> None:
         session = self._session
         if session is None:
             return
@@ -352,15 +352,15 @@ class Live:
         if outlet.port.type in LOGGED:
             try:
                 for entry in self._lines.lines_of(outlet, value):
-                    self._note(entry)
+                    self._note_entry(entry)
             except MessageError as error:
-                self._note(Entry(value.time_ns / 1e9, "warn", outlet.name, f"not shown: {error}"))
+                self._note_entry(Entry(value.time_ns / 1e9, "warn", outlet.name, f"not shown: {error}"))
 
     def _take_status(self, sample: zenoh.Sample) -> None:
         try:
             status = decode(SessionStatus, sample.payload.to_bytes())
         except MessageError as error:
-            self._note(Entry(0.0, "warn", "session", f"a status is not shown: {error}"))
+            self._note_entry(Entry(0.0, "warn", "session", f"a status is not shown: {error}"))
             return
         before, self._status = self._status, status
         at = status.sim_time_ns / 1e9
@@ -368,15 +368,15 @@ class Live:
             return
         if status.state != before.state:
             failed = status.state == "failed"
-            self._note(Entry(at, "error" if failed else "info", "session", status.state))
+            self._note_entry(Entry(at, "error" if failed else "info", "session", status.state))
         if status.detail != before.detail and status.detail:
-            self._note(Entry(at, "warn", "session", status.detail))
+            self._note_entry(Entry(at, "warn", "session", status.detail))
         late = status.late_steps - self._late
         if late and monotonic() - self._late_s > _LATE_S:
             self._late, self._late_s = status.late_steps, monotonic()
-            self._note(Entry(at, "warn", "session", f"{late} late steps"))
+            self._note_entry(Entry(at, "warn", "session", f"{late} late steps"))
         if refused := status.dropped_messages - before.dropped_messages:
-            self._note(Entry(at, "warn", "session", f"{refused} messages refused"))
+            self._note_entry(Entry(at, "warn", "session", f"{refused} messages refused"))
 
     def _ask_status(self, session: zenoh.Session, keys: Keys) -> None:
         """Ask for the status: a paused session publishes none."""
@@ -388,7 +388,7 @@ class Live:
         if sample.kind == zenoh.SampleKind.DELETE:
             self._gone.set()
 
-    def _note(self, entry: Entry) -> None:
+    def _note_entry(self, entry: Entry) -> None:
         with self._lock:
             self._numbered += 1
             self._entries.append((self._numbered, entry))

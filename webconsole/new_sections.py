@@ -67,7 +67,7 @@ class NewSections:
         for name in stage.surfaces:
             yield name, partial(self._surface, stage, name)
         for bond in stage.arrows:
-            yield bond.name, partial(self._arrows, stage, bond)
+            yield bond.name, partial(self._force_arrows, stage, bond)
         for device in stage.felt:
             yield device, partial(self._force, stage, device)
         for name in stage.markers:
@@ -94,7 +94,7 @@ class NewSections:
             yield surface
         yield from self._changed_section(stage, name)
 
-    def _arrows(self, stage: Stage, bond: BondArrows) -> Iterator[Section]:
+    def _force_arrows(self, stage: Stage, bond: BondArrows) -> Iterator[Section]:
         place, force = self._newest(bond.place), self._newest(bond.force)
         if place and force and self._are_new({bond.place: place, bond.force: force}, "arrows "):
             yield stage.arrow(bond, place, force)

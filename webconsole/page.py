@@ -129,14 +129,14 @@ class Page:
             asked = order.do
             if self._role == "viewer" and not isinstance(order, Show | At):
                 raise MessageError("a viewer may look, and nothing else: ask the operator for a link")
-            answer = await self._do(order)
+            answer = await self._execute_order(order)
         except TrocarError as error:
             await self._refuse(asked or command_name(text or ""), str(error))
             return
         if answer is not None:
             await self._tell({"is": "answer", "to": asked, **answer})
 
-    async def _do(self, order: Command) -> dict[str, Any] | None:
+    async def _execute_order(self, order: Command) -> dict[str, Any] | None:
         """Carry out a command of the page; raises TrocarError."""
         match order:
             case Show():
@@ -151,7 +151,7 @@ class Page:
                 return None
             case Lead():
                 self._console.pilots.lead(self, order.device, beside=order.beside)
-                self._return()
+                self._return_to_present()
                 return {"device": order.device}
             case Leave():
                 self._console.pilots.leave(self)
@@ -180,7 +180,7 @@ class Page:
         self._changed.set()
         return None
 
-    def _return(self) -> None:
+    def _return_to_present(self) -> None:
         """Show the present again."""
         self._at_ns = None
         self._changed.set()
@@ -213,7 +213,7 @@ class Page:
         while True:
             if source.generation != self._generation:
                 await self._begin()
-            card, problem = self._card()
+            card, problem = self._score_card()
             state = dict(source.state)
             await self._tell_problems([*state.pop("problems", ()), *problem, *self._new.problems.values()])
             pilots = self._console.pilots.state(self)
@@ -226,7 +226,7 @@ class Page:
             await self._tell(content)
             await asyncio.sleep(_STATE_S)
 
-    def _card(self) -> tuple[dict[str, Any] | None, list[str]]:
+    def _score_card(self) -> tuple[dict[str, Any] | None, list[str]]:
         """Return the score card, or why the card cannot be read."""
         try:
             return self._console.card(self._at_ns), []
@@ -247,7 +247,7 @@ class Page:
         self._generation = generation
         self._new, self._stage, self._told = NewSections(self._console), stage, set()
         if self._console.source.kind == "live":
-            self._return()
+            self._return_to_present()
         described = {} if stage is None else stage.describe()
         await self._tell(
             {

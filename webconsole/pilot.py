@@ -45,7 +45,7 @@ class Pilots:
             raise MessageError(
                 f"no device '{device:.80}' can be led from a page.{did_you_mean(device, self._devices)}"
             )
-        self._expire()
+        self._expire_leads()
         holder = self._pages.get(device)
         if holder is not None and holder is not page:
             raise MessageError(f"page {self._number_of(holder)} leads '{device}': it must leave first")
@@ -77,7 +77,7 @@ class Pilots:
 
     def state(self, page: object) -> list[dict[str, Any]]:
         """Return each device and its pilot, as `page` is told, ready for JSON."""
-        self._expire()
+        self._expire_leads()
         rows: list[dict[str, Any]] = []
         for device in self._devices:
             holder = self._pages.get(device)
@@ -85,7 +85,7 @@ class Pilots:
             rows.append({"device": device, "pilot": who})
         return rows
 
-    def _expire(self) -> None:
+    def _expire_leads(self) -> None:
         now = monotonic()
         for device in [name for name in self._pages if now - self._heard_s[name] > LEASE_S]:
             self._release(device)

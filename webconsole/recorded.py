@@ -174,14 +174,19 @@ class Recorded:
     @cached_property
     def events(self) -> list[Entry]:
         """Return the events of tasks, tissue, devices and lost inputs; by time."""
-        parts = (self._messages(), self._contacts(), _readable(self._stale(), "session"), self._statuses())
+        parts = (
+            self._messages(),
+            self._contacts(),
+            _readable_entries(self._stale(), "session"),
+            self._statuses(),
+        )
         return sorted((entry for part in parts for entry in part), key=lambda one: one.time_s)
 
     def _messages(self) -> Iterator[Entry]:
         lines = Entries()
         for outlet in self.outlets:
             if outlet.port.type in LOGGED:
-                yield from _readable(self._lines_of(outlet, lines), outlet.name)
+                yield from _readable_entries(self._lines_of(outlet, lines), outlet.name)
 
     def _lines_of(self, outlet: Outlet, lines: Entries) -> Iterator[Entry]:
         """Yield the lines of an outlet, and a line about all damaged messages."""
@@ -200,7 +205,7 @@ class Recorded:
         for bond in self.scenario.bonds if self.scenario else ():
             name = f"{bond.force}/wrench"
             if name in self.recording:
-                yield from _readable(self._contacts_of(name), name)
+                yield from _readable_entries(self._contacts_of(name), name)
 
     def _contacts_of(self, name: str) -> Iterator[Entry]:
         series = self._series(name)
@@ -236,7 +241,7 @@ class Recorded:
         """Files are opened for each look alone."""
 
 
-def _readable(entries: Iterator[Entry], source: str) -> Iterator[Entry]:
+def _readable_entries(entries: Iterator[Entry], source: str) -> Iterator[Entry]:
     """Yield entries as far as readable, and then why no further."""
     time_s = 0.0
     try:

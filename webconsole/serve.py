@@ -99,7 +99,7 @@ def _serve(
 ) -> None:
     pilots = Pilots()
     console = Console(source, pilots)
-    face = _foxglove(console) if foxglove else None
+    face = _foxglove_door(console) if foxglove else None
     server = Server(console, listening, {} if face is None else {_FOXGLOVE: face.relay})
     link = f"{listening.origins[0]}{server.gate.invite(role)}"
     hosted = HostedDevices(pilots)
@@ -113,17 +113,17 @@ def _serve(
         source.start()
 
     def announce_link() -> None:
-        _say(f"the page is at {link}")
+        _print_line(f"the page is at {link}")
         if listening.certificate is not None:
             authority = listening.certificate.with_name("ca.pem")
-            _say(
+            _print_line(
                 f"a browser warns unless it knows {authority}; go on only if it shows this SHA-256:"
                 f" {fingerprint(listening.certificate)}"
             )
         if face is not None:
             address = f"{listening.origins[0].replace('http', 'ws', 1)}{server.gate.link(_FOXGLOVE)}"
-            _say(f"Foxglove: open a connection to {address}")
-            _say(f"and import the layout {files('webconsole.foxglove') / 'layout.json'}")
+            _print_line(f"Foxglove: open a connection to {address}")
+            _print_line(f"and import the layout {files('webconsole.foxglove') / 'layout.json'}")
         if browse:
             webbrowser.open(link)
 
@@ -135,12 +135,12 @@ def _serve(
             face.close()
 
 
-def _foxglove(console: Console) -> Face:
+def _foxglove_door(console: Console) -> Face:
     """Return the door to Foxglove, imported here: without Foxglove the packages may be missing."""
     from webconsole.foxglove.face import Face
 
     return Face(console)
 
 
-def _say(text: str) -> None:
+def _print_line(text: str) -> None:
     terminal.print(text, markup=False, highlight=False, soft_wrap=True)

@@ -76,7 +76,7 @@ class Server:
                 Route("/sessions", self._sessions),
                 Route("/start", self._start),
                 Route("/fork", self._fork),
-                Route("/forks", self._forks),
+                Route("/forks", self._answer_forks),
                 WebSocketRoute("/page", self._page),
                 *(WebSocketRoute(path, serve) for path, serve in (others or {}).items()),
             ],
@@ -212,7 +212,7 @@ class Server:
         """Answer with the form of a fork."""
         return await self._of_recording(fork_form)
 
-    async def _forks(self, _request: Request) -> Response:
+    async def _answer_forks(self, _request: Request) -> Response:
         """Answer with the tree of the recordings beside this recording."""
         return await self._of_recording(tree_of)
 

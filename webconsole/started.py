@@ -49,7 +49,7 @@ class Ready:
 
     def __init__(self, modules: Sequence[str]) -> None:
         self.hub = ReadyProcess((_COMMAND, *modules))
-        self.page = ReadyProcess((_COMMAND, "webconsole.serve", *_scenes()))
+        self.page = ReadyProcess((_COMMAND, "webconsole.serve", *_drawable_scenes()))
 
     def close(self) -> None:
         """Let both processes end."""
@@ -57,7 +57,7 @@ class Ready:
         self.page.close()
 
 
-def _scenes() -> list[str]:
+def _drawable_scenes() -> list[str]:
     """Return the modules of a page's scenes."""
     return sorted({entry.module for entry in entry_points(group=GROUP)})
 
@@ -164,7 +164,7 @@ class Started:
     def prepare(self, modules: Sequence[str]) -> None:
         """Have processes ready for a session about to be started; `modules`: imported by the hub."""
         with self._lock:
-            if self._ready is None and not self._full:
+            if self._ready is None and not self._is_full:
                 self._ready = Ready(modules)
 
     @property
@@ -173,13 +173,13 @@ class Started:
         return () if self._ready is None else (self._ready.hub.process, self._ready.page.process)
 
     @property
-    def _full(self) -> bool:
+    def _is_full(self) -> bool:
         return sum(not one.ended for one in self._sessions) >= _MOST
 
     def start(self, title: str, arguments: Sequence[str], live_from_s: float = 0.0) -> StartedSession:
         """Start `trocar` with checked arguments; raises MessageError if too many sessions run already."""
         with self._lock:
-            if self._full:
+            if self._is_full:
                 raise MessageError(f"{_MOST} sessions that were started here are running: end one first")
             ready, self._ready = self._ready or Ready(()), None
             made = StartedSession(len(self._sessions) + 1, title, arguments, live_from_s, ready)

@@ -128,10 +128,10 @@ class Component:
             self._set_desired(requested)
         state.gripper = opening(float(inputs[f"{self.master}/gripper/measured_js"][0]))
         if lost := readiness.lost & {self.master, self.arm}:
-            self._disable(lost)
+            self._disable_following(lost)
         before, followed = state.current, state.following
         state.current = self._next(readiness, clutched=clutched)
-        self._permit(
+        self._permit_following(
             leads=state.desired is TeleopState.ENABLED
             and state.current >= TeleopState.ALIGNING_MTM
             and not clutched
@@ -193,7 +193,7 @@ class Component:
         self.state.desired = state
         self._publish("desired_state", StringMessage(data=state.name))
 
-    def _disable(self, lost: Set[str]) -> None:
+    def _disable_following(self, lost: Set[str]) -> None:
         """Stop when an arm is no longer ready.
 
         Only a command starts the component again, as on the real system.
@@ -215,7 +215,7 @@ class Component:
             TeleopState.ENABLED if led and state.desired is TeleopState.ENABLED else TeleopState.ALIGNING_MTM
         )
 
-    def _permit(self, *, leads: bool) -> None:
+    def _permit_following(self, *, leads: bool) -> None:
         """Enable or clutch the teleoperation."""
         if leads != self.state.leads:
             self.state.leads = Published(leads)

@@ -62,7 +62,7 @@ class DvrkConsole(Controller):
         self._state = DvrkConsoleState()
         self._state.enabled = params.enabled
         for component in self._components.values():
-            component.state.selected = not self._rivals(component)
+            component.state.selected = not self._rival_components(component)
         self.keep(
             self._state,
             self._readiness.state,
@@ -126,7 +126,7 @@ class DvrkConsole(Controller):
         for name, command in _POWER.items():
             for _ in inputs.events(f"system/{name}"):
                 if name == "power_off":
-                    self._enable(enabled=False)
+                    self._enable_teleoperation(enabled=False)
                 for arm in self.params.arms:
                     self._events.publish(f"{arm}/state_command", StringStamped(string=command))
         for volume in cast("tuple[Float64Message, ...]", inputs.events("system/set_volume")):
@@ -138,13 +138,13 @@ class DvrkConsole(Controller):
 
     def _execute_commands(self, inputs: Inputs) -> None:
         for enable in cast("tuple[BoolMessage, ...]", inputs.events("console/teleop/enable")):
-            self._enable(enabled=enable.data)
+            self._enable_teleoperation(enabled=enable.data)
         for scale in cast("tuple[Float64Message, ...]", inputs.events("console/teleop/set_scale")):
             self._set_scale(scale)
         for name in cast("tuple[StringMessage, ...]", inputs.events("console/teleop/select")):
-            self._select(name.data, selected=True)
+            self._select_component(name.data, selected=True)
         for name in cast("tuple[StringMessage, ...]", inputs.events("console/teleop/unselect")):
-            self._select(name.data, selected=False)
+            self._select_component(name.data, selected=False)
 
     def _read_pedals(self, inputs: Inputs) -> None:
         for pedal in PEDALS.events:
@@ -165,7 +165,7 @@ class DvrkConsole(Controller):
                     setattr(self._state, button, joy.buttons[0] != 0)
                 self._events.publish(f"console/{button}", joy)
 
-    def _enable(self, *, enabled: bool) -> None:
+    def _enable_teleoperation(self, *, enabled: bool) -> None:
         self._state.enabled = enabled
         self._events.publish("console/teleop/enabled", BoolMessage(data=enabled))
 
@@ -179,14 +179,14 @@ class DvrkConsole(Controller):
         for component in self._components.values():
             component.set_scale(accepted)
 
-    def _rivals(self, component: Component) -> list[Component]:
+    def _rival_components(self, component: Component) -> list[Component]:
         """Return the selected components with the same master or the same arm."""
         others = (
             other for other in self._components.values() if other is not component and other.state.selected
         )
         return [other for other in others if other.master == component.master or other.arm == component.arm]
 
-    def _select(self, name: str, *, selected: bool) -> None:
+    def _select_component(self, name: str, *, selected: bool) -> None:
         """Select a component, instead of another of the same master, or unselect the component.
 
         An arm led by another master is refused.
@@ -196,12 +196,14 @@ class DvrkConsole(Controller):
             self._warn(f"there is no teleoperation '{name}'.{did_you_mean(name, self._components)}")
         elif not selected:
             component.state.selected = False
-        elif taken := [other.name for other in self._rivals(component) if other.arm == component.arm]:
+        elif taken := [
+            other.name for other in self._rival_components(component) if other.arm == component.arm
+        ]:
             self._warn(
                 f"'{name}' is not selected: {component.arm} is led in '{taken[0]}', unselect that first"
             )
         else:
-            for other in self._rivals(component):
+            for other in self._rival_components(component):
                 other.state.selected = False
             component.state.selected = True
         self._publish_selected()

@@ -44,7 +44,7 @@ class Carrying(Errand):
             goal[3:] = self.state.upright
             self._enter(HandPhase.TURN, goal)
             return
-        self._bring(self._chore.meeting if self.state.role is HandRole.GIVER else self._place())
+        self._carry_to(self._chore.meeting if self.state.role is HandRole.GIVER else self._place())
 
     def _turn(self) -> None:
         """Turn until the measured object is upright, then carry the object to a place to stand."""
@@ -63,9 +63,9 @@ class Carrying(Errand):
         poses, index = self._seen.poses, self.state.object_index
         self.state.role = HandRole.ALONE
         self.state.place[:] = self._chore.rest(index, poses, self._chore.side(index, poses))
-        self._bring(self.state.place)
+        self._carry_to(self.state.place)
 
-    def _bring(self, to: Vector) -> None:
+    def _carry_to(self, to: Vector) -> None:
         self._enter(HandPhase.CARRY, self._line_moved_by(np.append((to - self._middle)[:2], 0.0)))
 
     def _place(self) -> Vector:

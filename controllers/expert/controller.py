@@ -136,13 +136,15 @@ class Expert(Controller):
         seen = self._seen
         for index in np.flatnonzero(seen.verdicts != seen.said).tolist():
             if seen.verdicts[index]:
-                yield StringMessage(data=self._sentence(index))
+                yield StringMessage(data=self._verdict_sentence(index))
         seen.said[:] = seen.verdicts
 
     def _describe_left(self) -> str:
-        return "; ".join(self._sentence(index) for index in np.flatnonzero(self._seen.verdicts).tolist())
+        return "; ".join(
+            self._verdict_sentence(index) for index in np.flatnonzero(self._seen.verdicts).tolist()
+        )
 
-    def _sentence(self, index: int) -> str:
+    def _verdict_sentence(self, index: int) -> str:
         seen = self._seen
         why = _VERDICTS[Verdict(int(seen.verdicts[index]))]
         x, y, z = (1e3 * seen.poses[index, :3, 3]).tolist()

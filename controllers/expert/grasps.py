@@ -92,7 +92,7 @@ def grasps_of_piece(pose: Vector, reach: float) -> Grasps:
             if opening > _WIDEST:
                 continue
             for way in (1.0, -1.0):
-                poses.append(_reaching(top + over * up, -up, way * axes[:, side]))
+                poses.append(_reaching_tip(top + over * up, -up, way * axes[:, side]))
                 openings.append(opening)
                 ups.append(up)
     return _grasps(poses, openings, [(0.0, 0.0)] * len(poses), ups)
@@ -140,7 +140,7 @@ def grasps_of_ring(
         away = np.array([middle, aside]) @ axes
         wrist = np.array([middle, aside - reach * sin(leant)]) @ axes
         for way in (0.0, pi):
-            poses.append(_downwards(centre + np.append(wrist, 0.0), over, turn + way, leant * cos(way)))
+            poses.append(_downward_tip(centre + np.append(wrist, 0.0), over, turn + way, leant * cos(way)))
             outwards.append(tuple(away))
             rooms.append(room)
     return _grasps(poses, [RING_OPENING] * len(poses), outwards, [up] * len(poses), rooms)
@@ -161,7 +161,7 @@ class _Fingers(NamedTuple):
     reach: float
     """Length of the fingers, m."""
 
-    def _inner(self, along: float) -> Vector:
+    def _inner_finger(self, along: float) -> Vector:
         """Return the middle of the finger in the ring, `along` (m) from its end."""
         off = (self.reach - along) * sin(RING_OPENING / 2.0) + FINGER_SIZE[0] / 2.0
         return np.array([self.middle - off, self.aside - along * sin(self.lean)])
@@ -169,7 +169,10 @@ class _Fingers(NamedTuple):
     def to_post(self, post: Vector, radius: float) -> float:
         """Return the clearance between the whole inner finger and a post higher than the ring, m."""
         half = [FINGER_SIZE[0] / 2.0, FINGER_SIZE[1] / cos(self.lean)]
-        off = [np.abs(post - self._inner(along)) - half for along in np.linspace(0.0, self.reach, _SAMPLES)]
+        off = [
+            np.abs(post - self._inner_finger(along)) - half
+            for along in np.linspace(0.0, self.reach, _SAMPLES)
+        ]
         return float(np.linalg.norm(np.maximum(off, 0.0), axis=1).min()) - radius
 
     def to_walls(self, ring: Ring) -> float:
@@ -178,7 +181,7 @@ class _Fingers(NamedTuple):
         At a distance q (m) from the axis towards a wall the triangular hole of inradius r has a half width of
         (2 r + q) / sqrt(3).
         """
-        ends = [self._inner(along) for along in (0.0, _DEPTH / cos(self.lean))]
+        ends = [self._inner_finger(along) for along in (0.0, _DEPTH / cos(self.lean))]
         wide = [
             (2.0 * ring.inradius + end[0] - FINGER_SIZE[0] / 2.0) / sqrt(3.0) - abs(end[1]) for end in ends
         ]
@@ -216,12 +219,12 @@ def _grasps(
     )
 
 
-def _reaching(origin: Vector, fingers: Vector, opening: Vector) -> Vector:
+def _reaching_tip(origin: Vector, fingers: Vector, opening: Vector) -> Vector:
     """Return the tip's pose (4, 4) at `origin` (m) with unit vectors along the fingers and their opening."""
     return rigid_transform(np.column_stack([np.cross(opening, fingers), opening, fingers]), origin)
 
 
-def _downwards(point: Vector, over: float, turn: float, lean: float) -> Vector:
+def _downward_tip(point: Vector, over: float, turn: float, lean: float) -> Vector:
     """Return the tip's pose `over` (m) a point, with the fingers down, opening at `turn` (rad) from x.
 
     The fingers are tilted by `lean` (rad) about the opening direction, with their ends to the left.

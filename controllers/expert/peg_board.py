@@ -157,7 +157,7 @@ class PegBoard:
         near = [each for each in np.delete(poses, index, axis=0) if self._is_near(each, pose)]
         if abs(float(pose[2, 2])) < UPRIGHT_COSINE:
             for others in (near, []) if near else ([],):
-                yield grasps_of_fallen_ring(ring, pose, reach, self._surroundings(pose[:3, 3], others))
+                yield grasps_of_fallen_ring(ring, pose, reach, self._ring_surroundings(pose[:3, 3], others))
             return
         off = self._posts - pose[:3, 3]
         nearest = int((off[:, :2] ** 2).sum(axis=1).argmin())
@@ -175,7 +175,7 @@ class PegBoard:
         off = other[:3, 3] - pose[:3, 3]
         return bool(np.linalg.norm(off) < 2.0 * self._board.ring.side)
 
-    def _surroundings(self, middle: Vector, others: list[Vector]) -> Around:
+    def _ring_surroundings(self, middle: Vector, others: list[Vector]) -> Around:
         local = np.abs((middle - self._pose[:3, 3]) @ self._pose[:3, :2])
         on_board = bool((local < np.array(self._board.size[:2]) / 2.0).all())
         floor = self._top if on_board else self._table

@@ -102,7 +102,7 @@ def plan_leaning(
     for i, k in enumerate(few.tolist()):
         for j, heading in enumerate(_HEADINGS):
             tips[i, j, 3] = _pose_after_carrying(
-                found.poses[k], middle, _heading(heading) @ upright(found.ups[k]), rest
+                found.poses[k], middle, _heading_rotation(heading) @ upright(found.ups[k]), rest
             )
     tips[:, :, 2] = tips[:, :, 3]
     tips[:, :, 2, 2, 3] += lift
@@ -126,7 +126,7 @@ def upright(axis: Vector) -> Vector:
     return np.eye(3) + turn + turn @ turn / (1.0 + z)
 
 
-def _heading(angle: float) -> Vector:
+def _heading_rotation(angle: float) -> Vector:
     c, s = cos(angle), sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 

@@ -90,7 +90,7 @@ class Taking(Errand):
             self.state.goal[:] = self.state.grasp  # the other hand may still bring it to rest
             if not self.hand.has_settled:
                 return
-        self._shut()
+        self._shut_jaw()
 
     def _goes_on(self, found: GraspPlan) -> bool:
         """Return whether a plan continues the present grasp, up to a shift of the object."""
@@ -99,9 +99,9 @@ class Taking(Errand):
 
     def _reach(self) -> None:
         if self._is_there:
-            self._shut()
+            self._shut_jaw()
 
-    def _shut(self) -> None:
+    def _shut_jaw(self) -> None:
         self.hand.move_jaw(_SHUT)
         self._progress.attempts += 1
         self._seen.tries[self.state.object_index] += 1.0
@@ -123,9 +123,9 @@ class Taking(Errand):
         other = self.team.other(self) if self.state.role is HandRole.TAKER else None
         held = None if other is None else pose_to_matrix(other.hand.measured)
         ways = self._chore.grasps(index, self._seen.poses, self.hand.jaw.length, held)
-        return next((found for found in (self._best(index, each) for each in ways) if found), None)
+        return next((found for found in (self._best_plan(index, each) for each in ways) if found), None)
 
-    def _best(self, index: int, found: Grasps) -> GraspPlan | None:
+    def _best_plan(self, index: int, found: Grasps) -> GraspPlan | None:
         poses, hand = self._seen.poses, self.hand
         middle, role = poses[index, :3, 3], self.state.role
         lift = self._chore.travel - middle[2]

@@ -90,9 +90,9 @@ class Team:
 
     def choice(self, hand: TeamMember) -> tuple[int, HandRole]:
         """Return index and role of the next object of `hand`; -1: none."""
-        return self._exchange(hand) if self._hand_over else (self._next(hand), HandRole.ALONE)
+        return self._choose_exchange(hand) if self._hand_over else (self._next(hand), HandRole.ALONE)
 
-    def _exchange(self, hand: TeamMember) -> tuple[int, HandRole]:
+    def _choose_exchange(self, hand: TeamMember) -> tuple[int, HandRole]:
         other = self.other(hand)
         if other is None:
             return -1, HandRole.ALONE
@@ -143,10 +143,10 @@ class Team:
             elif seen.verdicts[index] == Verdict.NONE and not seen.holders[index]:
                 if seen.tries[index] >= _TRIES and not self.is_done(index):
                     seen.verdicts[index] = Verdict.BLOCKED
-                elif all(hand.refusals.objects[index] for hand in self._eligible(index)):
+                elif all(hand.refusals.objects[index] for hand in self._eligible_hands(index)):
                     seen.verdicts[index] = Verdict.NOT_REACHABLE
 
-    def _eligible(self, index: int) -> list[TeamMember]:
+    def _eligible_hands(self, index: int) -> list[TeamMember]:
         """Return the hands allowed to pick an object up."""
         if not self._hand_over:
             return self.hands

@@ -170,7 +170,7 @@ class Arm:
             self._messages.desired_state(self._lifecycle.desired_state)
             self._equipment.publish()
         self._lifecycle.watch(self._period)
-        awaited = self._execute(inputs, arrived)
+        awaited = self._execute_arrived(inputs, arrived)
         self._lifecycle.step(self._period)
         following = self._drives.step(self._period)
         state, homed, busy = self._condition = self._lifecycle.condition
@@ -211,7 +211,7 @@ class Arm:
         if self._modes[0] and not self._commands.settings.gravity_compensation:
             self._modes[0] += _BARE
 
-    def _execute(self, inputs: Inputs, ports: Collection[str]) -> bool:
+    def _execute_arrived(self, inputs: Inputs, ports: Collection[str]) -> bool:
         """Execute commands from `ports`; return whether clients now wait for the operating state."""
         awaited = False
         for port in sorted(ports, key=self._order):

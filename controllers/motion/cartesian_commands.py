@@ -71,7 +71,7 @@ class CartesianCommands:
         self._base.place(goals.frame(message.pose))
 
     def _servo_cp(self, message: PoseStamped) -> None:
-        self._drives.follow(self._joints, self._solve(message), self._period)
+        self._drives.follow(self._joints, self._solve_pose(message), self._period)
 
     def _servo_cr(self, message: PoseStamped) -> None:
         step = goals.frame(message.pose)
@@ -79,7 +79,7 @@ class CartesianCommands:
         goal = self._chain.forward(self._joints.newest_goal)
         goal[:3, 3] += axes @ step[:3, 3]
         goal[:3, :3] = axes @ step[:3, :3] @ axes.T @ goal[:3, :3]
-        self._drives.follow(self._joints, self._inverse(goal), self._period)
+        self._drives.follow(self._joints, self._inverse_nearest(goal), self._period)
 
     def _servo_cs(self, message: CartesianState) -> None:
         posed, moved, pushed = (
@@ -98,7 +98,7 @@ class CartesianCommands:
         )
         if posed:
             self._drives.follow(
-                self._joints, self._inverse(frame @ goals.frame(message.pose)), self._period, velocity
+                self._joints, self._inverse_nearest(frame @ goals.frame(message.pose)), self._period, velocity
             )
         elif velocity is not None:
             self._drives.drift(velocity)
@@ -124,11 +124,11 @@ class CartesianCommands:
         self._drives.press(goals.wrench(message.wrench), WrenchFrame.SPATIAL)
 
     def _move_cp(self, message: PoseStamped) -> None:
-        self._drives.move(self._joints, self._solve(message), self._ratio)
+        self._drives.move(self._joints, self._solve_pose(message), self._ratio)
 
-    def _solve(self, message: PoseStamped) -> Vector:
+    def _solve_pose(self, message: PoseStamped) -> Vector:
         """Return the joint positions, shape (n,), of a pose in the reference or in the arm's base frame."""
-        return self._inverse(self._from(message.header.frame_id).dot(goals.frame(message.pose)))
+        return self._inverse_nearest(self._from(message.header.frame_id).dot(goals.frame(message.pose)))
 
     def _from(self, frame_id: str) -> Vector:
         """Return the pose of a message's frame in the arm's base frame, shape (4, 4).
@@ -138,7 +138,7 @@ class CartesianCommands:
         named = goals.check_frame(frame_id, self._base.reference, self._base.local)
         return _IDENTITY if named == self._base.local else inverse_transform(self._base.pose)
 
-    def _inverse(self, tip: Vector) -> Vector:
+    def _inverse_nearest(self, tip: Vector) -> Vector:
         """Return the joint positions, shape (n,), of a pose in the arm's base frame, shape (4, 4).
 
         Among several solutions, the nearest to the setpoint.

@@ -87,14 +87,14 @@ class Drives:
 
     def power(self, *, on: bool) -> None:
         """Switch all drives off, or on to hold the present positions."""
-        self._abandon(*self.groups)
+        self._abandon_move(*self.groups)
         self._leave()
         for axes in self.groups:
             axes.power(on=on)
 
     def rest(self) -> None:
         """Brake and stay; a pressing gripper goes on pressing."""
-        self._abandon(*self.groups)
+        self._abandon_move(*self.groups)
         self._leave()
         for axes in self.groups:
             if axes is self.joints or axes.mode is Mode.POSITION:
@@ -161,7 +161,7 @@ class Drives:
                 self._messages.goal_reached(reached=True)
 
     def _take_over(self, axes: Axes) -> None:
-        self._abandon(axes)
+        self._abandon_move(axes)
         if axes is self.joints:
             self._leave()
 
@@ -169,7 +169,7 @@ class Drives:
         """End the last Cartesian command."""
         self.control.frame, self.control.cartesian = WrenchFrame.NONE, False
 
-    def _abandon(self, *groups: Axes) -> None:
+    def _abandon_move(self, *groups: Axes) -> None:
         if any(axes.is_moving for axes in groups):
             self._messages.goal_reached(reached=False)
 

@@ -62,7 +62,7 @@ class Followers:
         )
         faster, bends = away / wait, np.array(stated).take(self._owner) if any(stated) else None
         if bends is not None:
-            faster = np.where(bends, _bend(left, velocity, arrival, wait, h), faster)
+            faster = np.where(bends, _bend_velocity(left, velocity, arrival, wait, h), faster)
         target = arrival + clip(faster, -most_away, most_away)
         if not all(stated):
             # while it catches up: the next goal may be late or turn back, so it must be able to come to rest
@@ -80,7 +80,7 @@ class Followers:
                 state.stated = False
 
 
-def _bend(left: Vector, velocity: Vector, arrival: Vector, wait: Vector, h: float) -> Vector:
+def _bend_velocity(left: Vector, velocity: Vector, arrival: Vector, wait: Vector, h: float) -> Vector:
     """Return the next step's velocity less the velocity of arrival, shape (N,), on a cubic of `wait` s."""
     mean = left / wait
     now, then = velocity - mean, arrival - mean  # the cubic less the straight line

@@ -69,7 +69,7 @@ def efforts(chain: SerialChain, message: JointState) -> Vector:
     """
     values = joint_values(chain, message, "effort")
     wrong = [
-        _excessive(joint, value)
+        _excess_sentence(joint, value)
         for joint, value in zip(chain.joints, values.tolist(), strict=True)
         if abs(value) > joint.effort + TOLERANCE
     ]
@@ -78,7 +78,7 @@ def efforts(chain: SerialChain, message: JointState) -> Vector:
     return np.clip(values, -chain.effort, chain.effort)
 
 
-def _excessive(joint: Joint, effort: float) -> str:
+def _excess_sentence(joint: Joint, effort: float) -> str:
     value, lower, upper = distinct(effort, -joint.effort, joint.effort)
     unit = "N m" if joint.kind == "revolute" else "N"
     return f"joint {joint.name} at {value} {unit}, allowed are {lower} .. {upper}"
@@ -94,16 +94,16 @@ def check_frame(frame_id: str, *allowed: str) -> str:
 def frame(pose: Pose) -> Vector:
     """Return the pose as (4, 4) matrix."""
     x, y, z = _numbers(pose.position, "position")
-    first, second, third = rotation.rows(*_unit(pose.orientation))
+    first, second, third = rotation.rows(*_unit_quaternion(pose.orientation))
     return np.array([(*first, x), (*second, y), (*third, z), (0.0, 0.0, 0.0, 1.0)])
 
 
 def rotation_matrix(q: Quaternion) -> Vector:
     """Return the orientation as (3, 3) matrix."""
-    return np.array(rotation.rows(*_unit(q)))
+    return np.array(rotation.rows(*_unit_quaternion(q)))
 
 
-def _unit(q: Quaternion) -> tuple[float, float, float, float]:
+def _unit_quaternion(q: Quaternion) -> tuple[float, float, float, float]:
     """Return the quaternion (x, y, z, w) of a message with a norm of 1."""
     x, y, z, w = numbers = q.x, q.y, q.z, q.w
     _check_finite(numbers, "orientation")

@@ -22,7 +22,7 @@ _Offsets = tuple[Angle, Angle, Length]
 """Offsets of yaw, pitch and insertion."""
 
 
-def _positive(bounds: _Offsets | None) -> _Offsets | None:
+def _check_positive(bounds: _Offsets | None) -> _Offsets | None:
     if bounds is not None and min(bounds) < 0.0:
         raise ValueError(f"{bounds}: bounds are not below 0")
     return bounds
@@ -37,7 +37,7 @@ class JointErrors(Params):
     PSM1: _Offsets | None = Field(default=None, description="as stated, whatever is drawn")
     PSM2: _Offsets | None = None
     PSM3: _Offsets | None = None
-    within: Annotated[_Offsets | None, AfterValidator(_positive)] = Field(
+    within: Annotated[_Offsets | None, AfterValidator(_check_positive)] = Field(
         default=None, description="bounds between which those of the other PSMs are drawn; null: 0"
     )
     seed: int = Field(default=0, ge=0, description="draws them, for every arm others")

@@ -79,12 +79,12 @@ class Lifecycle:
         self._repeats = Repeats()
         self.records = (self._now, self._repeats.state)
         self._commands = {
-            "enable": self._enable,
-            "disable": self._disable,
+            "enable": self._enable_arm,
+            "disable": self._disable_arm,
             "home": self._go_home,
-            "unhome": self._unhome,
-            "pause": self._pause,
-            "resume": self._resume,
+            "unhome": self._forget_home,
+            "pause": self._pause_motion,
+            "resume": self._resume_motion,
         }
         if homed:
             self._now.state, self._now.homed, self._now.desired = State.ENABLED, True, Desired.HOMED
@@ -146,7 +146,7 @@ class Lifecycle:
     def watch(self, h: float) -> None:
         """Check for ends and failures in the last step, of `h` seconds."""
         if self.is_lost:
-            self._fault(self._loss())
+            self._enter_fault(self._loss())
         self._drives.report_arrivals(silent=self._now.homing)
         if self._now.homing and self.state is State.ENABLED and not self._drives.joints.is_moving:
             self._check_home(h)
@@ -159,7 +159,7 @@ class Lifecycle:
         if self._now.powering < 0.5 * h:  # whole steps, in spite of rounding
             self._finish_powering()
 
-    def _enable(self) -> None:
+    def _enable_arm(self) -> None:
         if self.state is State.DISABLED and not self._now.powering:
             self._now.powering = self._power_time
             if not self._power_time:
@@ -168,27 +168,27 @@ class Lifecycle:
     def _go_home(self) -> None:
         """Home the arm unless homed or homing; power a DISABLED arm first."""
         if self._now.homed or self._now.homing:
-            self._enable()
+            self._enable_arm()
             return
         self._now.homing, self._now.late = True, 0.0
         if self.state is State.ENABLED:
             self._drives.move(self._drives.joints, self._home, _FULL)
         else:
-            self._enable()
+            self._enable_arm()
 
-    def _disable(self) -> None:
+    def _disable_arm(self) -> None:
         self._switch_off(State.DISABLED)
 
-    def _unhome(self) -> None:
+    def _forget_home(self) -> None:
         if self.state is State.ENABLED:
             self._drives.rest()
         self._now.homed = self._now.homing = False
 
-    def _pause(self) -> None:
+    def _pause_motion(self) -> None:
         self._drives.rest()
         self._now.state = State.PAUSED
 
-    def _resume(self) -> None:
+    def _resume_motion(self) -> None:
         self._now.state = State.ENABLED
         if self._now.homing:
             self._drives.move(self._drives.joints, self._home, _FULL)
@@ -205,7 +205,7 @@ class Lifecycle:
         self._now.state = state
         self._drives.power(on=False)
 
-    def _fault(self, reason: str) -> None:
+    def _enter_fault(self, reason: str) -> None:
         self._messages.error(f"FAULT: {reason}; send state_command disable, then enable")
         self._switch_off(State.FAULT)
         self._messages.desired_state(self.desired_state)
@@ -228,7 +228,7 @@ class Lifecycle:
         self._now.late += h
         if self._now.late > _HOMING_TIMEOUT:
             distance, allowed = distinct(away, _GOAL_TOLERANCE, digits=3)
-            self._fault(
+            self._enter_fault(
                 f"home not reached {_HOMING_TIMEOUT:g} s after its trajectory, {distance} (rad, m) away,"
                 f" allowed are {allowed}"
             )

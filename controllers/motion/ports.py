@@ -130,7 +130,7 @@ def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns
     yield from _cartesian_states(arm, reference, period_ns)
     yield from _wrench_states(arm, len(joints), reference, period_ns)
     yield from _settings(arm, joints, reference, period_ns)
-    yield from _servo(arm, joints)
+    yield from _servo_command_ports(arm, joints)
     yield signal_out(
         f"drive/{arm}/control_mode",
         description=(
@@ -142,7 +142,7 @@ def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns
     if gripper is not None:
         driven = tuple(joint.name for joint in gripper.joints)
         yield from _joint_states(f"{arm}/{gripper.name}", driven, period_ns)
-        yield from _servo(f"{arm}/{gripper.name}", driven)
+        yield from _servo_command_ports(f"{arm}/{gripper.name}", driven)
 
 
 def setup_joint_ports(arm: CartArm, cart: str, period_ns: int) -> Iterator[Port]:
@@ -216,7 +216,7 @@ def _settings(arm: str, joints: tuple[str, ...], reference: str, period_ns: int)
     )
 
 
-def _servo(prefix: str, names: tuple[str, ...]) -> Iterator[Port]:
+def _servo_command_ports(prefix: str, names: tuple[str, ...]) -> Iterator[Port]:
     yield signal_in(f"sense/{prefix}/measured_js", JointState, names=names, fields=crtk.MEASURED)
     yield signal_out(f"drive/{prefix}/servo_jp", JointState, names=names)
     yield signal_out(f"drive/{prefix}/servo_jf", JointState, names=names, fields=("effort",))

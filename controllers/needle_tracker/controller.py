@@ -157,7 +157,7 @@ class NeedleTracker(PictureController):
         in_camera = self._in_camera(in_base, inputs["ECM/measured_js"][: len(self._camera.joints)])
         slot = now.steps % _KEPT
         now.at[slot], now.grippers[slot], now.steps = t * 1e-9, in_camera, now.steps + 1
-        self._calibrate(inputs)
+        self._run_calibration(inputs)
         pictures = self._pictures(inputs)
         overlay = self._follow(pictures, h * 1e-9)
         if self._is_blind(t, now.picture_ns):
@@ -171,7 +171,7 @@ class NeedleTracker(PictureController):
         camera = self._camera_base @ self._camera.forward(camera_joints)
         return inverse_transform(camera) @ self._base @ in_base
 
-    def _calibrate(self, inputs: Inputs) -> None:
+    def _run_calibration(self, inputs: Inputs) -> None:
         for i, eye in enumerate(self._eyes):
             for info in cast("tuple[CameraInfo, ...]", inputs.events(f"{eye}/camera_info")):
                 if info.p[0] > 0.0 and not info.d.any():

@@ -111,7 +111,7 @@ def update_estimate(
         first = first or fits
         tip_first = tip_first and any(each.tip for each in fits)
         residuals, slopes, spreads = _stack_fits([each.tip_only for each in fits] if tip_first else fits)
-        weights = np.sqrt(_robust(residuals, spreads))
+        weights = np.sqrt(_robust_weights(residuals, spreads))
         weighted = np.linalg.solve(spreads, weights[:, None] * slopes) * weights[:, None]  # (n, 6)
         off = pose_error(prior.pose, pose)
         normal = information + slopes.T @ weighted
@@ -139,7 +139,7 @@ def _stack_fits(fits: Sequence[ArcFit]) -> tuple[Vector, Vector, Vector]:
     )
 
 
-def _robust(residuals: Vector, spread: Vector) -> Vector:
+def _robust_weights(residuals: Vector, spread: Vector) -> Vector:
     size = np.abs(residuals) / np.sqrt(np.diag(spread))
     return np.minimum(1.0, _HUBER / np.maximum(size, 1e-12))
 

@@ -69,7 +69,7 @@ def detect_needle(cv2: Any, picture: NDArray[np.uint8], region: Region, wire_px:
     every = 1 + len(rows) // _POINTS
     points = np.stack([columns, rows], axis=1)[::every] + corner
     lengths = share[::every] * every / max(wire_px, 1.0)
-    return Detection(points, lengths, _spots(cv2, blue, np.maximum(red, green)) + corner)
+    return Detection(points, lengths, _colour_spots(cv2, blue, np.maximum(red, green)) + corner)
 
 
 def _of_colour(colour: Any, others: Any) -> tuple[Vector, Vector, Vector]:
@@ -81,7 +81,7 @@ def _of_colour(colour: Any, others: Any) -> tuple[Vector, Vector, Vector]:
     return rows.astype(np.float64), columns.astype(np.float64), np.minimum(1.0, found / full)
 
 
-def _spots(cv2: Any, colour: Any, others: Any) -> Vector:
+def _colour_spots(cv2: Any, colour: Any, others: Any) -> Vector:
     """Return the centres of the spots that have a colour, shape (k, 2)."""
     excess = np.maximum(colour - others, 0.0)
     mask = ((colour > _STRONGER * others) & (excess >= _LEAST)).astype(np.uint8)

@@ -100,11 +100,11 @@ class TrackingError(Controller):
             np.linalg.norm(now.error[:3]),
             np.arccos(np.clip(estimate[:3, 2] @ truth[:3, 2], -1.0, 1.0)),
             abs(now.error[5]),
-            self._distances(truth, estimate),
+            self._pose_distances(truth, estimate),
             now.error @ np.linalg.lstsq(covariance, now.error, rcond=None)[0],
         )
         return self._values
 
-    def _distances(self, truth: Vector, estimate: Vector) -> float:
+    def _pose_distances(self, truth: Vector, estimate: Vector) -> float:
         between = self._marks @ (truth - estimate)[:3, :3].T + (truth - estimate)[:3, 3]
         return float(np.linalg.norm(between, axis=1).sum())

@@ -50,7 +50,7 @@ def pick(
 ) -> None:
     """Pick entry and exit of the needle; the path is shown, or why there is none."""
     points = [[each * 1e-3 for each in place] for place in (entry, exit_)]
-    _tell(lead, [("pick", _point(frame, *point)) for point in points], session, connect)
+    _tell(lead, [("pick", _point_stamped(frame, *point)) for point in points], session, connect)
 
 
 @app.command()
@@ -68,7 +68,7 @@ def click(
 ) -> None:
     """Pick entry and exit in the picture: the points of the pad under two pixels."""
     frame = f"{camera}_{eye}_image"
-    _tell(lead, [("pick", _point(frame, x, y, 0.0)) for x, y in (entry, exit_)], session, connect)
+    _tell(lead, [("pick", _point_stamped(frame, x, y, 0.0)) for x, y in (entry, exit_)], session, connect)
 
 
 @app.command()
@@ -91,7 +91,7 @@ def say(
     _tell(lead, [("command", {"data": text})], session, connect)
 
 
-def _point(frame: str, x: float, y: float, z: float) -> dict[str, Any]:
+def _point_stamped(frame: str, x: float, y: float, z: float) -> dict[str, Any]:
     return {"header": {"frame_id": frame}, "point": {"x": x, "y": y, "z": z}}
 
 

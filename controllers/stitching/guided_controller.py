@@ -101,7 +101,7 @@ class GuidedStitching(TwoHands):
             for message in cast("tuple[BoolMessage, ...]", inputs.events(f"{hand.arm}/following")):
                 seen.led[number] = message.data
         surgeon.measure(setpoints, led=bool(seen.led.any()))
-        said = [*self._hear(inputs)]
+        said = [*self._hear_person(inputs)]
         surgeon.step()
         self._command()
         said += surgeon.statuses()
@@ -109,7 +109,7 @@ class GuidedStitching(TwoHands):
         self._show(said)
         return self._outputs
 
-    def _hear(self, inputs: Inputs) -> Iterator[str]:
+    def _hear_person(self, inputs: Inputs) -> Iterator[str]:
         """Execute the points and words of the person; yield why something cannot be done."""
         surgeon = self._surgeon
         for source in SOURCES:

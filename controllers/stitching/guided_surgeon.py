@@ -110,11 +110,11 @@ class GuidedSurgeon(Procedure):
         guided.picked = 1 + is_exit
         guided.stage = Stage.PICKING
         if is_exit:
-            self._propose()
+            self._propose_plan()
         else:
             self._status.append("the entry is picked, the exit is next")
 
-    def _propose(self) -> None:
+    def _propose_plan(self) -> None:
         try:
             plan = self._way_on()
         except MotionError as error:
@@ -136,7 +136,7 @@ class GuidedSurgeon(Procedure):
         roles = bytes([plan.exchanged, plan.alone, len(plan.handed)])
         return blake2b(self.guided.points.tobytes() + roles, digest_size=_NAME_BYTES).hexdigest()
 
-    def _consent(self, name: str) -> None:
+    def _accept_consent(self, name: str) -> None:
         """Start the proposal of this name. Raises MotionError if another proposal is valid now."""
         plan = self._way_on()
         if name != (proposed := self._name(plan)):
@@ -190,7 +190,7 @@ class GuidedSurgeon(Procedure):
         elif guided.stage is Stage.PAUSED and self._is_where_it_paused:
             self._stage(Stage.RUNNING)
         elif word == "consent":
-            self._consent(name.strip())
+            self._accept_consent(name.strip())
         else:
             self._go_on(self._way_on())
 

@@ -118,9 +118,9 @@ class Handing:
         for exchanged, driver in enumerate(self._hands):
             puller = driver if alone else self._hands[1 - exchanged]
             grips = _four_grips(puller, params.taken, stitch)
-            taken = tuple(grip for grip in grips if _margin(puller, grip, self._pull) >= MARGIN)
+            taken = tuple(grip for grip in grips if _joint_margin(puller, grip, self._pull) >= MARGIN)
             for hold in self._driver_holds(driver) if taken else ():
-                margin = _margin(driver, hold.grip, self._drive)
+                margin = _joint_margin(driver, hold.grip, self._drive)
                 if margin >= MARGIN:
                     found.append(_Goal(hold, puller, taken, margin, bool(exchanged), alone))
         return sorted(found, key=lambda goal: -goal.margin)
@@ -145,7 +145,7 @@ class Handing:
             hold
             for hold in self._holds
             if -(self._needle[:3, :3] @ hold.grip[:3, 2]) @ up > _DOWN
-            and _margin(hold.hand, hold.grip, np.stack([self._up, self._needle])) >= MARGIN
+            and _joint_margin(hold.hand, hold.grip, np.stack([self._up, self._needle])) >= MARGIN
         ]
 
     @cached_property
@@ -295,7 +295,7 @@ def _four_grips(hand: RobotHand, behind: float, stitch: Stitch) -> list[Vector]:
     return [grip for side in (False, True) for grip in grips_of(hand, behind, stitch.needle, backwards=side)]
 
 
-def _margin(hand: RobotHand, grip: Vector, needles: Vector) -> float:
+def _joint_margin(hand: RobotHand, grip: Vector, needles: Vector) -> float:
     return best_reach(hand.chain, hand.base, needles @ grip).margin
 
 

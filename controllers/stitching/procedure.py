@@ -62,11 +62,11 @@ class Procedure(Parts, ABC):
         self._status: list[str] = []
         self._steps: dict[StitchPhase, Callable[[], None]] = {
             StitchPhase.BEGIN: self._begin,
-            StitchPhase.HOVER: self._hover,
+            StitchPhase.HOVER: self._hover_over_needle,
             StitchPhase.DESCEND: self._descend,
             StitchPhase.CLOSE: self._close,
             StitchPhase.LIFT: self._lift,
-            StitchPhase.APPROACH: self._approach,
+            StitchPhase.APPROACH: self._approach_needle,
             StitchPhase.ALIGN: self._align,
             StitchPhase.DRIVE: self._drive,
             StitchPhase.COME: lambda: self._come(StitchPhase.TAKE),
@@ -217,7 +217,7 @@ class Procedure(Parts, ABC):
         grip = self.handing.pick if self.handing.pending else self.state.planned[0]
         return approach_pose(self.state.needle @ grip, away)
 
-    def _hover(self) -> None:
+    def _hover_over_needle(self) -> None:
         hand = self._picker
         if self._has_arrived(hand, _ACCURATE):
             hand.go(self._pick_pose(0.0), _GENTLE)
@@ -276,7 +276,7 @@ class Procedure(Parts, ABC):
         self._lead(self.driver, stitch.pose(stitch.entry - BEFORE, self.params.lift))
         self._enter(StitchPhase.APPROACH)
 
-    def _approach(self) -> None:
+    def _approach_needle(self) -> None:
         if self._has_arrived(self.driver):
             self._require_room()
             self.state.angle[0] = self.stitch.entry - BEFORE
@@ -379,7 +379,7 @@ class Procedure(Parts, ABC):
     def _leave(self) -> None:
         """Let the driver go clear, then to the resting place, and pull."""
         if self._has_arrived(self.driver):
-            self._park(self.driver)
+            self._park_hand(self.driver)
             self._to_pull()
 
     def _to_pull(self) -> None:
@@ -407,13 +407,13 @@ class Procedure(Parts, ABC):
         """Let the giver go clear, then to its place, and hand the needle back or begin the stitch."""
         giver, taker = self._giver, self._next_taker
         if self._has_arrived(giver):
-            self._park(giver)
+            self._park_hand(giver)
             if self.handing.left:
                 self.handing.left -= 1
                 self._to_present(taker)
             else:
                 self._to_approach()
 
-    def _park(self, hand: RobotHand) -> None:
+    def _park_hand(self, hand: RobotHand) -> None:
         """Send a hand to the resting place."""
         hand.go(self.state.park[self.hands.index(hand)])

@@ -92,8 +92,8 @@ class ContactEstimate(Record):
         push = float(self.normal.dot(self.force))
         depth = self.tip_depth = max(self.tip_depth, push / _STIFFEST)
         across = _length(self.force - push * self.normal)
-        self.stiffness += _approach(self.stiffness, push / depth, elapsed)
-        self.friction += _approach(self.friction, across / push, elapsed)
+        self.stiffness += _approach_step(self.stiffness, push / depth, elapsed)
+        self.friction += _approach_step(self.friction, across / push, elapsed)
 
     def _follow(self, move: Vector) -> None:
         """Add the tip's motion `move` (3,) to the depth.
@@ -120,7 +120,7 @@ def _length(vector: Vector) -> float:
     return sqrt(vector.dot(vector))  # np.linalg.norm's own way, at a fifth of its cost
 
 
-def _approach(value: float, target: float, elapsed: float) -> float:
+def _approach_step(value: float, target: float, elapsed: float) -> float:
     """Return by how much `value` goes towards `target` in `elapsed` seconds."""
     time = _RISE if target > value else _FALL
     return (1.0 - exp(-elapsed / time)) * (target - value)

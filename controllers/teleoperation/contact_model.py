@@ -25,7 +25,7 @@ from schemas.vectors import Vector
 __all__ = ["ContactModelBuilder", "ForceParams", "PlaneParams", "PlanesParams"]
 
 
-def _direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
+def _unit_direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
     length = float(np.linalg.norm(value))
     if not length > 0.0:
         raise ValueError(
@@ -41,7 +41,7 @@ class PlaneParams(Params):
     The tip is pushed to normal . tip = `distance`.
     """
 
-    normal: Annotated[tuple[float, float, float], AfterValidator(_direction)] = Field(
+    normal: Annotated[tuple[float, float, float], AfterValidator(_unit_direction)] = Field(
         description="out of the surface, of any length"
     )
     distance: Length = Field(description="of the surface from the remote centre of motion, along the normal")
@@ -123,7 +123,7 @@ class ContactModelBuilder:
         if not following or not gain:
             return []
         planes = [
-            self._plane(
+            self._contact_plane(
                 hand,
                 to_base.T.dot(normal),
                 (plane.distance - float(normal.dot(tip))) / scale,
@@ -135,7 +135,7 @@ class ContactModelBuilder:
         ]
         felt = (estimate for estimate in (self._tissue, self._rigid) if estimate.known)
         planes += [
-            self._plane(
+            self._contact_plane(
                 hand,
                 to_base.T.dot(surface.normal),
                 surface.depth(tip) / scale,
@@ -147,7 +147,7 @@ class ContactModelBuilder:
         ]
         return planes
 
-    def _plane(
+    def _contact_plane(
         self, hand: Vector, normal: Vector, depth: float, stiffness: float, damping: float, friction: float
     ) -> ContactPlane:
         """Return the plane with this `normal` (3,) and the hand `depth` below, in the hand's frame."""

@@ -142,7 +142,7 @@ class Teleoperation(Controller):
         self._stream(header, follows=follows)
         period = max(self.params.contact_period, h)
         if not (t + h) % period:
-            self._outputs["contact"] = self._feel(inputs, to_base, header, period * 1e-9)
+            self._outputs["contact"] = self._feel_contact(inputs, to_base, header, period * 1e-9)
         return self._outputs
 
     def restore(self, state: bytes) -> None:
@@ -265,7 +265,7 @@ class Teleoperation(Controller):
         for port, positions in self._streams.items():
             self._outputs[port] = (_positions(positions, header),) if follows else ()
 
-    def _feel(self, inputs: Inputs, to_base: Vector, header: Header, elapsed: float) -> ContactModel:
+    def _feel_contact(self, inputs: Inputs, to_base: Vector, header: Header, elapsed: float) -> ContactModel:
         """Return the contact model for the hand, `elapsed` seconds after the last model."""
         hand, tip = inputs["master"], self._tip
         if self._law is None:  # as the hand's own frame is the tip's own

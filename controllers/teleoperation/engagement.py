@@ -110,7 +110,7 @@ class Engagement:
             if self._must_hold and not fresh:
                 now.pressed = False  # until the button is received again
             now.lost = not fresh
-        phase = self._decide(to_base, hand, tip, gripper, h, fresh=fresh)
+        phase = self._decide_phase(to_base, hand, tip, gripper, h, fresh=fresh)
         if phase is not before:
             now.phase = phase
         if phase is EngagementPhase.DISABLED and before is not EngagementPhase.DISABLED:
@@ -127,7 +127,7 @@ class Engagement:
         if interrupted:
             now.interrupted = False
 
-    def _decide(
+    def _decide_phase(
         self, to_base: Vector, hand: Vector, tip: Vector, gripper: float, h: float, *, fresh: bool
     ) -> EngagementPhase:
         gate = self._gate

@@ -132,11 +132,11 @@ class VisualServoing(PictureController):
             now.command[0] = np.clip(measured, self._chain.lower, self._chain.upper)
             now.started = True
         self._look(inputs.events("left/image_raw"))
-        now.phase = self._phase(t)
+        now.phase = self._current_phase(t)
         if now.phase < ServoingPhase.MOVING:
             now.command[1], now.camera_velocity[:], now.rests_since_ns = 0.0, 0.0, -1
         else:
-            self._steer(t, h * 1e-9)
+            self._steer_command(t, h * 1e-9)
         return self._outputs(before)
 
     def _receive(self, inputs: Inputs) -> None:
@@ -183,7 +183,7 @@ class VisualServoing(PictureController):
             now.shown[:] = sight.features * (fx, fy) + (cx, cy)
             now.pose[:3], now.pose[3:] = sight.pose[:3, 3], rotation.from_matrix(sight.pose)
 
-    def _phase(self, t: int) -> ServoingPhase:
+    def _current_phase(self, t: int) -> ServoingPhase:
         now = self._now
         if not (now.ready and now.started):
             return ServoingPhase.WAITING
@@ -198,7 +198,7 @@ class VisualServoing(PictureController):
             return ServoingPhase.REACHED
         return ServoingPhase.SETTLED if 0 <= now.rests_since_ns <= t - _REST_NS else ServoingPhase.MOVING
 
-    def _steer(self, t: int, seconds: float) -> None:
+    def _steer_command(self, t: int, seconds: float) -> None:
         """Move the command by `seconds` of the law's velocities."""
         now, chain = self._now, self._chain
         q = now.command[0]

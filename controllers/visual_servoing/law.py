@@ -88,7 +88,7 @@ def joint_velocities(
         limits: what is kept.
     """
     moved = interaction_matrix(features, depths) @ jacobian  # (2 m, n)
-    rows, room = _constraints(q, moved, features, limits)
+    rows, room = _velocity_constraints(q, moved, features, limits)
     if law == "direct":
         wanted = -gain * (features - goal).reshape(-1)
         joints = len(q)
@@ -101,7 +101,9 @@ def joint_velocities(
     return velocities / max(1.0, float(abs(velocities / limits.velocity).max()))
 
 
-def _constraints(q: Vector, moved: Vector, features: Vector, limits: MotionLimits) -> tuple[Vector, Vector]:
+def _velocity_constraints(
+    q: Vector, moved: Vector, features: Vector, limits: MotionLimits
+) -> tuple[Vector, Vector]:
     """Return rows and bounds, shapes (k, n) and (k,), of what dq/dt must keep: joint ranges and the view.
 
     What is outside already may not go farther out; no bound is below 0.

@@ -83,12 +83,12 @@ class Renderer:
     def _friction(self, rubbing: list[_Rubbing], position: Vector3, velocity: Vector3) -> Vector3:
         """Return the friction of all planes, each at most its cone's radius, towards their common anchor."""
         x, y, z = position
-        way = _difference(self._anchor or position, position)
+        way = _vector_difference(self._anchor or position, position)
         for nx, ny, nz, k, _, most in rubbing:
             across = _across(way, nx, ny, nz)
             shortened = _at_most(across, most / k)
             # what is normal to one plane is tangential to another
-            along = ZERO if len(rubbing) == 1 else _difference(way, across)
+            along = ZERO if len(rubbing) == 1 else _vector_difference(way, across)
             way = (along[0] + shortened[0], along[1] + shortened[1], along[2] + shortened[2])
         self._anchor = (x + way[0], y + way[1], z + way[2])
         fx = fy = fz = 0.0
@@ -110,7 +110,7 @@ def _across(v: Vector3, nx: float, ny: float, nz: float) -> Vector3:
     return v[0] - along * nx, v[1] - along * ny, v[2] - along * nz
 
 
-def _difference(v: Vector3, w: Vector3) -> Vector3:
+def _vector_difference(v: Vector3, w: Vector3) -> Vector3:
     return v[0] - w[0], v[1] - w[1], v[2] - w[2]
 
 

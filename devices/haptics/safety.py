@@ -92,14 +92,14 @@ class SafetyChain:
         if self._too_fast or speed > limits.speed:
             self._too_fast = True
             return self._off(Condition.TOO_FAST)
-        self._fade(size, age, dt)
+        self._fade_gain(size, age, dt)
         scale = self._gain * min(1.0, limits.force / size) if size else 0.0
         self.force = _limit_slew(
             self.force, (scale * wanted[0], scale * wanted[1], scale * wanted[2]), limits.slew
         )
         return self.force
 
-    def _fade(self, size: float, age: float, dt: float) -> None:
+    def _fade_gain(self, size: float, age: float, dt: float) -> None:
         """Let the gain fall while the simulation is silent, and else rise once the force is engaged."""
         limits = self._limits
         if age > limits.hold:

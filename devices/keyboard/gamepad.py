@@ -43,30 +43,30 @@ class Gamepad:
         """Return the command of sticks and buttons; no motion without a gamepad."""
         if self._pad is None or not self._pad.attached():
             return NOTHING
-        close = max(0.0, self._axis(pygame.CONTROLLER_AXIS_TRIGGERRIGHT))
+        close = max(0.0, self._axis_share(pygame.CONTROLLER_AXIS_TRIGGERRIGHT))
         return Wish(
             linear=(
-                -self._axis(pygame.CONTROLLER_AXIS_LEFTY),
-                -self._axis(pygame.CONTROLLER_AXIS_LEFTX),
-                self._pair(pygame.CONTROLLER_BUTTON_DPAD_UP, pygame.CONTROLLER_BUTTON_DPAD_DOWN),
+                -self._axis_share(pygame.CONTROLLER_AXIS_LEFTY),
+                -self._axis_share(pygame.CONTROLLER_AXIS_LEFTX),
+                self._key_pair(pygame.CONTROLLER_BUTTON_DPAD_UP, pygame.CONTROLLER_BUTTON_DPAD_DOWN),
             ),
             angular=(
-                -self._axis(pygame.CONTROLLER_AXIS_RIGHTY),
-                self._axis(pygame.CONTROLLER_AXIS_RIGHTX),
-                self._pair(pygame.CONTROLLER_BUTTON_DPAD_RIGHT, pygame.CONTROLLER_BUTTON_DPAD_LEFT),
+                -self._axis_share(pygame.CONTROLLER_AXIS_RIGHTY),
+                self._axis_share(pygame.CONTROLLER_AXIS_RIGHTX),
+                self._key_pair(pygame.CONTROLLER_BUTTON_DPAD_RIGHT, pygame.CONTROLLER_BUTTON_DPAD_LEFT),
             ),
-            gripper=max(0.0, self._axis(pygame.CONTROLLER_AXIS_TRIGGERLEFT)) - close,
+            gripper=max(0.0, self._axis_share(pygame.CONTROLLER_AXIS_TRIGGERLEFT)) - close,
             dead_man=bool(self._pad.get_button(pygame.CONTROLLER_BUTTON_LEFTSHOULDER)),
             jaw=close > 0.0,
         )
 
-    def _axis(self, axis: int) -> float:
+    def _axis_share(self, axis: int) -> float:
         """Return a share from -1 to 1, growing from 0 at the edge of the dead zone."""
         assert self._pad is not None
         value = self._pad.get_axis(axis) / _FULL
         beyond = max(0.0, min(abs(value), 1.0) - _DEAD_ZONE) / (1.0 - _DEAD_ZONE)
         return beyond if value > 0.0 else -beyond
 
-    def _pair(self, plus: int, minus: int) -> float:
+    def _key_pair(self, plus: int, minus: int) -> float:
         assert self._pad is not None
         return float(self._pad.get_button(plus)) - float(self._pad.get_button(minus))

@@ -88,7 +88,7 @@ class HdapiDriver(Driver):
         """Return the errors of this tick: first the calibration's, then HDAPI's stack."""
         found = [error for device in self._devices.values() for error in device.pop_errors()]
         found += errors(self.hd)
-        return [DriverError(code, handle, _phase(code)) for code, handle in found]
+        return [DriverError(code, handle, _phase_after_error(code)) for code, handle in found]
 
     def start(self, tick: Callable[[float], bool]) -> None:
         """Schedule the callback and start the scheduler, with the priority of this thread."""
@@ -150,7 +150,7 @@ class _Device:
         if self._has_switch:
             hd.hdGetBooleanv(Get.SAFETY_SWITCH, self._switch)
         moved = tip.move(self._transform[:], self._velocity[:], now)
-        self._calibrate()
+        self._run_calibration()
         return Reading(
             tip.position,
             tip.rotation,
@@ -176,7 +176,7 @@ class _Device:
         found, self._errors = self._errors, []
         return found
 
-    def _calibrate(self) -> None:
+    def _run_calibration(self) -> None:
         """Check the calibration, and update where possible; keep the errors of HDAPI from before.
 
         Force output is enabled only while the stylus is calibrated.
@@ -210,7 +210,7 @@ class _Device:
         return not any(self._joints)
 
 
-def _phase(code: int) -> ServoPhase:
+def _phase_after_error(code: int) -> ServoPhase:
     """Return the condition of the stylus after an error; only a fault of the device (0x3xx) ends the use."""
     if Code.is_busy(code):
         return ServoPhase.BUSY

@@ -159,9 +159,9 @@ class OpenXrRuntime:
             except xr.EventUnavailable:
                 return
             if event.type == xr.StructureType.EVENT_DATA_SESSION_STATE_CHANGED:
-                self._change_to(_as(event, xr.EventDataSessionStateChanged).state)
+                self._change_to(_as_event(event, xr.EventDataSessionStateChanged).state)
             elif event.type == xr.StructureType.EVENT_DATA_USER_PRESENCE_CHANGED_EXT:
-                self._present = bool(_as(event, xr.EventDataUserPresenceChangedEXT).is_user_present)
+                self._present = bool(_as_event(event, xr.EventDataUserPresenceChangedEXT).is_user_present)
             elif event.type == xr.StructureType.EVENT_DATA_INSTANCE_LOSS_PENDING:
                 raise DeviceError("the OpenXR runtime ends; start it again")
 
@@ -188,7 +188,7 @@ class OpenXrRuntime:
             xr.destroy_instance(self._instance)
 
 
-def _as(event: xr.EventDataBuffer, kind: type[_Event]) -> _Event:
+def _as_event(event: xr.EventDataBuffer, kind: type[_Event]) -> _Event:
     return cast(byref(event), POINTER(kind)).contents
 
 

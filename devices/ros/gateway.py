@@ -129,7 +129,7 @@ class Gateway(Device):
             self.name, self._advertise_all(transport), self.params.publish_period
         )
         for port, value in self._early.items():
-            self._note(self._inputs[port], value)
+            self._note_value(self._inputs[port], value)
             self._events[port].write(value)
         self._early = {}
         for row in self.rows:
@@ -241,13 +241,13 @@ class Gateway(Device):
             raise MessageError(
                 f"device '{self.name}' has no input '{port}'.{did_you_mean(port, self._inputs)}"
             )
-        self._note(row, value)
+        self._note_value(row, value)
         if port in self._events:
             self._events[port].write(value)
         elif row.latched:
             self._early[port] = value
 
-    def _note(self, row: Row, value: Value) -> None:
+    def _note_value(self, row: Row, value: Value) -> None:
         """Note the operating state of a simulated arm and the simulated time, before their publication."""
         if row.name == "operating_state" and isinstance(value, OperatingState):
             self._arbiters[row.owner].busy = value.is_busy

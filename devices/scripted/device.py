@@ -96,7 +96,7 @@ class ScriptedDevice(Device):
         bag = Bag(self.params.samples)
         played = sorted(bag.messages(), key=lambda message: message.time_ns)
         try:
-            makers = _makers(played, self.ports)
+            makers = _sample_makers(played, self.ports)
         except MessageError as error:
             raise RecordingError(f"'{bag.file}': {error}") from error
         self._playback = Playback(self._play(played, makers))
@@ -124,7 +124,7 @@ class ScriptedDevice(Device):
             offset += lap
 
 
-def _makers(played: list[BagMessage], ports: Sequence[Port]) -> list[_Maker]:
+def _sample_makers(played: list[BagMessage], ports: Sequence[Port]) -> list[_Maker]:
     """Return what makes the sample of each message of a recording.
 
     Messages of a signal are read as numbers, all at once, if they are laid out alike: a hundredth of the time

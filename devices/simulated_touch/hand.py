@@ -38,13 +38,15 @@ class SimulatedHand:
 
     def move(self, force: Vector3, target: Vector3, velocity: Vector3) -> None:
         """Move for a tick under `force` (N), with spring and damper to `target` (m) and `velocity` (m/s)."""
-        axis = self._axis
+        axis = self._axis_step
         (x, y, z), (vx, vy, vz), (fx, fy, fz) = self.position, self.velocity, force
         (tx, ty, tz), (ux, uy, uz) = target, velocity
         (x, vx), (y, vy), (z, vz) = axis(x, vx, fx, tx, ux), axis(y, vy, fy, ty, uy), axis(z, vz, fz, tz, uz)
         self.position, self.velocity = (x, y, z), (vx, vy, vz)
 
-    def _axis(self, x: float, v: float, force: float, target: float, velocity: float) -> tuple[float, float]:
+    def _axis_step(
+        self, x: float, v: float, force: float, target: float, velocity: float
+    ) -> tuple[float, float]:
         xx, xv, vx, vv = self._step
         rest = target + (force + self._damping * velocity) / self._stiffness
         e = x - rest

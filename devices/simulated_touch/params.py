@@ -77,7 +77,9 @@ class SimulatedStylusParams(Params):
 
     @field_validator("path")
     @classmethod
-    def _sound(cls, path: tuple[Waypoint, ...] | Path, info: ValidationInfo) -> tuple[Waypoint, ...] | Path:
+    def _check_recording(
+        cls, path: tuple[Waypoint, ...] | Path, info: ValidationInfo
+    ) -> tuple[Waypoint, ...] | Path:
         """Check the order of the times, and find the recording."""
         if isinstance(path, Path):
             file = find_file(path, info)
@@ -97,7 +99,7 @@ class SimulatedStylusParams(Params):
 
     @field_validator("safety")
     @classmethod
-    def _bearable(cls, safety: SafetyParams) -> SafetyParams:
+    def _check_bearable_force(cls, safety: SafetyParams) -> SafetyParams:
         try:
             safety.within(TOUCH)
         except ScenarioError as error:

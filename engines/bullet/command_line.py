@@ -40,7 +40,7 @@ def organs(
 
     Organs come with surfaces and meshes, materials with sources; SI units.
     """
-    found = {"shapes": _shapes(nodes), "materials": _materials()}
+    found = {"shapes": _shapes(nodes), "materials": _material_rows()}
     typer.echo(json.dumps(found, indent=2) if as_json else _text(found))
 
 
@@ -80,7 +80,7 @@ def _contact(shape: str, nodes: int) -> list[dict[str, Any]]:
     return [{**asdict(one), "text": str(one)} for one in found if one is not None]
 
 
-def _materials() -> dict[str, Any]:
+def _material_rows() -> dict[str, Any]:
     from engines.bullet.organs.materials import presets
 
     return {name: preset.model_dump() for name, preset in presets().items()}

@@ -75,7 +75,7 @@ class Instance(ABC):
             stack.callback(self._fmu.freeLibrary)
             self.library: Library = self._fmu.dll
             self._check_functions(description)
-            self.options = self._instantiate(description, options)
+            self.options = self._instantiate_fmu(description, options)
             """Those that the FMU has taken."""
             self._loaded = stack.pop_all()
         self.can_save = self._can_save(description)
@@ -86,8 +86,8 @@ class Instance(ABC):
         self.memory = np.zeros(0)
         """State between steps apart from the FMU's own; written in place, never replaced."""
         self._serialised: Any = (self.byte * 0)()
-        self.inputs = [Block("Set", group, self._access) for group in grouped(description.inputs)]
-        self.outputs = [Block("Get", group, self._access) for group in grouped(description.outputs)]
+        self.inputs = [Block("Set", group, self._prepare_access) for group in grouped(description.inputs)]
+        self.outputs = [Block("Get", group, self._prepare_access) for group in grouped(description.outputs)]
 
     def _check_functions(self, description: Description) -> None:
         needed = dict.fromkeys(self.prefix + name for name in self.required)
@@ -99,7 +99,7 @@ class Instance(ABC):
                 f"the library of '{description.path}' cannot be used: it lacks {', '.join(missing)}"
             )
 
-    def _instantiate(
+    def _instantiate_fmu(
         self, description: Description, options: Sequence[Mapping[str, Any]]
     ) -> Mapping[str, Any]:
         """Instantiate the FMU with the first accepted `options`, and return the options."""
@@ -216,7 +216,9 @@ class Instance(ABC):
         """Note the FMU's request to end the simulation."""
         self.ended = f"the FMU asks to end the simulation at {time_s:.9g} s ({how}){self._reason()}"
 
-    def _access(self, function: str, references: Sequence[int], raw: NDArray[Any]) -> Callable[[], int]:
+    def _prepare_access(
+        self, function: str, references: Sequence[int], raw: NDArray[Any]
+    ) -> Callable[[], int]:
         return prepared(self._function(function), self._component, references, raw, counted=self.counted)
 
     def transfer(self, block: Block) -> None:
@@ -234,6 +236,8 @@ class Instance(ABC):
                 "SetString", (ctypes.c_uint * 1)(start.reference), 1, text, *([1] if self.counted else [])
             )
             return
-        status = self._access(f"Set{start.access}", [start.reference], np.ascontiguousarray(start.value))()
+        status = self._prepare_access(
+            f"Set{start.access}", [start.reference], np.ascontiguousarray(start.value)
+        )()
         if status > WARNING:
             raise self.failure(f"Set{start.access}", status, f" for the start value of '{start.name}'")

@@ -37,7 +37,7 @@ class NumberType:
         A boolean is 0 or 1, an integer a whole number in range and of at most 2^53. Raises ValueError, naming
         the variable, for a value without an exact representation.
         """
-        low, high = self._bounds()
+        low, high = self._integer_bounds()
         fits = (values >= low) & (values <= high)
         if self.dtype.kind != "f":
             fits &= values == np.rint(values)
@@ -48,7 +48,7 @@ class NumberType:
             )
         return values.astype(self.dtype)
 
-    def _bounds(self) -> tuple[float, float]:
+    def _integer_bounds(self) -> tuple[float, float]:
         if self.name == "Boolean":
             return 0.0, 1.0
         if self.dtype.kind == "f":
@@ -111,9 +111,9 @@ def port_name(variable: str) -> str:
     `arm/x5F_q`.
     """
     parts = variable.split(".")
-    return "/".join(map(_escaped, parts if all(parts) else [variable]))
+    return "/".join(map(_escape_part, parts if all(parts) else [variable]))
 
 
-def _escaped(part: str) -> str:
+def _escape_part(part: str) -> str:
     head = f"x{ord(part[0]):02X}_" if _BAD_START.match(part) else part[0]
     return head + _ILLEGAL.sub(lambda match: f"_x{ord(match[0]):02X}_", part[1:])

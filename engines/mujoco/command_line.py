@@ -173,14 +173,15 @@ def dynamics(
     if as_json:
         typer.echo(
             json.dumps(
-                {"arm": arm, "instrument": tool, "q": positions, "dq": velocities, **_plain(found)}, indent=2
+                {"arm": arm, "instrument": tool, "q": positions, "dq": velocities, **_plain_summary(found)},
+                indent=2,
             )
         )
     else:
         _print(found)
 
 
-def _plain(found: JointDynamics) -> dict[str, Any]:
+def _plain_summary(found: JointDynamics) -> dict[str, Any]:
     return {
         key: value.tolist() if isinstance(value, np.ndarray) else value
         for key, value in asdict(found).items()

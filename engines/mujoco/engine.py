@@ -135,7 +135,7 @@ class MujocoEngine(Stepped):
             every = period if self._at_once else timestep
             self._rigid = RigidContact(self._model, self._data, psms, fixtures=fixtures, every=every * 1e-9)
             self._outputs.update(self._rigid.outputs)
-        self._couple(setup)
+        self._couple_bonds(setup)
         self._readings.refresh()
         self._holding.refresh()
         self._keepers = [
@@ -153,7 +153,7 @@ class MujocoEngine(Stepped):
         self._state = np.empty(self._size + sum(keeper.state.size for keeper in self._keepers))
         return self._outputs
 
-    def _couple(self, setup: Setup) -> None:
+    def _couple_bonds(self, setup: Setup) -> None:
         from engines.mujoco.interaction.contact_spheres_bond import ContactSpheresBond
         from engines.mujoco.interaction.probe_bond import ProbeBond
 

@@ -111,7 +111,7 @@ class Channel:
             tip: Vector = rotation @ self._tip + origin
             force = self._press(rotation, tip, origin, over_pad=over_pad)
             if not state.count:
-                lying, moment = self._lie(rotation, origin, 0, len(self._stations) - 1)
+                lying, moment = self._skin_force(rotation, origin, 0, len(self._stations) - 1)
                 return force + lying, moment + cross(tip, force)
         return self._follow(rotation, origin)
 
@@ -160,7 +160,7 @@ class Channel:
         state.length = self._needle.radius * (self._needle.arc / 2.0 - angle)
         state.cut = max(0.0, state.length - self._tissue.give)
         state.slid = state.length
-        self._dig(rotation, origin)
+        self._extend_channel(rotation, origin)
 
     def _skin_angle(self, rotation: Vector, origin: Vector, *, entering: bool) -> float:
         """Return the angle on the wire, nearest to the tip, of the passage through the skin, in or out.
@@ -175,7 +175,7 @@ class Channel:
         # of the turns of this angle that which is at most half a turn from the tip's
         return angle - 2.0 * pi * round((angle - end) / (2.0 * pi))
 
-    def _dig(self, rotation: Vector, origin: Vector) -> None:
+    def _extend_channel(self, rotation: Vector, origin: Vector) -> None:
         """Add points to the channel up to the cut end, along the present wire."""
         state = self.state
         while state.count < self._most and state.count * SPACING <= state.cut:
@@ -194,7 +194,7 @@ class Channel:
         local = (state.points[: state.count] - origin).dot(rotation)
         x, y, z = local.T
         away = np.maximum(np.hypot(x, y), 1e-9)
-        on_wire, weights = self._slide(np.arctan2(y, x))
+        on_wire, weights = self._slide_tip(np.arctan2(y, x))
         if self._has_left(on_wire):
             return np.zeros(3), np.zeros(3)
         self._followed = rotation, local, away, weights
@@ -207,18 +207,18 @@ class Channel:
         np.subtract(z * sums[2], away * sums[1], out=sums[3])
         directions = local.T[:2] / away
         (wx, zx, rx, mx), (wy, zy, ry, my) = directions.dot(sums.T).tolist()
-        press, rub = tissue.compression * SPACING, self._rub(state.covered)
-        at_tip = self._resist(rotation, origin)
+        press, rub = tissue.compression * SPACING, self._channel_friction(state.covered)
+        at_tip = self._resisting_force(rotation, origin)
         force = np.array([press * rx + rub * wy, press * ry - rub * wx, press * float(weights.dot(z))])
         moment = np.array([rub * zx - press * my, rub * zy + press * mx, -rub * float(weights.dot(away))])
         force -= at_tip * self._forward
         moment[2] -= at_tip * radius
         force, moment = rotation.dot(force), rotation.dot(moment)
         moment += cross(origin, force)
-        lying, turning = self._lie(rotation, origin, *self._outside())
+        lying, turning = self._skin_force(rotation, origin, *self._outside())
         return force + lying, moment + turning
 
-    def _slide(self, angles: Vector) -> tuple[Vector, Vector]:
+    def _slide_tip(self, angles: Vector) -> tuple[Vector, Vector]:
         """Move the tip along the channel to the points at `angles` on the wire, rad.
 
         Returns the distance of each point behind the tip along the wire, m, and the covered share.
@@ -242,7 +242,7 @@ class Channel:
         state.covered = covered * SPACING
         return on_wire, weights
 
-    def _rub(self, covered: float) -> float:
+    def _channel_friction(self, covered: float) -> float:
         """Return the friction (N) at each covered point; let the wire slip at too large a friction."""
         state, largest = self.state, self._tissue.friction * SPACING
         stiffness = largest / self._tissue.give
@@ -252,7 +252,7 @@ class Channel:
             state.slid = state.length - pull / stiffness
         return pull if covered > 0.0 else 0.0
 
-    def _resist(self, rotation: Vector, origin: Vector) -> float:
+    def _resisting_force(self, rotation: Vector, origin: Vector) -> float:
         """Return the force (N) against the tip: of cutting, or of stretching skin up to the break."""
         state, tissue, needle = self.state, self._tissue, self._needle
         ahead = state.length - state.cut
@@ -263,13 +263,13 @@ class Channel:
         to_skin = self._way_to_skin(rotation, origin)
         if ahead > tissue.give and to_skin > tissue.give:
             state.cut = state.length - min(ahead, tissue.give)
-            self._dig(rotation, origin)
+            self._extend_channel(rotation, origin)
             ahead = state.length - state.cut
         stretch = max(0.0, ahead - tissue.give)
         state.tip = stiffness * min(ahead, tissue.give) + tissue.skin_stiffness * stretch
         if stretch > 0.0 and state.tip > tissue.exit_puncture:
             state.phase, state.cut, state.tip = Phase.THROUGH, state.length + min(0.0, to_skin), 0.0
-            self._dig(rotation, origin)
+            self._extend_channel(rotation, origin)
             angle = np.array([needle.arc / 2.0 + to_skin / needle.radius])
             state.came_out[:] = rotation @ needle.points(angle)[0] + origin
         return state.tip
@@ -295,7 +295,7 @@ class Channel:
         behind = self._needle.length - self.state.length
         return 0, max(0, int(behind / self._share) - 1)
 
-    def _lie(self, rotation: Vector, origin: Vector, first: int, last: int) -> tuple[Vector, Vector]:
+    def _skin_force(self, rotation: Vector, origin: Vector, first: int, last: int) -> tuple[Vector, Vector]:
         """Return force and moment of the skin on the stations of the wire pressing from above."""
         force, moment, stations = np.zeros(3), np.zeros(3), self._stations[first:last]
         depth = self._needle.wire_radius - float(origin[2]) - stations.dot(rotation[2])

@@ -115,7 +115,7 @@ class SuturePad(Stepped):
             "entry": self._state.entry,
             "exit": self._state.exit,
             "events": (),
-            **self._drawn(0),
+            **self._drawn_bodies(0),
         }
         if self._side is not None:
             still = {self._side.force_port: np.zeros(9), self._side.work_port: np.zeros(1)}
@@ -130,15 +130,15 @@ class SuturePad(Stepped):
             outputs.pop(f"{body}/nodes", None)
         if side is not None:
             was = self._channel.state.phase
-            outputs |= self._react(side, inputs, h)
+            outputs |= self._react_to_needle(side, inputs, h)
             if self._channel.state.phase is not was:
                 outputs["events"] = self._events(was, t + h)
             self._report()
         if not (t + h) % self.params.node_period:
-            outputs |= self._drawn(t + h)
+            outputs |= self._drawn_bodies(t + h)
         return outputs
 
-    def _react(self, side: ForceSide, inputs: Inputs, h: int) -> dict[str, Vector]:
+    def _react_to_needle(self, side: ForceSide, inputs: Inputs, h: int) -> dict[str, Vector]:
         """Take the sub-steps of a step, and return the reaction."""
         side.begin(inputs, h * 1e-9)
         dt, no_damper, pushed = self.params.timestep * 1e-9, np.zeros(9), np.zeros(9)
@@ -198,13 +198,13 @@ class SuturePad(Stepped):
                 header=Header(stamp=Time.from_ns(time_ns), frame_id="world"),
                 event=event,
                 object=self._thing,
-                place=self._hole(place, "entry" if event in ("entered", "withdrawn") else "exit"),
+                place=self._nearest_hole(place, "entry" if event in ("entered", "withdrawn") else "exit"),
                 value=state.tip_force,
                 unit="N",
             ),
         )
 
-    def _hole(self, place: Vector, kind: str) -> str:
+    def _nearest_hole(self, place: Vector, kind: str) -> str:
         """Return the name of the hole of a kind nearest to `place` (m, world); empty: none is near."""
         here = self._world_in_pad[:3, :3] @ place + self._world_in_pad[:3, 3]
         away = np.linalg.norm(self._holes[:, :3, 3] - here, axis=1)
@@ -212,7 +212,7 @@ class SuturePad(Stepped):
         nearest = int(away.argmin())
         return self._names[nearest] if away[nearest] <= _NEAR else ""
 
-    def _drawn(self, time_ns: int) -> dict[str, SoftBodyState]:
+    def _drawn_bodies(self, time_ns: int) -> dict[str, SoftBodyState]:
         """Return skin and thread; the thread settles over the time since the last drawing."""
         first, thread = time_ns == 0, self._thread
         skin = self._skin.displaced(*self._channel.displaced())

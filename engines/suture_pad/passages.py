@@ -130,20 +130,20 @@ class Passages:
         if newest < 0:
             return _STILL
         if inserted is not None:
-            self.pull = self._slide(inserted, is_led=True)
+            self.pull = self._slide_thread(inserted, is_led=True)
             force: Vector = -self.pull * forward
         else:
             x, y, z = base.tolist()
             u, v, w = self._ends[newest]
             u, v, w = u - x, v - y, w - z
             gap = sqrt(u * u + v * v + w * w)
-            self.pull = self._slide(self._lengths[newest] + gap, is_led=False)
+            self.pull = self._slide_thread(self._lengths[newest] + gap, is_led=False)
             scale = self.pull / max(gap, 1e-9)
             force = np.array([scale * u, scale * v, scale * w])
         self._forget(inserted)
         return force
 
-    def _slide(self, demand: float, *, is_led: bool) -> float:
+    def _slide_thread(self, demand: float, *, is_led: bool) -> float:
         """Pull the newest passage to `demand` (m), then the earlier passages; return the sum of friction, N.
 
         `is_led`: the needle itself is in the newest passage, and pushes the thread back, too.
@@ -168,14 +168,14 @@ class Passages:
         state = self.state
         if inserted is not None and inserted <= 0.0:
             state.count -= 1
-            self._clear(state.count)
+            self._clear_passage(state.count)
         elif float(state.through[0]) >= self._total + self._lengths[0]:
             for kept in (state.points, state.counts, state.through, state.slid):
                 kept[:-1] = kept[1:].copy()
             state.count -= 1
-            self._clear(state.count)
+            self._clear_passage(state.count)
 
-    def _clear(self, at: int) -> None:
+    def _clear_passage(self, at: int) -> None:
         state = self.state
         state.points[at] = state.counts[at] = state.through[at] = state.slid[at] = 0.0
         self.refresh()

@@ -38,13 +38,13 @@ def pad_ports(node_period_ns: int, *, thread: bool) -> tuple[Port, ...]:
     broken = f"{', '.join(EVENTS)}: with the nearest hole, and the force of the tip just before"
     return (
         *(signal_out(name, Float64Message, meaning, unit=unit) for name, unit, meaning in numbers),
-        *(_hole(name, way) for name, way in (("entry", "in"), ("exit", "out"))),
+        *(_hole_port(name, way) for name, way in (("entry", "in"), ("exit", "out"))),
         event_out("events", TaskEvent, broken),
         *(_nodes(body, node_period_ns) for body in ((SKIN, THREAD) if thread else (SKIN,))),
     )
 
 
-def _hole(name: str, way: str) -> Port:
+def _hole_port(name: str, way: str) -> Port:
     meaning = f"where the needle went {way} last, on the skin at rest, in the world"
     return signal_out(name, description=meaning, size=3, unit="m")
 

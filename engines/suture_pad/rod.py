@@ -96,11 +96,11 @@ class Rod:
             state.nodes[inside] = passage.at(ways[inside])
             held |= inside
         nodes = np.concatenate([[base + thread.segment * forward], state.nodes])
-        for span in self._spans(base, passages):
+        for span in self._thread_spans(base, passages):
             self._take(span, held, nodes, dt)
         state.nodes[:] = nodes[1:]
 
-    def _spans(self, base: Vector, passages: Sequence[Passage]) -> list[Span]:
+    def _thread_spans(self, base: Vector, passages: Sequence[Passage]) -> list[Span]:
         """Return the parts outside of passages, from the needle's base on."""
         spans: list[Span] = []
         start, place = 0.0, base

@@ -47,7 +47,7 @@ class Skin:
         nodes = self.rest.copy()
         if len(places):
             top = nodes[: self._count]
-            distances = self._distances(places)
+            distances = self._node_distances(places)
             nearest = distances.min(axis=1, keepdims=True)
             shares = np.subtract(nearest, distances, out=distances)
             shares /= _BLEND
@@ -56,7 +56,7 @@ class Skin:
             top += np.exp(-nearest / _REACH) * (shares @ displacements)
         return nodes
 
-    def _distances(self, places: Vector) -> Vector:
+    def _node_distances(self, places: Vector) -> Vector:
         """Return how far the top's nodes at rest, a grid, are from `places`, (m, 3): m, shape (n, m)."""
         x, y = self._xs[:, None] - places[:, 0], self._ys[:, None] - places[:, 1]
         squares = (x * x)[None] + (y * y)[:, None]  # (rows, columns, m)

@@ -48,13 +48,13 @@ class ThreePoints:
             plain_sum(arm[i] * arm[j] for arm in arms)
             for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
         )
-        turning = _solved((yy + zz, -xy, -xz, xx + zz, -yz, xx + yy), mx, my, mz)
+        turning = _solve_symmetric((yy + zz, -xy, -xz, xx + zz, -yz, xx + yy), mx, my, mz)
         u, v, w = turning
         fx, fy, fz = fx / 3.0, fy / 3.0, fz / 3.0
         return np.array([(fx + v * z - w * y, fy + w * x - u * z, fz + u * y - v * x) for x, y, z in arms])
 
 
-def _solved(
+def _solve_symmetric(
     matrix: tuple[float, float, float, float, float, float], x: float, y: float, z: float
 ) -> tuple[float, float, float]:
     """Return the solution of a symmetric matrix, (11, 12, 13, 22, 23, 33), for the right side x, y, z."""

@@ -48,7 +48,7 @@ def show(result: Mapping[str, Any], *, as_json: bool) -> None:
         return
     console.print(
         table(
-            _readable(name, value)
+            _readable_value(name, value)
             for name, value in result.items()
             if value is not None and not isinstance(value, dict)
         )
@@ -103,7 +103,7 @@ def latency_rows(latency: Mapping[str, Mapping[str, Mapping[str, float]]]) -> It
                 yield way, stream, round(row["count"]), *(f"{1e3 * row[name]:.3f} ms" for name in _TIMES)
 
 
-def _readable(name: str, value: Any) -> tuple[str, str]:
+def _readable_value(name: str, value: Any) -> tuple[str, str]:
     """Return label and value; a unit at the end of the name follows the value."""
     stem, _, suffix = name.rpartition("_")
     unit = _UNITS.get(suffix)

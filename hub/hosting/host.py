@@ -160,7 +160,7 @@ class Host:
         ParticipantError.
         """
         while self._successors and self._successors[0][0] <= grant.step:
-            self._renew(*self._successors.pop(0))
+            self._renew_participant(*self._successors.pop(0))
         for sample in grant.inlets:
             for one, port, codec in self._inlets.get((sample.participant, sample.port), ()):
                 _enter(one, port, codec, sample)
@@ -186,7 +186,7 @@ class Host:
                 min(cell.tag(-(-end // period) * period, fresh=fresh) for period, fresh in readers)
             )
 
-    def _renew(self, step: int, one: HostedParticipant, new: Stepped) -> None:
+    def _renew_participant(self, step: int, one: HostedParticipant, new: Stepped) -> None:
         """Let `new` go on in the place of a participant, with the participant's state."""
         try:
             new.restore(one.participant.save())

@@ -92,7 +92,7 @@ class HostProcesses:
     def dead(self) -> dict[str, str]:
         """Return the kind of end of each ended process, by host."""
         return {
-            host: _how(process.returncode)
+            host: _exit_sentence(process.returncode)
             for host, process in self._processes.items()
             if process.returncode is not None
         }
@@ -122,7 +122,7 @@ class HostProcesses:
             link.close()
 
 
-def _how(code: int) -> str:
+def _exit_sentence(code: int) -> str:
     if code >= 0:
         return f"its process ended with exit code {code}"
     try:

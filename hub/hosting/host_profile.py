@@ -34,10 +34,10 @@ class HostProfile:
         The first grant is left out: since being ready, a host has waited for the first grant.
         """
         watch = self.process.watch
-        self.process.attach(host, self._ran)
+        self.process.attach(host, self._has_run)
         watch.time(acknowledge, watch.phase("acks", "connections"))
 
-    def _ran(self) -> None:
+    def _has_run(self) -> None:
         if self._began:
             self.process.watch.next_round()
         else:

@@ -74,11 +74,11 @@ class Connections:
         *motion, force = zip(bond_ports(planned.motion), bond_ports(planned.force), strict=True)
         for here, there in motion:
             source, target = _end(bond.motion, here), _end(bond.force, there)
-            self._couple(source, target, index, fresh=is_fresh(bond, "motion"))
+            self._couple_sides(source, target, index, fresh=is_fresh(bond, "motion"))
         source, target = _end(bond.force, force[1]), _end(bond.motion, force[0])
-        self._couple(source, target, index, fresh=is_fresh(bond, "force"))
+        self._couple_sides(source, target, index, fresh=is_fresh(bond, "force"))
 
-    def _couple(self, source: PortReference, target: PortReference, index: int, *, fresh: bool) -> None:
+    def _couple_sides(self, source: PortReference, target: PortReference, index: int, *, fresh: bool) -> None:
         self._feed(target, str(source), ("bonds", index))
         self.stepped.append(PlannedConnection(**_ends(source, target), fresh=fresh, linear=False))
 

@@ -18,20 +18,20 @@ _FORMATS = ("path", "file-path", "directory-path")
 def parameter_paths(model: type[Params], values: Mapping[str, Any]) -> set[str]:
     """Return every text in `values` at the place of a path in the model, as written."""
     schema = model.model_json_schema()
-    return set(_paths(schema, values, schema.get("$defs", {})))
+    return set(_paths_in(schema, values, schema.get("$defs", {})))
 
 
-def _paths(schema: _Schema, value: Any, definitions: _Schema) -> Iterator[str]:
+def _paths_in(schema: _Schema, value: Any, definitions: _Schema) -> Iterator[str]:
     """Yield the paths in `value`; of schemas with alternatives, the paths of each."""
     if isinstance(value, str) and schema.get("format") in _FORMATS:
         yield value
     if "$ref" in schema:
-        yield from _paths(definitions[schema["$ref"].removeprefix("#/$defs/")], value, definitions)
+        yield from _paths_in(definitions[schema["$ref"].removeprefix("#/$defs/")], value, definitions)
     for alternatives in ("anyOf", "oneOf", "allOf"):
         for alternative in schema.get(alternatives, ()):
-            yield from _paths(alternative, value, definitions)
+            yield from _paths_in(alternative, value, definitions)
     for of_part, part in _parts(schema, value):
-        yield from _paths(of_part, part, definitions)
+        yield from _paths_in(of_part, part, definitions)
 
 
 def _parts(schema: _Schema, value: Any) -> Iterator[tuple[_Schema, Any]]:

@@ -164,7 +164,7 @@ def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tup
             yield from _marks(key, other, path)
     # `key:` without a value: the parser is already on the next line
     empty = value.start_mark.index == value.end_mark.index
-    yield path, (_mark(key), _mark(key if empty else value))
+    yield path, (_mark_node(key), _mark_node(key if empty else value))
     if value.id == "mapping":
         for name, child in value.value:
             if name.tag != MERGE:
@@ -199,7 +199,7 @@ def merge_missing(value: Any, over: Any) -> Any:
     }
 
 
-def _mark(node: Any) -> _Mark:
+def _mark_node(node: Any) -> _Mark:
     return node.start_mark.line + 1, node.start_mark.column + 1
 
 

@@ -20,19 +20,19 @@ def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
     Relative paths start at `directory`. A directory stands for all files directly inside.
     """
     files: set[Path] = set()
-    for named in _paths(list(params)):
+    for named in _paths_of(list(params)):
         path = (directory / named).resolve()
         files |= {file for file in (path.iterdir() if path.is_dir() else (path,)) if file.is_file()}
     return {str(file): file_hash(file) for file in sorted(files)}
 
 
-def _paths(value: Any) -> Iterator[Path]:
+def _paths_of(value: Any) -> Iterator[Path]:
     if isinstance(value, Path):
         yield value
     elif isinstance(value, BaseModel):
-        yield from _paths(list(vars(value).values()))
+        yield from _paths_of(list(vars(value).values()))
     elif isinstance(value, Mapping):
-        yield from _paths(list(cast("Mapping[Any, Any]", value).values()))
+        yield from _paths_of(list(cast("Mapping[Any, Any]", value).values()))
     elif isinstance(value, (list, tuple, set, frozenset)):
         for part in cast("Iterable[Any]", value):
-            yield from _paths(part)
+            yield from _paths_of(part)

@@ -133,7 +133,7 @@ class McapFile:
             self._append_bytes(_bytes_of(DataEnd(0)))
             self._append_summary()
         except OSError:
-            self._cut(size)
+            self._cut_tail(size)
             raise
 
     def _append_summary(self) -> None:
@@ -180,12 +180,12 @@ class McapFile:
         try:
             _write(self._file, data)
         except OSError:
-            self._cut(self.size)
+            self._cut_tail(self.size)
             raise
         offset, self.size = self.size, self.size + len(data)
         return offset
 
-    def _cut(self, size: int) -> None:
+    def _cut_tail(self, size: int) -> None:
         """Remove everything after `size` bytes."""
         self._file.truncate(size)
         self._file.seek(size)

@@ -195,7 +195,7 @@ class Recorder:
                 continue
             written = 0
             try:
-                self._declare(channels)
+                self._declare_channels(channels)
                 for part in self._split_queue(queue, size):
                     self._file.add_chunk(chunk_data(part, self._blocks))
                     written += len(part)
@@ -217,7 +217,7 @@ class Recorder:
         if start < len(queue):
             yield queue[start:]
 
-    def _declare(self, channels: Sequence[tuple[str, str]]) -> None:
+    def _declare_channels(self, channels: Sequence[tuple[str, str]]) -> None:
         """Write the channels still missing in the file."""
         for number, (topic, type_name) in enumerate(
             channels[len(self._file.channels) :], len(self._file.channels) + 1

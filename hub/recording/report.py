@@ -43,7 +43,7 @@ def report(recording: Recording, output: Path) -> None:
     """
     scenario = recording.scenario()
     traces = [trace for bond in scenario.bonds if (trace := _bond_trace(recording, bond)) is not None]
-    books = {bond.name: _book(recording, bond) for bond in scenario.bonds}
+    books = {bond.name: _energy_book(recording, bond) for bond in scenario.bonds}
     statuses = list(recording.statuses())
     page = Template((files("hub.recording") / "report_page.html").read_text(encoding="utf-8"))
     text = page.substitute(
@@ -84,7 +84,7 @@ def _first(recording: Recording, bond: str, names: Iterable[str]) -> Series | No
     return next((recording[f"{bond}/{name}"] for name in names if f"{bond}/{name}" in recording), None)
 
 
-def _book(recording: Recording, bond: Bond) -> tuple[Vector, Vector, Vector]:
+def _energy_book(recording: Recording, bond: Bond) -> tuple[Vector, Vector, Vector]:
     """Return times (s), work given and work taken (J) of the energy book, each of shape (n,)."""
     rows = [
         (time_ns * 1e-9, entry.motion_work_j, entry.force_work_j)

@@ -116,7 +116,7 @@ def _unseen_demands(kind: str, params: Mapping[str, Any], directory: Path) -> It
     """Yield demands refused unseen: a look at a class imports it, a look at a network path signs on there."""
     if names_class(kind):
         yield f"the class '{safe_text(kind)}', which no installed package has as a kind"
-    for text in (str(directory), *_texts(params)):
+    for text in (str(directory), *_all_texts(params)):
         if text.startswith(("\\\\", "//")):
             yield f"the network path '{safe_text(text)}'"
 
@@ -146,13 +146,13 @@ def _log_other_files(kind: str, params: Mapping[str, Any], directory: Path, reco
             )
 
 
-def _texts(value: Any) -> Iterator[str]:
+def _all_texts(value: Any) -> Iterator[str]:
     """Yield every text in a parameter."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict):
         for part in cast("dict[str, Any]", value).values():
-            yield from _texts(part)
+            yield from _all_texts(part)
     elif isinstance(value, list):
         for part in cast("list[Any]", value):
-            yield from _texts(part)
+            yield from _all_texts(part)

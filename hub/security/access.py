@@ -53,8 +53,8 @@ def access_settings(
     # all that `trocar ls` needs
     rights[OBSERVER] = [
         *rights.get(OBSERVER, ()),
-        *_query(Keys("*").status, Keys("*").profile),
-        *_subscribe(keys.status),
+        *_query_messages(Keys("*").status, Keys("*").profile),
+        *_subscribe_messages(keys.status),
     ]
     everything = ["**"]  # does not match chunks that begin with @, as in some foreign keys
     for name, shared in (foreign or {}).items():
@@ -115,8 +115,8 @@ def _part(plan: Plan, keys: Keys, planned: PlannedParticipant) -> list[Rule]:
         allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),
         allow("egress", ["declare_subscriber"], f"{keys.prefix}/{role}/{name}/**", *of_all),
         allow("ingress", ["liveliness_token"], keys.alive(role, name)),
-        *_query(Keys("*").join(planned.host), keys.control("clock")),
-        *_subscribe(*dict.fromkeys([*inputs, *orders])),
+        *_query_messages(Keys("*").join(planned.host), keys.control("clock")),
+        *_subscribe_messages(*dict.fromkeys([*inputs, *orders])),
         allow("ingress", ["liveliness_query", "declare_liveliness_subscriber"], hub),
         allow("egress", ["liveliness_token"], hub),
     ]
@@ -129,11 +129,11 @@ def _to_device(plan: Plan, keys: Keys, connection: ConnectionToDevice) -> str:
     return keys.signals(connection.source, connection.target)
 
 
-def _query(*keys: str) -> list[Rule]:
+def _query_messages(*keys: str) -> list[Rule]:
     return [allow("ingress", ["query"], *keys), allow("egress", ["reply", "declare_queryable"], *keys)]
 
 
-def _subscribe(*keys: str) -> list[Rule]:
+def _subscribe_messages(*keys: str) -> list[Rule]:
     return [allow("ingress", ["declare_subscriber"], *keys), allow("egress", ["put"], *keys)]
 
 

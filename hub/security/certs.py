@@ -53,7 +53,7 @@ def create_authority(directory: Path, hosts: Sequence[str], days: float) -> Path
     directory.mkdir(parents=True, exist_ok=True, mode=0o700)
     key = ec.generate_private_key(ec.SECP256R1())
     # longer ones are invalid (RFC 5280, ub-common-name)
-    name = _named(f"Trocar authority {secrets.token_hex(4)} of {socket.gethostname()}"[:64])
+    name = _distinguished_name(f"Trocar authority {secrets.token_hex(4)} of {socket.gethostname()}"[:64])
     signs = dict.fromkeys(("key_cert_sign", "crl_sign"), True)
     other = (
         "digital_signature",
@@ -64,12 +64,12 @@ def create_authority(directory: Path, hosts: Sequence[str], days: float) -> Path
         "encipher_only",
         "decipher_only",
     )
-    builder = _builder(name, name, key, datetime.now(UTC) + timedelta(days=_AUTHORITY_DAYS))
+    builder = _certificate_builder(name, name, key, datetime.now(UTC) + timedelta(days=_AUTHORITY_DAYS))
     builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
     builder = builder.add_extension(x509.KeyUsage(**signs, **dict.fromkeys(other, False)), critical=True)
     _write(key_file, _key_pem(key))
     _write(certificate_file, builder.sign(key, hashes.SHA256()).public_bytes(Encoding.PEM))
-    return _issue(directory, HUB, days, hosts)
+    return _issue_certificate(directory, HUB, days, hosts)
 
 
 def renew(directory: Path, hosts: Sequence[str], days: float) -> Path:
@@ -85,7 +85,7 @@ def renew(directory: Path, hosts: Sequence[str], days: float) -> Path:
                 "the names of the hub are unknown, as its certificate is missing or invalid; give them with"
                 f" trocar certs renew HOST ... ({error})"
             ) from error
-    return _issue(directory, HUB, days, hosts)
+    return _issue_certificate(directory, HUB, days, hosts)
 
 
 def issue(directory: Path, name: str, days: float) -> Path:
@@ -95,7 +95,7 @@ def issue(directory: Path, name: str, days: float) -> Path:
     invalid name, ConnectError if `directory` has no authority.
     """
     _check_holder(name)
-    return _issue(directory, name, days)
+    return _issue_certificate(directory, name, days)
 
 
 def revoke(directory: Path, name: str) -> str:
@@ -109,7 +109,7 @@ def revoke(directory: Path, name: str) -> str:
             f" move {directory} away and start afresh with trocar certs init"
         )
     _check_holder(name)
-    _authority(directory)
+    _load_authority(directory)
     return revoked.add(directory / revoked.FILE, name)
 
 
@@ -134,13 +134,13 @@ def _check_holder(name: str) -> None:
         )
 
 
-def _issue(directory: Path, name: str, days: float, hosts: Sequence[str] = ()) -> Path:
-    authority_key, authority = _authority(directory)
+def _issue_certificate(directory: Path, name: str, days: float, hosts: Sequence[str] = ()) -> Path:
+    authority_key, authority = _load_authority(directory)
     key = ec.generate_private_key(ec.SECP256R1())
     until = min(datetime.now(UTC) + timedelta(days=days), authority.not_valid_after_utc)
     purpose = ExtendedKeyUsageOID.SERVER_AUTH if name == HUB else ExtendedKeyUsageOID.CLIENT_AUTH
     common_name = revoked.common_name(name, revoked.read(directory / revoked.FILE))
-    builder = _builder(_named(common_name), authority.subject, key, until)
+    builder = _certificate_builder(_distinguished_name(common_name), authority.subject, key, until)
     builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
     builder = builder.add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
     if hosts:
@@ -154,7 +154,7 @@ def _issue(directory: Path, name: str, days: float, hosts: Sequence[str] = ()) -
     return file
 
 
-def _authority(directory: Path) -> tuple[ec.EllipticCurvePrivateKey, x509.Certificate]:
+def _load_authority(directory: Path) -> tuple[ec.EllipticCurvePrivateKey, x509.Certificate]:
     try:
         key = load_pem_private_key((directory / "ca.key").read_bytes(), None)
         certificate = x509.load_pem_x509_certificate((directory / "ca.pem").read_bytes())
@@ -168,7 +168,7 @@ def _authority(directory: Path) -> tuple[ec.EllipticCurvePrivateKey, x509.Certif
     return key, certificate
 
 
-def _builder(
+def _certificate_builder(
     subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, until: datetime
 ) -> x509.CertificateBuilder:
     return x509.CertificateBuilder(
@@ -176,7 +176,7 @@ def _builder(
     )
 
 
-def _named(name: str) -> x509.Name:
+def _distinguished_name(name: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
 
 

@@ -63,7 +63,7 @@ class Gate:
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
         )
-        orders, answers = _pipes(process)
+        orders, answers = _process_pipes(process)
         settings = {
             "listen": self.endpoints,
             "connect": [self._hub],
@@ -83,7 +83,7 @@ class Gate:
     def _read(self) -> None:
         """Log the reports of the process, and restart an ended process; clients then reconnect."""
         while True:
-            answers = _pipes(self._process)[1]
+            answers = _process_pipes(self._process)[1]
             for line in answers:
                 level, _, message = line.rstrip().partition(" ")
                 log.log(int(level), "gate: %s", message)
@@ -94,11 +94,11 @@ class Gate:
             else:
                 log.warning("the list of revoked certificates has changed: restarting the gate with it")
             answers.close()
-            while not self._restart():
+            while not self._restart_process():
                 if self._closing.wait(_RETRY_S):
                     return
 
-    def _restart(self) -> bool:
+    def _restart_process(self) -> bool:
         with self._starting:
             if self._closing.is_set():
                 return False
@@ -117,13 +117,13 @@ class Gate:
             self._closing.set()
         _stop(self._process)
         self._reader.join()
-        _pipes(self._process)[1].close()
+        _process_pipes(self._process)[1].close()
 
 
 def _stop(process: subprocess.Popen[str]) -> int:
     """Stop a process by closing its input, or by force; return the exit code."""
     with suppress(BrokenPipeError):
-        _pipes(process)[0].close()
+        _process_pipes(process)[0].close()
     try:
         return process.wait(_STOP_S)
     except subprocess.TimeoutExpired:
@@ -131,7 +131,7 @@ def _stop(process: subprocess.Popen[str]) -> int:
         return process.wait()
 
 
-def _pipes(process: subprocess.Popen[str]) -> tuple[IO[str], IO[str]]:
+def _process_pipes(process: subprocess.Popen[str]) -> tuple[IO[str], IO[str]]:
     """Return the input and the output of a process."""
     if process.stdin is None or process.stdout is None:
         raise ValueError("the process of a gate needs pipes as input and output")

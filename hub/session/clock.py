@@ -108,9 +108,9 @@ class Clock:
             sleep(ahead_ns / 1e9)
         else:
             self.late_steps += count
-            self._slip(max(-ahead_ns - _CAUGHT_UP_NS, 0), now_ns)
+            self._slip_time(max(-ahead_ns - _CAUGHT_UP_NS, 0), now_ns)
 
-    def _slip(self, slip_ns: int, now_ns: int) -> None:
+    def _slip_time(self, slip_ns: int, now_ns: int) -> None:
         """Let simulated time slip; report the slip where devices lead."""
         self._wall_zero_ns += slip_ns
         self._slipped_ns += slip_ns

@@ -93,25 +93,33 @@ class ControlServer:
         self._thread = Thread(target=self._run, name="control", daemon=True)
         self._thread.start()
         self._queryables = [
-            self._declare(
+            self._declare_queryable(
                 session, keys.join("**"), JoinRequest, joins.join, lambda request: keys.join(request.host)
             ),
-            self._declare(session, keys.control("describe"), Empty, lambda _: description),
-            self._declare(session, keys.control("pause"), Empty, lambda _: self._done(state.pause())),
-            self._declare(session, keys.control("resume"), Empty, lambda _: self._done(state.resume())),
-            self._declare(
+            self._declare_queryable(session, keys.control("describe"), Empty, lambda _: description),
+            self._declare_queryable(
+                session, keys.control("pause"), Empty, lambda _: self._answer_done(state.pause())
+            ),
+            self._declare_queryable(
+                session, keys.control("resume"), Empty, lambda _: self._answer_done(state.resume())
+            ),
+            self._declare_queryable(
                 session,
                 keys.control("step"),
                 StepRequest,
-                lambda request: self._done(state.step(request.steps)),
+                lambda request: self._answer_done(state.step(request.steps)),
             ),
-            self._declare(session, keys.control("set"), SetRequest, self._set),
-            self._declare(session, keys.control("link"), NetworkLinkRequest, network_links.change_link),
-            self._declare(session, keys.control("clock"), Empty, self._clock),
-            self._declare(session, keys.control("shutdown"), Empty, lambda _: self._done(state.shutdown())),
+            self._declare_queryable(session, keys.control("set"), SetRequest, self._set),
+            self._declare_queryable(
+                session, keys.control("link"), NetworkLinkRequest, network_links.change_link
+            ),
+            self._declare_queryable(session, keys.control("clock"), Empty, self._clock),
+            self._declare_queryable(
+                session, keys.control("shutdown"), Empty, lambda _: self._answer_done(state.shutdown())
+            ),
         ]
 
-    def _declare(
+    def _declare_queryable(
         self,
         session: zenoh.Session,
         key: str,
@@ -145,13 +153,13 @@ class ControlServer:
             except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
                 self._refuse(query, key, _reason(error)[:_LONGEST_REASON])
             else:
-                _reply(query, at, reply)
+                _send_reply(query, at, reply)
 
         return session.declare_queryable(key, Callback(accept, indirect=False))
 
     def _refuse(self, query: zenoh.Query, key: str, reason: str) -> None:
         self._refusals.refuse(key, reason)
-        _reply(query, key, Refusal(refused=reason))
+        _send_reply(query, key, Refusal(refused=reason))
 
     def _run(self) -> None:
         while (answer := self._waiting.get()) is not None:
@@ -166,7 +174,7 @@ class ControlServer:
         return ClockReply(received_ns=received_ns, replied_ns=monotonic_ns())
 
     @staticmethod
-    def _done(_nothing: None) -> Empty:
+    def _answer_done(_nothing: None) -> Empty:
         return Empty()
 
     def _set(self, request: SetRequest) -> Empty:
@@ -189,7 +197,7 @@ class ControlServer:
         self._thread.join()
 
 
-def _reply(query: zenoh.Query, key: str, reply: BaseModel) -> None:
+def _send_reply(query: zenoh.Query, key: str, reply: BaseModel) -> None:
     with query:
         query.reply(
             key,

@@ -130,13 +130,13 @@ class RunProfile:
         if self._queue is not None and clock.realtime:
             waited_ns = self._queue.waited_ns()
             if late:
-                causes = self._causes(watch.round_ns(), waited_ns - self._waited_ns)
+                causes = self._split_causes(watch.round_ns(), waited_ns - self._waited_ns)
                 self._late.add(late, simulated_ns, clock.time_ns, causes)
             self._waited_ns = waited_ns
         watch.next_round()
         return self._wall_clock
 
-    def _causes(self, phases: dict[Phase, int], no_core_ns: int) -> dict[str, int]:
+    def _split_causes(self, phases: dict[Phase, int], no_core_ns: int) -> dict[str, int]:
         """Return the wall time (ns) of a grant by cause.
 
         The wait for a host is due to the participants there, as far as the participants computed. The time of

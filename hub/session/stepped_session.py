@@ -62,7 +62,7 @@ class SteppedSession:
         self._recorder: Recorder | None = None
         self._looking: set[str] = set()
         self._host = Host("hub", self.plan, self._stepped)
-        self._configure()
+        self._configure_all()
 
     def _make_participants(self) -> tuple[Plan, dict[str, Stepped]]:
         plan, made = plan_of(self._scenario, self._loaded.params)
@@ -83,7 +83,7 @@ class SteppedSession:
             if port.causality == "input" and port.name not in self.plan.connected_inputs(name)
         }
 
-    def _configure(self) -> None:
+    def _configure_all(self) -> None:
         """Configure all participants, and keep the initial states for `restart`."""
         self._host.configure(self._loaded.source.directory)
         self._first = {name: _copy_outputs(self._host.newest(name)) for name in self.plan.order}
@@ -108,7 +108,7 @@ class SteppedSession:
         self.close()
         self.plan, self._stepped = self._make_participants()
         self._host = Host("hub", self.plan, self._stepped)
-        self._configure()
+        self._configure_all()
         if record is not None:
             self._begin(record)
 
@@ -141,7 +141,7 @@ class SteppedSession:
         )
         while steps:
             count = min(steps, self._window)
-            self._grant(count, entering)
+            self._send_grant(count, entering)
             steps, entering = steps - count, ()
 
     def _samples(self, port: str, value: Value) -> list[Entering]:
@@ -157,18 +157,18 @@ class SteppedSession:
             Entering(name, input_port, False, np.frombuffer(payload, np.uint8), 0) for payload in payloads
         ]
 
-    def _grant(self, count: int, entering: tuple[Entering, ...]) -> None:
+    def _send_grant(self, count: int, entering: tuple[Entering, ...]) -> None:
         step_ns = self.plan.step_ns
         grant = Grant(_RUN, 0, self.step, self.time_ns, (self.step + count) * step_ns, entering)
         if self._monitor is not None:
             self._monitor.grant(grant, pack_grant(grant))
-        self._host.run(grant, self._book)
+        self._host.run(grant, self._book_work)
         self.step += count
         if self._monitor is not None:
             self._monitor.due_energy_books(self.time_ns)
             self._monitor.record()
 
-    def _book(self, planned: PlannedParticipant, ack: Ack) -> None:
+    def _book_work(self, planned: PlannedParticipant, ack: Ack) -> None:
         self._digests.add(planned.name, ack.state_hash)
         if self._monitor is not None:
             first = ack.step + -ack.step % planned.period

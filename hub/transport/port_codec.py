@@ -48,9 +48,9 @@ class PortCodec:
 
     def encode(self, value: Any, time_ns: int) -> bytes:
         """Return a vector or message as CDR."""
-        return self.vector.encode(value, time_ns) if self.vector is not None else self._encode(value)
+        return self.vector.encode(value, time_ns) if self.vector is not None else self._encode_value(value)
 
-    def _encode(self, message: Message) -> bytes:
+    def _encode_value(self, message: Message) -> bytes:
         newest, payload = self._newest
         if message is not newest:
             payload = encode(message)
@@ -66,7 +66,7 @@ class PortCodec:
 
     def pack(self, value: Any) -> bytes:
         """Return a signal's value for a bundle: a vector as numbers alone, a message as CDR."""
-        return value.tobytes() if self.vector is not None else self._encode(value)
+        return value.tobytes() if self.vector is not None else self._encode_value(value)
 
     def unpack(self, payload: bytes) -> Any:
         """Return a value packed by a `PortCodec` of the same port; raises MessageError if invalid."""

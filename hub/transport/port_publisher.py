@@ -85,7 +85,7 @@ class PortPublisher:
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`."""
         if self._bundles:
-            self._bundle(time_ns, value)
+            self._send_bundle(time_ns, value)
         if self._pages.needed:
             self._pages.put(step, time_ns, value)
         if not self._needed:
@@ -100,7 +100,7 @@ class PortPublisher:
                 self.codec.encode(message, time_ns), Tag.pack(self._run, 0, step, time_ns, index, len(value))
             )
 
-    def _bundle(self, time_ns: int, value: Any) -> None:
+    def _send_bundle(self, time_ns: int, value: Any) -> None:
         takers = [
             (bundle, index)
             for bundle, index in self._bundles

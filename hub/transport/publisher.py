@@ -42,10 +42,12 @@ class Publisher:
         """Whether there is a subscriber."""
         self._changed = changed
         if not always:
-            self._listener = self._publisher.declare_matching_listener(Callback(self._match, indirect=False))
-            self._match(self._publisher.matching_status)
+            self._listener = self._publisher.declare_matching_listener(
+                Callback(self._note_match, indirect=False)
+            )
+            self._note_match(self._publisher.matching_status)
 
-    def _match(self, status: Any) -> None:
+    def _note_match(self, status: Any) -> None:
         self.needed = bool(status.matching)
         self._changed()
 

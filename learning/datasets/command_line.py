@@ -92,7 +92,7 @@ def _pixels(size: str) -> tuple[int, int]:
 
 
 @contextmanager
-def _terminable() -> Generator[None]:
+def _raise_on_sigterm() -> Generator[None]:
     """Let SIGTERM and the end of the terminal interrupt the main thread, as Ctrl-C does."""
 
     def interrupt(*_: object) -> None:
@@ -121,7 +121,7 @@ def _run(recordings: list[Path], output: Path, wanted: Wanted) -> None:
     with NewDirectory(output, "data set") as new:
         conversion = Conversion(new.path, wanted)
         try:
-            with _terminable(), conversion as made, Progress(*columns, console=console) as bar:
+            with _raise_on_sigterm(), conversion as made, Progress(*columns, console=console) as bar:
                 counted = bar.add_task("recordings", total=len(recordings))
                 for path in recordings:
                     if note := made.add(path):

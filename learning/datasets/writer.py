@@ -170,7 +170,7 @@ class Writer:
 
     def _add_rows(self, columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         """Append rows to the data; return where they are."""
-        table = pa.table({name: _arrow(values) for name, values in columns.items()})
+        table = pa.table({name: _to_arrow_column(values) for name, values in columns.items()})
         limit = self._info["data_files_size_in_mb"] * _MB
         file = self._file("data", self._data_file, "parquet")
         if self._data is not None and file.stat().st_size > limit:
@@ -223,7 +223,7 @@ def _table(values: NDArray[Any]) -> NDArray[Any]:
     return values.reshape(len(values), -1)
 
 
-def _arrow(values: NDArray[Any]) -> Any:
+def _to_arrow_column(values: NDArray[Any]) -> Any:
     """Return rows as a column: lists of fixed length, or bare numbers where there is one in a row."""
     flat = pa.array(values.reshape(-1))
     width = values.size // len(values)

@@ -100,7 +100,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._settling = -(-settling_ns // self._session.plan.step_ns)
         self.exercise = exercise(cast("Task", self._session.participant("task")))
         self._view = self._new_view()
-        self._describe(len(self._view.vector()), (height, width, 3))
+        self._describe_spaces(len(self._view.vector()), (height, width, 3))
         self._closed = False
         self._episode, self._seen = 0, set[str]()
         self._goal = np.zeros(exercise.goal_size)
@@ -108,7 +108,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _new_view(self) -> EnvironmentView:
         return EnvironmentView(self._session, self.exercise.task, self.exercise.hands)
 
-    def _describe(self, size: int, picture: tuple[int, int, int]) -> None:
+    def _describe_spaces(self, size: int, picture: tuple[int, int, int]) -> None:
         """Set the spaces."""
         goal = spaces.Box(-_FAR, _FAR, (self.exercise.goal_size,), np.float32)
         parts: dict[str, spaces.Space[Any]] = {

@@ -93,7 +93,7 @@ def identify(
     except MotionError as error:
         raise typer.BadParameter(str(error), param_hint="--instrument") from error
     if excite:
-        _excite(output, arm, of_ecm() if tool is None else of_psm(tool, jaw=True), periods, seed)
+        _write_excitation(output, arm, of_ecm() if tool is None else of_psm(tool, jaw=True), periods, seed)
         return
     from learning.identification.figures import write_figure
     from learning.identification.measurements import has_jaw, measurements
@@ -117,7 +117,7 @@ def identify(
     typer.echo(f"wrote {output}; name it in a scenario: arms: {{{arm}: {{dynamics: {output}}}}}")
 
 
-def _excite(output: Path, arm: str, moving: IdentifiedArm, periods: int, seed: int) -> None:
+def _write_excitation(output: Path, arm: str, moving: IdentifiedArm, periods: int, seed: int) -> None:
     from learning.identification.excitation import write_excitation
     from robots.identification.excitation import PERIOD, excitation
 

@@ -63,7 +63,8 @@ class Sweep:
         for variation in self.variations:
             for value in variation.values:
                 trocar.load_scenario(
-                    self.scenario, set=self._fixed_settings() | _texts(first | {variation.path: value})
+                    self.scenario,
+                    set=self._fixed_settings() | _setting_texts(first | {variation.path: value}),
                 )
 
     @cached_property
@@ -72,7 +73,7 @@ class Sweep:
 
         Raises ScenarioError if the scenario is not valid.
         """
-        first = self._fixed_settings() | _texts(self.trials[0].settings)
+        first = self._fixed_settings() | _setting_texts(self.trials[0].settings)
         scenario = trocar.load_scenario(self.scenario, set=first).scenario
         return hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()
 
@@ -123,7 +124,7 @@ class Sweep:
         `ray` is the address of a Ray cluster with nodes for the trials; `jobs` is then left to Ray.
         """
         pending = self.pending()
-        made = _on_ray(ray, self._calls(pending)) if ray else _here(jobs, self._calls(pending))
+        made = _on_ray(ray, self._calls(pending)) if ray else _run_here(jobs, self._calls(pending))
         for number, found in made:
             row = {"scenario_hash": self.scenario_hash} | found
             _write(self._row(pending[number]), json.dumps(row, indent=2) + "\n")
@@ -135,7 +136,10 @@ class Sweep:
         return [
             (
                 scenario,
-                [*self.overrides, *(f"{path}={text}" for path, text in _texts(trial.settings).items())],
+                [
+                    *self.overrides,
+                    *(f"{path}={text}" for path, text in _setting_texts(trial.settings).items()),
+                ],
                 str(self.directory.resolve() / "trials" / trial.name) if self.recorded else None,
             )
             for trial in trials
@@ -160,7 +164,7 @@ class Sweep:
         return self.directory / "trials" / f"{trial.name}.json"
 
 
-def _here(jobs: int, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str, Any]]]:
+def _run_here(jobs: int, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str, Any]]]:
     from joblib import Parallel, delayed
 
     # threads: a trial is a process already, and one that dies takes no worker with it
@@ -187,7 +191,7 @@ def _call_numbered(number: int, call: _Call) -> tuple[int, dict[str, Any]]:
     return number, run_trial(*call)
 
 
-def _texts(settings: Mapping[str, Any]) -> dict[str, str]:
+def _setting_texts(settings: Mapping[str, Any]) -> dict[str, str]:
     """Return values as texts for `--set`."""
     return {path: json.dumps(value) for path, value in settings.items()}
 

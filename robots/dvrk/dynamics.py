@@ -82,7 +82,7 @@ class Dynamics:
         """
         self._chain.check_form(q)
         ways = (self._ratios * q.take(self._leaders, -1)).T  # (motions, ...)
-        steps, twists, ratios = self._exponentials(ways), self._over(self._twists, ways), self._ratios
+        steps, twists, ratios = self._twist_exponentials(ways), self._over(self._twists, ways), self._ratios
         above, poses = np.empty_like(steps), np.empty_like(steps)
         for i, (parent, *_) in enumerate(self._motions):
             above[i] = poses[parent] if parent >= 0 else _UNMOVED
@@ -129,7 +129,7 @@ class Dynamics:
         """Return `values`, one for each motion, such that they go with `ways`, shape (motions, ...)."""
         return values if ways.ndim == 1 else values[:, None]
 
-    def _exponentials(self, ways: Vector) -> Vector:
+    def _twist_exponentials(self, ways: Vector) -> Vector:
         """Return exp(w T), shape (motions, ..., 4, 4), for the twist T and the ways w of each motion.
 
         For a rotation it is 1 + sin w T + (1 - cos w) T^2 (Rodrigues), for a translation 1 + w T.

@@ -187,7 +187,7 @@ def _from_data(name: str, row: dict[str, Any], data: dict[str, Any]) -> Instrume
     return Instrument(
         name,
         number,
-        tuple(_joint(*cells) for cells in row["joints"]),
+        tuple(_tool_joint(*cells) for cells in row["joints"]),
         np.vstack([data["tips"][row["tip"]], [0.0, 0.0, 0.0, 1.0]]),
         jaw if jaw.effort else Electrode(),
         coupling,
@@ -204,7 +204,7 @@ def _jaw_numbers(
     return lower, upper, effort, _JAW_LENGTHS.get(number[3:], _OTHER_JAW_LENGTH), share
 
 
-def _joint(
+def _tool_joint(
     name: str, alpha: float, a: float, d: float, theta: float, lower: float, upper: float, effort: float
 ) -> Joint:
     limits = (WRIST_VELOCITY, effort, WRIST_ACCELERATION, jerk_limit(WRIST_ACCELERATION))

@@ -131,7 +131,7 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
     )
     best, each = cost.argmin(axis=0), np.arange(len(poses))
     reached = np.isfinite(cost[best, each])
-    if _any(~reached):
+    if _any_true(~reached):
         raise _unreachable(chain, branches[:, reached.argmin()], reached.argmin(), len(poses))
     q = np.minimum(np.maximum(branches[best, each], chain.lower), chain.upper)
     if n == len(ecm.JOINTS):
@@ -150,9 +150,9 @@ def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vect
         raise MotionError(f"positions `near` of shape {np.shape(near)}, expected {allowed}: {names}")
     poses = np.asarray(pose, np.float64).reshape(-1, 4, 4)
     start = np.asarray(near, np.float64).reshape(-1, n)  # (N, n), or (1, n) for all
-    if _any(~np.isfinite(poses)) or _any(~np.isfinite(start)):
+    if _any_true(~np.isfinite(poses)) or _any_true(~np.isfinite(start)):
         raise MotionError("a pose or a joint position that is not finite cannot be reached")
-    if _any(np.abs(poses[:, :3, 3]) > _FAR):
+    if _any_true(np.abs(poses[:, :3, 3]) > _FAR):
         raise MotionError(f"a position more than {_FAR:g} m away from the base cannot be reached")
     if (i := _first_unrigid(poses)) is not None:
         where = f" {i}" if len(poses) > 1 else ""
@@ -163,7 +163,7 @@ def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vect
     return poses, start
 
 
-def _any(flags: NDArray[np.bool_]) -> bool:
+def _any_true(flags: NDArray[np.bool_]) -> bool:
     return 1 in flags.tobytes()  # a quarter of the cost of flags.any()
 
 
@@ -172,8 +172,8 @@ def _first_unrigid(poses: Vector) -> int | None:
     rotation = poses[:, :3, :3]
     away = np.abs(rotation.swapaxes(-1, -2) @ rotation - _ONE) > _RIGID
     below = np.abs(poses[:, 3] - _BOTTOM) > _RIGID
-    mirrored = _dot(cross(rotation[:, :, 0], rotation[:, :, 1]), rotation[:, :, 2]) < 0.0
-    if not (_any(away) or _any(below) or _any(mirrored)):
+    mirrored = _dot_rows(cross(rotation[:, :, 0], rotation[:, :, 1]), rotation[:, :, 2]) < 0.0
+    if not (_any_true(away) or _any_true(below) or _any_true(mirrored)):
         return None
     return int((away.any(axis=(-2, -1)) | below.any(axis=-1) | mirrored).argmax())
 
@@ -226,11 +226,14 @@ def _branches_without_wrist(chain: SerialChain, position: Vector, rotation: Vect
     outwards = np.where(distance > _POINT, position / np.maximum(distance, _POINT), rotation[:, :, 2])
     shaft = outwards * _BRANCH_SIGNS[0][:2]  # (2, N, 3)
     q = np.empty((2, len(position), 4))
-    x3, y3 = _shaft_joints(chain, shaft, _dot(shaft, position) - chain.tip[2, 3], q)
+    x3, y3 = _shaft_joints(chain, shaft, _dot_rows(shaft, position) - chain.tip[2, 3], q)
     # The turn about the shaft that brings x4, y4 nearest to the goal's x and y (least squares of the
     # matrices' difference).
     x, y = rotation[:, :, 0], rotation[:, :, 1]
-    q[..., 3] = np.arctan2(_dot(x, y3) - _dot(y, x3), _dot(x, x3) + _dot(y, y3)) - chain.joints[3].theta
+    q[..., 3] = (
+        np.arctan2(_dot_rows(x, y3) - _dot_rows(y, x3), _dot_rows(x, x3) + _dot_rows(y, y3))
+        - chain.joints[3].theta
+    )
     return q
 
 
@@ -238,9 +241,9 @@ def _psm_branches(chain: SerialChain, ends: Vector, near: Vector) -> Vector:
     """Return the joint positions, shape (4, N, 6), of poses of the wrist yaw link, shape (N, 4, 4)."""
     yaw = chain.joints[5]
     x6, y6, yaw_axis, centre = ends[:, :3, 0], ends[:, :3, 1], ends[:, :3, 2], ends[:, :3, 3]
-    across = centre - _dot(centre, yaw_axis)[:, None] * yaw_axis
+    across = centre - _dot_rows(centre, yaw_axis)[:, None] * yaw_axis
     distance = _length(across)
-    if _any(distance <= _POINT):
+    if _any_true(distance <= _POINT):
         angle = near[:, 5:] + yaw.theta
         kept = np.cos(angle) * x6 - np.sin(angle) * y6  # x5 at the wrist yaw of `near`
         x5 = np.where(distance > _POINT, across / np.maximum(distance, _POINT), kept)
@@ -249,29 +252,31 @@ def _psm_branches(chain: SerialChain, ends: Vector, near: Vector) -> Vector:
     x5 = x5 * _BRANCH_SIGNS[0]  # (4, N, 3)
     z5 = cross(x5, yaw_axis)
     wrist = centre - yaw.a * x5
-    shaft = _shaft(chain, wrist, x5, z5, near) * _BRANCH_SIGNS[1]
+    shaft = _shaft_direction(chain, wrist, x5, z5, near) * _BRANCH_SIGNS[1]
     q = np.empty((4, len(ends), 6))
-    x3, y3 = _shaft_joints(chain, shaft, _dot(shaft, wrist), q)
-    np.arctan2(-_dot(z5, x3), _dot(z5, y3), out=q[..., 3])
-    np.arctan2(-_dot(x5, shaft), _dot(x5, cross(z5, shaft)), out=q[..., 4])
-    np.arctan2(-_dot(y6, x5), _dot(x6, x5), out=q[..., 5])
+    x3, y3 = _shaft_joints(chain, shaft, _dot_rows(shaft, wrist), q)
+    np.arctan2(-_dot_rows(z5, x3), _dot_rows(z5, y3), out=q[..., 3])
+    np.arctan2(-_dot_rows(x5, shaft), _dot_rows(x5, cross(z5, shaft)), out=q[..., 4])
+    np.arctan2(-_dot_rows(y6, x5), _dot_rows(x6, x5), out=q[..., 5])
     q[..., 3:] -= _form(chain).theta
     return q
 
 
-def _shaft(chain: SerialChain, wrist: Vector, x5: Vector, z5: Vector, near: Vector) -> Vector:
+def _shaft_direction(chain: SerialChain, wrist: Vector, x5: Vector, z5: Vector, near: Vector) -> Vector:
     """Return the direction of the shaft, shape (4, N, 3), which passes through RCM and wrist.
 
     It is perpendicular to the wrist pitch axis z5.
     """
     distance = _length(wrist)
-    shaft = wrist - _dot(wrist, z5)[..., None] * z5
-    if _any(distance <= _POINT):
+    shaft = wrist - _dot_rows(wrist, z5)[..., None] * z5
+    if _any_true(distance <= _POINT):
         yaw, pitch = near[:, 0], near[:, 1]
         old = np.stack([np.cos(pitch) * np.sin(yaw), -np.sin(pitch), -np.cos(pitch) * np.cos(yaw)], axis=-1)
         y5 = cross(z5, x5)
         joint = chain.joints[4]
-        bend = np.clip(np.arctan2(-_dot(old, y5), _dot(old, x5)), joint.lower, joint.upper)[..., None]
+        bend = np.clip(np.arctan2(-_dot_rows(old, y5), _dot_rows(old, x5)), joint.lower, joint.upper)[
+            ..., None
+        ]
         shaft = np.where(distance > _POINT, shaft, np.cos(bend) * x5 - np.sin(bend) * y5)
     return shaft / _length(shaft)
 
@@ -299,7 +304,7 @@ def _length(a: Vector) -> Vector:
     return np.sqrt(np.add.reduce(a * a, axis=-1, keepdims=True))
 
 
-def _dot(a: Vector, b: Vector) -> Vector:
+def _dot_rows(a: Vector, b: Vector) -> Vector:
     product: Vector = np.vecdot(a, b)
     return product
 

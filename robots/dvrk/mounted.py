@@ -169,7 +169,7 @@ class PsmTool(BaseModel):
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
 
     @property
-    def _stated(self) -> Mapping[str, Sequence[float]]:
+    def _stated_positions(self) -> Mapping[str, Sequence[float]]:
         """Stated positions at time 0, by the name of the end effector."""
         return {"jaw": (self.jaw,)}
 
@@ -181,7 +181,7 @@ class PsmTool(BaseModel):
     @property
     def end_effector_start(self) -> tuple[float, ...]:
         """Positions of the end effector's joints at time 0."""
-        return start_positions(self.end_effector, self._stated)
+        return start_positions(self.end_effector, self._stated_positions)
 
     @property
     def spheres(self) -> tuple[ContactSphere, ...]:
@@ -200,7 +200,7 @@ class PsmTool(BaseModel):
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start, self.end_effector, self._stated)
+        check_start(self.chain, self.start, self.end_effector, self._stated_positions)
         return self
 
 
@@ -232,8 +232,8 @@ class MountedPsm(PsmTool, MountedArm):
         return arm_bodies.psm(self.tool), drives.psm(self.tool), drives.discs(self.tool)
 
     @property
-    def _stated(self) -> Mapping[str, Sequence[float]]:
-        return {**super()._stated, "hand": self.hand}
+    def _stated_positions(self) -> Mapping[str, Sequence[float]]:
+        return {**super()._stated_positions, "hand": self.hand}
 
 
 class MountedEcm(MountedArm):

@@ -35,14 +35,14 @@ __all__ = [
 ArmName = Literal["PSM1", "PSM2", "PSM3"]
 
 
-def _unit(value: tuple[float, ...]) -> tuple[float, ...]:
+def _check_unit_quaternion(value: tuple[float, ...]) -> tuple[float, ...]:
     norm = float(np.linalg.norm(value))
     if abs(norm - 1.0) > 1e-6:
         raise ValueError(f"{value} is no unit quaternion (x, y, z, w): its norm is {distinct(norm, 1.0)[0]}")
     return value
 
 
-def _mountable(name: str) -> str:
+def _check_mountable(name: str) -> str:
     try:
         found = instrument(name)
     except MotionError as error:
@@ -62,7 +62,7 @@ def _text(name: Any) -> Any:
 InstrumentName = Annotated[
     str,
     BeforeValidator(_text),  # a number in YAML needs no quotes
-    AfterValidator(_mountable),
+    AfterValidator(_check_mountable),
     WithJsonSchema(
         {
             "anyOf": [{"type": "string"}, {"type": "integer"}],
@@ -81,7 +81,7 @@ SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
 MountedPositions = tuple[Angle, Angle, Length, Angle] | tuple[Angle, Angle, Length, Angle, Angle, Angle]
 """Positions of a PSM's joints (rad, m): four with a hand, else six."""
 
-UnitQuaternion = Annotated[tuple[float, float, float, float], AfterValidator(_unit)]
+UnitQuaternion = Annotated[tuple[float, float, float, float], AfterValidator(_check_unit_quaternion)]
 """A rotation as quaternion (x, y, z, w)."""
 
 HandPositions = tuple[Angle, Angle, Angle, Angle, Angle, Angle]

@@ -67,7 +67,7 @@ class Study:
     @property
     def regrasped(self) -> Mask:
         """Whether the standard needle driver can make each stitch, shape (n,), with a grasp chosen for it."""
-        return _any(self.constant, 1)
+        return _any_true(self.constant, 1)
 
     def shares(self, of: Mask | None = None) -> dict[str, float]:
         """Return the shares of feasible stitches, of all or of those in the mask `of`, shape (n,)."""
@@ -113,20 +113,20 @@ def _feasible(tool: Instrument, needle: Needle, alike: Sequence[Stitch], rolls: 
     q = held_needle.solutions(tool, seven, paths, rolls)  # (4, k, points, m, 6)
     allowed = _find_allowed(tool, q, stitch.tissue(one.tilt))
     # worth following: somehow possible at each point
-    whole = np.flatnonzero(_any(allowed, (0, 3)).sum(axis=1) == paths.shape[1])
-    branches = np.flatnonzero(_any(allowed, (1, 2, 3)))
+    whole = np.flatnonzero(_any_true(allowed, (0, 3)).sum(axis=1) == paths.shape[1])
+    branches = np.flatnonzero(_any_true(allowed, (1, 2, 3)))
     states, valid = _roll_by_a_turn(tool, q[branches][:, whole], allowed[branches][:, whole])
     seconds = (2.0 * one.entry + stitch.EMERGE) / (paths.shape[1] - 1) / DRIVE
     reach, turns = _reach(seven, seconds), int(seven.velocity[-1] * seconds / (rolls[1] - rolls[0]) + 1e-9)
     constant, rolling = np.zeros((len(alike), len(rolls)), bool), np.zeros(len(alike), bool)
     constant[whole], rolling[whole] = (
         _ways(states, valid, reach, 0),
-        _any(_ways(states, valid, reach, turns), 1),
+        _any_true(_ways(states, valid, reach, turns), 1),
     )
     return constant, rolling
 
 
-def _any(mask: Mask, axis: int | tuple[int, ...]) -> Mask:
+def _any_true(mask: Mask, axis: int | tuple[int, ...]) -> Mask:
     found: Mask = np.any(mask, axis=axis)
     return found
 
@@ -195,4 +195,4 @@ def _ways(q: Vector, valid: Mask, reach: Vector, turns: int) -> Mask:
                 near = (np.abs(q[to, :, :, i, new] - q[of, :, :, i - 1, old]) <= reach).all(axis=-1)
                 after[to, ..., new] |= near & alive[of, ..., old]
         alive = after & valid[..., i, :]
-    return _any(alive, (0, 1))
+    return _any_true(alive, (0, 1))

@@ -120,7 +120,7 @@ def fit(
     effort = measured - carried
     base = base_parameters(model)
     condition = _condition(regressor[seen], base)
-    sigma = _noise(regressor[seen][..., base.columns], effort[seen])
+    sigma = _residual_deviations(regressor[seen][..., base.columns], effort[seen])
     weighted = (regressor[seen] / sigma[:, None]).reshape(-1, regressor.shape[-1])
     goal = (effort[seen] / sigma).ravel()
     base_values, deviations = _least_squares(weighted[:, base.columns], goal)
@@ -192,7 +192,7 @@ def _with_friction(rows: _Rows, seen: slice) -> _Rows:
     base = base_parameters(model)
     coulomb = model.parts["coulomb"]
     fixed = [column for column in base.columns.tolist() if not coulomb.start <= column < coulomb.stop]
-    sigma = _noise(rows.regressor[seen][..., base.columns], effort[seen])[:, None]
+    sigma = _residual_deviations(rows.regressor[seen][..., base.columns], effort[seen])[:, None]
     weighted = [Candidate(one.shape, one.columns[seen] / sigma) for one in rows.dry]
     shape, picks = choose_shape(
         model.shares, rows.regressor[seen][..., fixed] / sigma, weighted, effort[seen] / sigma[:, 0]
@@ -235,7 +235,7 @@ def _samples_per_independent(samples: Samples) -> float:
     return max(1.0, 1.0 / (2.0 * samples.cutoff * float(samples.time[1] - samples.time[0])))
 
 
-def _noise(regressor: Vector, effort: Vector) -> Vector:
+def _residual_deviations(regressor: Vector, effort: Vector) -> Vector:
     """Return the standard deviation of the residual of unweighted least squares by joint, shape (n,)."""
     count, n, size = regressor.shape
     found = np.linalg.lstsq(regressor.reshape(-1, size), effort.ravel())[0]

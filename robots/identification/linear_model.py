@@ -105,13 +105,13 @@ class LinearModel:
         Arguments (N, n); results (N, n, P) and (N, n).
         """
         parts = [
-            self._some(*(values[first : first + _AT_ONCE] for values in (q, dq, ddq)))
+            self._regressor_of_some(*(values[first : first + _AT_ONCE] for values in (q, dq, ddq)))
             for first in range(0, len(q), _AT_ONCE)
         ]
         regressor, carried = (np.concatenate(column) for column in zip(*parts, strict=True))
         return regressor, carried
 
-    def _some(self, q: Vector, dq: Vector, ddq: Vector) -> tuple[Vector, Vector]:
+    def _regressor_of_some(self, q: Vector, dq: Vector, ddq: Vector) -> tuple[Vector, Vector]:
         (count, n), moving = q.shape, len(self.arm.chain.joints)
         gradients = np.zeros((count, n, len(self.arm.bodies) + len(self._carried), 4, 4))
         gradients[:, :moving] = self._dynamics.effort_gradients(
@@ -120,9 +120,9 @@ class LinearModel:
         bodies, known = np.split(gradients, [len(self.arm.bodies)], axis=2)
         parts = [
             (bodies[..., _UPPER[0], _UPPER[1]] * _TWICE).reshape(count, n, -1),
-            _diagonal(ddq),
-            _diagonal(q),
-            _diagonal(np.ones_like(q)),
+            _diagonal_matrices(ddq),
+            _diagonal_matrices(q),
+            _diagonal_matrices(np.ones_like(q)),
             self.spread(dq @ self.shares.T),
             self.dry(dq, self.shape),
         ]
@@ -150,6 +150,6 @@ def pseudo_inertias(parameters: Vector) -> Vector:
     return result
 
 
-def _diagonal(values: Vector) -> Vector:
+def _diagonal_matrices(values: Vector) -> Vector:
     """Return a diagonal matrix for each row: (N, n) to (N, n, n)."""
     return values[:, :, None] * np.eye(values.shape[1])

@@ -36,7 +36,7 @@ def own_dynamics(found: Fit, cutoff: float, recordings: Sequence[str]) -> OwnDyn
             )
         },
         discs=[losses for name, losses in friction.items() if name not in model.joints],
-        fit=_how(found, cutoff, recordings),
+        fit=_fit_provenance(found, cutoff, recordings),
     )
 
 
@@ -54,7 +54,7 @@ def _friction(model: LinearModel, values: Mapping[str, list[float]]) -> dict[str
     }
 
 
-def _how(found: Fit, cutoff: float, recordings: Sequence[str]) -> dict[str, Any]:
+def _fit_provenance(found: Fit, cutoff: float, recordings: Sequence[str]) -> dict[str, Any]:
     model = found.model
     return {
         "recordings": list(recordings),

@@ -90,7 +90,9 @@ _SRC_BASE, _SRC_MID, _SRC_TIP = (-9.513e-3, 1.026e-3), (-4.099e-3, 8.965e-3), (6
 """SRC: frames of the needle in the frame of the mesh, m; the tip is on the right in SRC."""
 
 
-def _through(base: tuple[float, float], mid: tuple[float, float], tip: tuple[float, float]) -> NeedleShape:
+def _needle_through(
+    base: tuple[float, float], mid: tuple[float, float], tip: tuple[float, float]
+) -> NeedleShape:
     """Return the needle through three points of a plane, m."""
     a, b, c = (np.array(point) for point in (base, mid, tip))
     # the centre is as far from b and c as from a
@@ -105,7 +107,7 @@ def _through(base: tuple[float, float], mid: tuple[float, float], tip: tuple[flo
     )
 
 
-_SRC = _through(_SRC_BASE, _SRC_MID, _SRC_TIP)
+_SRC = _needle_through(_SRC_BASE, _SRC_MID, _SRC_TIP)
 """SRC: radius 9.39 mm, 132.5 degrees from base to tip, mesh 1.0 mm thick. The mass in SRC, 0.5 kg, would mean
 a density of 29 kg/cm^3; our needles are of steel.
 """

@@ -66,7 +66,7 @@ def _frames(rows: Sequence[_Row]) -> Vector:
     return frames
 
 
-def _src(
+def _src_phantom(
     skin: tuple[float, float, float], base: float, entries: Sequence[_Row], exits: Sequence[_Row]
 ) -> Phantom:
     """Return a phantom from frames in a world with the surgeon's right at -x, centred on the frames."""
@@ -78,7 +78,7 @@ def _src(
     return Phantom(skin, base, holes[: len(entries)], holes[len(entries) :])
 
 
-_3D_MED = _src(
+_3D_MED = _src_phantom(
     (0.075, 0.075, 0.012),
     0.010,
     (
@@ -96,7 +96,7 @@ _3D_MED = _src(
 )
 """SRC, 3D_MED. The outline in SRC is a mesh; the size of our pad is assumed, wide enough for all stitches."""
 
-_STRAIGHT = _src(
+_STRAIGHT = _src_phantom(
     (0.075, 0.075, 0.012),
     0.010,
     (
@@ -116,7 +116,7 @@ _STRAIGHT = _src(
 is assumed.
 """
 
-_SIMPLE = _src(
+_SIMPLE = _src_phantom(
     (0.0797, 0.173, 0.012),
     0.0273,
     (

@@ -62,7 +62,7 @@ class Stitches(Metric[StitchesState]):
         state, tissue = self.state, self._tissue
         for event in events:
             if event.kind in ("entered", "exited"):
-                self._mark(event, tissue.entry if event.kind == "entered" else tissue.exit)
+                self._mark_hole(event, tissue.entry if event.kind == "entered" else tissue.exit)
             state.made += event.kind == "stitched"
             state.withdrawn += event.kind == "withdrawn"
             if event.kind in ("entered", "stitched", "withdrawn"):
@@ -72,7 +72,7 @@ class Stitches(Metric[StitchesState]):
         state.swept += tissue.trauma * now.period_s
         state.inside += state.is_inside * now.period_s
 
-    def _mark(self, event: Event, at: Vector) -> None:
+    def _mark_hole(self, event: Event, at: Vector) -> None:
         state, side = self.state, int(event.kind == "exited")
         if event.place < 0:
             state.missed += 1

@@ -95,7 +95,7 @@ def _make(parameters: SessionParameters, name: str, rules: Sequence[str]) -> Tas
 
 def _without_task(recording: Recording, rules: Sequence[str], *, trust: bool) -> Scored:
     """Return the score by a task missing in the session, from the scene of the robot."""
-    robot, scene = _robot(recording)
+    robot, scene = _robot_participant(recording)
     arms = {
         arm: one for arm, one in _table(scene, "arms").items() if f"{robot}.{arm}/measured_cp" in recording
     }
@@ -117,7 +117,7 @@ def _without_task(recording: Recording, rules: Sequence[str], *, trust: bool) ->
     return score(task, streams | _hands(recording, task), _PERIOD_NS)
 
 
-def _robot(recording: Recording) -> tuple[str, dict[str, Any]]:
+def _robot_participant(recording: Recording) -> tuple[str, dict[str, Any]]:
     """Return the participant publishing the poses of arms, best an engine, and the parameters."""
     plan, specs = recording.plan(), recording.scenario().participants
     engines = {name for name, planned in plan.participants.items() if planned.role == "engine"}

@@ -80,10 +80,10 @@ class Icra2026(Rules[Icra2026State]):
         points = self._legs.state.total
         yield ScoreValue(name="points", value=float(points))
         yield ScoreValue(name="placed_any", value=float(points > 0))
-        yield self._tie()
+        yield self._tie_breaker()
         yield ScoreValue(name="time", value=self.state.time, unit="s")
 
-    def _tie(self) -> ScoreValue:
+    def _tie_breaker(self) -> ScoreValue:
         return ScoreValue(name="tie", value=self.state.motion, unit="m")
 
 
@@ -97,7 +97,7 @@ class Icra2026Live(Icra2026):
     name: ClassVar[str] = "icra2026-live"
     _goes_on: ClassVar[bool] = True
 
-    def _tie(self) -> ScoreValue:
+    def _tie_breaker(self) -> ScoreValue:
         if self.state.last < 0.0:
             return ScoreValue(name="tie", unit="s", reason="no ring has been placed")
         return ScoreValue(name="tie", value=self.state.last, unit="s")

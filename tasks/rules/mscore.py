@@ -43,7 +43,7 @@ class MScore(Rules[MScoreState]):
             yield ScoreValue(name="passed", reason=reason)
             yield ScoreValue(name="metrics_passed", reason=reason)
             return
-        passed = sum(self._passes(metrics[name]) for name in self._benchmarks)
+        passed = sum(self._passes_benchmark(metrics[name]) for name in self._benchmarks)
         without = [name for name in self._benchmarks if metrics[name].reason]
         if without:
             yield ScoreValue(name="passed", reason=f"{without[0]}: {metrics[without[0]].reason}")
@@ -51,7 +51,7 @@ class MScore(Rules[MScoreState]):
             yield ScoreValue(name="passed", value=float(passed == len(self._benchmarks)))
         yield ScoreValue(name="metrics_passed", value=float(passed))
 
-    def _passes(self, metric: ScoreValue) -> bool:
+    def _passes_benchmark(self, metric: ScoreValue) -> bool:
         limit = self._benchmarks[metric.name]
         if metric.reason:
             return False

@@ -124,7 +124,7 @@ class _Shapes(Channel):
         for number, part in enumerate(self._scene.parts):
             shape = _triangles(part.vertices, part.faces, part.colour)
             frame = f"{self._participant}/{self._scene.bodies[part.body]}"
-            yield _entity(f"{self._participant}/{number}", frame, shape, 0)
+            yield _scene_entity(f"{self._participant}/{number}", frame, shape, 0)
 
 
 class _Surface(Channel):
@@ -142,7 +142,9 @@ class _Surface(Channel):
         nodes = decode(SoftBodyState, value.payload).nodes_m.reshape(-1, 3)
         faces = decode(SoftBodyState, first.payload).triangles.reshape(-1, 3)
         if faces.size and faces.max() < len(nodes):
-            yield _entity(self._name, WORLD, _triangles(nodes, faces, (*self._colour, 1.0)), value.time_ns)
+            yield _scene_entity(
+                self._name, WORLD, _triangles(nodes, faces, (*self._colour, 1.0)), value.time_ns
+            )
 
 
 def channels_of(
@@ -171,7 +173,7 @@ def _stamp(time_ns: int) -> Timestamp:
     return Timestamp(*divmod(time_ns, 10**9))
 
 
-def _entity(name: str, frame: str, shape: TriangleListPrimitive, time_ns: int) -> bytes:
+def _scene_entity(name: str, frame: str, shape: TriangleListPrimitive, time_ns: int) -> bytes:
     made = SceneEntity(
         timestamp=_stamp(time_ns), frame_id=frame, id=name, frame_locked=True, triangles=[shape]
     )

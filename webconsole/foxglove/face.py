@@ -97,7 +97,7 @@ class Face:
         if self._feeding is None:
             self._feeding = asyncio.create_task(self._feed())
         try:
-            await self._relay(websocket)
+            await self._relay_messages(websocket)
         finally:
             self._clients -= 1
             if not self._clients:
@@ -105,7 +105,7 @@ class Face:
                 self._feeding = None
                 self._console.want(self, None)
 
-    async def _relay(self, websocket: WebSocket) -> None:
+    async def _relay_messages(self, websocket: WebSocket) -> None:
         offered = [Subprotocol(one) for one in websocket.scope["subprotocols"]]
         address = f"wss://{_LOOPBACK}:{self.port}"
         try:
@@ -113,7 +113,9 @@ class Face:
                 address, ssl=self._trust, subprotocols=offered, compression=None, max_size=None, proxy=None
             ) as inside:
                 await websocket.accept(subprotocol=inside.subprotocol)
-                ways = [asyncio.create_task(way) for way in (_in(websocket, inside), _out(websocket, inside))]
+                ways = [
+                    asyncio.create_task(way) for way in (_in(websocket, inside), _send_out(websocket, inside))
+                ]
                 await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
                 for way in ways:
                     way.cancel()
@@ -129,7 +131,7 @@ class Face:
         while True:
             try:
                 await self._follow()
-                self._repeat()
+                self._repeat_constants()
                 for channel in self._channels:
                     channel.put(lambda name: source.newest(name, None))
             except TrocarError as error:
@@ -143,7 +145,7 @@ class Face:
     def _wanted_outlets(self) -> Iterator[str]:
         return (name for channel in self._channels if channel.has_subscribers for name in channel.outlets)
 
-    def _repeat(self) -> None:
+    def _repeat_constants(self) -> None:
         """Send constant values once more to new subscribers."""
         asked = {self._subscribed.topics.popleft() for _ in range(len(self._subscribed.topics))}
         for channel in self._channels:
@@ -172,7 +174,7 @@ async def _in(websocket: WebSocket, inside: ClientConnection) -> None:
         await inside.send(message.get("text") or message.get("bytes") or b"")
 
 
-async def _out(websocket: WebSocket, inside: ClientConnection) -> None:
+async def _send_out(websocket: WebSocket, inside: ClientConnection) -> None:
     async for message in inside:
         with suppress(WebSocketDisconnect):
             if isinstance(message, str):

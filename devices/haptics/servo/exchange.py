@@ -142,12 +142,12 @@ class RingReader(_Ring):
             return []
         first = max(self._seen + 1, newest - self._slots + 1)
         found = [
-            record for number in range(first, newest + 1) if (record := self._intact(number)) is not None
+            record for number in range(first, newest + 1) if (record := self._is_intact(number)) is not None
         ]
         self._seen = newest
         return found
 
-    def _intact(self, number: int) -> tuple[float, ...] | None:
+    def _is_intact(self, number: int) -> tuple[float, ...] | None:
         at = number % self._slots * self._size
         slot = bytes(self._memory[at : at + self._size])
         content = slot[_HEAD.size :]

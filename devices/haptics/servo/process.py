@@ -73,7 +73,7 @@ class ServoProcess:
             for file in inherited:
                 os.close(file)
         self._said: SimpleQueue[dict[str, Any]] = SimpleQueue()
-        self._listener = threading.Thread(target=self._listen, name="servo process", daemon=True)
+        self._listener = threading.Thread(target=self._listen_to_process, name="servo process", daemon=True)
         self._listener.start()
         styluses = [asdict(spec) for spec in specs]
         self._send(asdict(driver) | {"memory": handle, "styluses": styluses})
@@ -140,7 +140,7 @@ class ServoProcess:
             self._process.stdin.write(json.dumps(message) + "\n")
             self._process.stdin.flush()
 
-    def _listen(self) -> None:
+    def _listen_to_process(self) -> None:
         assert self._process.stdout
         with self._process.stdout as lines:
             for line in lines:

@@ -56,7 +56,7 @@ class Stylus:
             bool(reading.buttons >> dead_man & 1) if isinstance(dead_man, int) else reading.switch
         )
         self._judge(now, reading, watched=watched)
-        self._driver.write(self.handle, self._render(now))
+        self._driver.write(self.handle, self._render_force(now))
 
     def on_error(self, code: int, phase: ServoPhase, now: float) -> None:
         """Handle an error reported by the driver after the tick at `now`.
@@ -104,7 +104,7 @@ class Stylus:
         elif phase is not _READY:
             self.phase, self._code = _READY, 0
 
-    def _render(self, now: float) -> Vector3:
+    def _render_force(self, now: float) -> Vector3:
         """Return the force (N) on the hand."""
         loop, reading = self._loop, self._reading
         if loop is None:

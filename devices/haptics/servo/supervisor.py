@@ -98,11 +98,11 @@ class Supervisor:
         """Supervise the processes; return the new states of each open stylus, oldest first."""
         states: dict[str, list[State]] = {}
         if self._process is not None:
-            states = self._attend(self._process, now)
+            states = self._attend_process(self._process, now)
         if self._probe is not None and (found := self._probe.poll(now)) is not None:
             self._probe = None
             self._use(found, now)
-        self._retry(now)
+        self._retry_lost(now)
         return states
 
     def close(self) -> None:
@@ -118,7 +118,7 @@ class Supervisor:
         self._ending, self._has_ticked = None, False
         self._held = dict.fromkeys(self._specs, False)
 
-    def _attend(self, process: ServoProcess, now: float) -> dict[str, list[State]]:
+    def _attend_process(self, process: ServoProcess, now: float) -> dict[str, list[State]]:
         for message in process.read_messages():
             self._on_message(process, message, now)
         states: dict[str, list[State]] = {}
@@ -130,7 +130,7 @@ class Supervisor:
             last = new[-1]
             self._held[name] = bool(last.permitted)
             if ServoPhase(last.phase).is_lost:
-                self._lose(name, ServoPhase(last.phase), last.code, "", now)
+                self._lose_stylus(name, ServoPhase(last.phase), last.code, "", now)
                 self._end(process, now)
             elif name not in self.lost:
                 states[name] = new
@@ -139,14 +139,14 @@ class Supervisor:
 
     def _on_message(self, process: ServoProcess, message: dict[str, Any], now: float) -> None:
         if "absent" in message:
-            self._lose(message["stylus"], *absence(message), "", now)
+            self._lose_stylus(message["stylus"], *absence(message), "", now)
             if self.lost.keys() >= set(process.names):
                 self._end(process, now)
         elif "stylus" in message:
             self._opened(process, message)
         elif "failed" in message:
             for name in process.names:
-                self._lose(name, ServoPhase.FAULT, 0, message["failed"], now)
+                self._lose_stylus(name, ServoPhase.FAULT, 0, message["failed"], now)
         elif message.get("priority") == "normal" and not self._warned:
             self._warned = True
             log.warning(_NO_PRIORITY)
@@ -157,7 +157,7 @@ class Supervisor:
         if not ended and self._ending is None and now - self._last_frame > patience:
             self._end(process, now)
             for name in process.names:
-                self._lose(name, ServoPhase.FAULT, 0, f"no frame for {patience:g} s", now)
+                self._lose_stylus(name, ServoPhase.FAULT, 0, f"no frame for {patience:g} s", now)
         if not ended and self._ending is not None and now - self._ending > _ENDING:
             process.kill()
         if ended:
@@ -165,7 +165,7 @@ class Supervisor:
             if self._ending is None:
                 cause = _STOOD_STILL if process.was_killed_by_watcher else "the servo process has ended"
                 for name in process.names:
-                    self._lose(name, ServoPhase.FAULT, 0, cause, now)
+                    self._lose_stylus(name, ServoPhase.FAULT, 0, cause, now)
             self._process = None
 
     def _end(self, process: ServoProcess, now: float) -> None:
@@ -173,7 +173,7 @@ class Supervisor:
             self._ending = now
             process.end()
 
-    def _lose(self, name: str, phase: ServoPhase, code: int, cause: str, now: float) -> None:
+    def _lose_stylus(self, name: str, phase: ServoPhase, code: int, cause: str, now: float) -> None:
         if name in self.lost:
             self.lost[name].cause = self.lost[name].cause or cause
             return
@@ -182,7 +182,7 @@ class Supervisor:
         self._delays[name] = min(2.0 * delay, _LAST_RETRY)
         self.lost[name] = Lost(phase, code, cause, now + delay)
 
-    def _retry(self, now: float) -> None:
+    def _retry_lost(self, now: float) -> None:
         """Start the servo process or a probe if a lost stylus is due."""
         due = [
             name

@@ -77,7 +77,7 @@ def export(
     """
     plan = recording.plan()
     shown = _gateway(recording, plan, gateway, trust=trust)
-    routes = {name: rows for name, rows in _routes(plan, shown).items() if name in recording.topics}
+    routes = {name: rows for name, rows in _recorded_routes(plan, shown).items() if name in recording.topics}
     with BagWriter(directory) as bag:
         replay, last_ns = _Replay(shown, routes, _RowWriter(bag, recording.started_ns())), -1
         for message in recording.messages(*routes):
@@ -131,7 +131,7 @@ def _gateway(recording: Recording, plan: Plan, name: str | None, *, trust: bool)
     return made
 
 
-def _routes(plan: Plan, gateway: Gateway) -> _Routes:
+def _recorded_routes(plan: Plan, gateway: Gateway) -> _Routes:
     rows = {row.port.name: row for row in gateway.rows if row.port is not None}
     routes: defaultdict[str, list[tuple[Row, Port]]] = defaultdict(list)
     for connection in plan.to_devices:
@@ -204,9 +204,9 @@ class _Replay:
                 every = periods_between(row.name, self._period_ns)
                 self._periodic.append((row, whole_robot[row.name], every))
             elif row.name == "robot_description" and gateway.params.robot_description is not None:
-                self._describe(row, gateway.params.robot_description)
+                self._describe_topic(row, gateway.params.robot_description)
 
-    def _describe(self, row: Row, file: Path) -> None:
+    def _describe_topic(self, row: Row, file: Path) -> None:
         try:
             self._bag.write(row, 0, StringMessage(data=robot_description(file)))
         except DeviceError as error:

@@ -64,14 +64,14 @@ class DdsGateway(Gateway):
             raise MissingExtraError(f"device '{self.name}'", "ros2-dds", "cyclonedds") from error
         where = self._where
         # resolved here, because Cyclone DDS ends the process for a name that it cannot resolve
-        peers = [_address(peer) for peer in where.peers]
+        peers = [_resolve_address(peer) for peer in where.peers]
         joined = domain(where.domain, configuration(where.discovery, peers))
         hosts = ["127.0.0.1", *peers] if where.discovery == "localhost" else peers
         services = ServiceParticipant(where.domain, multicast=where.discovery == "subnet", hosts=hosts)
         return DdsTransport(joined, where.domain, services)
 
 
-def _address(peer: str) -> str:
+def _resolve_address(peer: str) -> str:
     """Return the address of another machine. Raises DeviceError if the name cannot be resolved."""
     try:
         return socket.gethostbyname(peer)

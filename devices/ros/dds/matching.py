@@ -134,7 +134,7 @@ class Matching:
         proxy = self.proxies[prefix]
         found = self._reader_of(proxy.publications[writer_id], prefix)
         if found is not None and writer_id not in proxy.readers:
-            self._match(prefix, proxy, writer_id, *found)
+            self._match_endpoint(prefix, proxy, writer_id, *found)
 
     def _on_unmatched(self, prefix: bytes, proxy: ParticipantProxy, part: FromWriter) -> None:
         """Match an undiscovered writer with the addressed reader, or discover the writer now."""
@@ -144,12 +144,12 @@ class Matching:
         for subscription in self._subscriptions:
             if subscription.reader_id == part.reader_id:
                 deliver = partial(_on_message, subscription, prefix)
-                self._match(prefix, proxy, part.writer_id, part.reader_id, deliver)
+                self._match_endpoint(prefix, proxy, part.writer_id, part.reader_id, deliver)
                 return
         if prefix.startswith(FAST_DDS):
             proxy.readers[PUBLICATIONS_WRITER].request_heartbeat()
 
-    def _match(
+    def _match_endpoint(
         self,
         prefix: bytes,
         proxy: ParticipantProxy,

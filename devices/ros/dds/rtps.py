@@ -139,10 +139,10 @@ class Message:
 def encode_message(source: bytes, destination: bytes, submessages: Iterable[bytes]) -> bytes:
     """Return a message with INFO_DST; `source` and `destination` are GUID prefixes, the latter 0 for all."""
     header = b"RTPS\x02\x03" + source[:2] + source
-    return header + _submessage(_INFO_DST, 0, destination) + b"".join(submessages)
+    return header + _encode_submessage(_INFO_DST, 0, destination) + b"".join(submessages)
 
 
-def _submessage(kind: int, flags: int, content: bytes) -> bytes:
+def _encode_submessage(kind: int, flags: int, content: bytes) -> bytes:
     content += bytes(-len(content) % 4)
     return struct.pack("<BBH", kind, flags | _LITTLE_ENDIAN, len(content)) + content
 
@@ -163,33 +163,35 @@ def encode_data(
     qos = encode_parameters(inline_qos) if inline_qos else b""
     flags = (_DATA_PRESENT if payload else 0) | (_INLINE_QOS if inline_qos else 0)
     head = struct.pack("<HH", 0, 16) + reader_id + writer_id + encode_sequence_number(sequence_number)
-    return _submessage(_DATA, flags, head + qos + payload)
+    return _encode_submessage(_DATA, flags, head + qos + payload)
 
 
 def encode_heartbeat(writer_id: bytes, reader_id: bytes, first: int, last: int, count: int) -> bytes:
     """Return a HEARTBEAT submessage with a required ACKNACK."""
     numbers = encode_sequence_number(first) + encode_sequence_number(last)
-    return _submessage(_HEARTBEAT, 0, reader_id + writer_id + numbers + struct.pack("<I", count))
+    return _encode_submessage(_HEARTBEAT, 0, reader_id + writer_id + numbers + struct.pack("<I", count))
 
 
 def encode_acknack(
     writer_id: bytes, reader_id: bytes, base: int, missing: Iterable[int], count: int
 ) -> bytes:
     """Return an ACKNACK submessage: has all before `base`, requests `missing` (within 256 of `base`)."""
-    numbers = encode_sequence_number(base) + _bitmap(base, missing)
-    return _submessage(_ACKNACK, _FINAL, reader_id + writer_id + numbers + struct.pack("<I", count))
+    numbers = encode_sequence_number(base) + _number_set_bitmap(base, missing)
+    return _encode_submessage(_ACKNACK, _FINAL, reader_id + writer_id + numbers + struct.pack("<I", count))
 
 
 def encode_nack_fragments(
     writer_id: bytes, reader_id: bytes, sequence_number: int, missing: Sequence[int], count: int
 ) -> bytes:
     """Return a NACK_FRAG submessage: of a sample, the fragments `missing` (within 256 of the first)."""
-    numbers = struct.pack("<I", missing[0]) + _bitmap(missing[0], missing)
+    numbers = struct.pack("<I", missing[0]) + _number_set_bitmap(missing[0], missing)
     sample = encode_sequence_number(sequence_number)
-    return _submessage(_NACK_FRAG, 0, reader_id + writer_id + sample + numbers + struct.pack("<I", count))
+    return _encode_submessage(
+        _NACK_FRAG, 0, reader_id + writer_id + sample + numbers + struct.pack("<I", count)
+    )
 
 
-def _bitmap(base: int, members: Iterable[int]) -> bytes:
+def _number_set_bitmap(base: int, members: Iterable[int]) -> bytes:
     """Return number of bits and bitmap of a set of numbers, without numbers beyond 256 from `base`."""
     offsets = [number - base for number in members if number - base < _MOST_IN_SET]
     bits = max(offsets, default=-1) + 1
@@ -237,12 +239,12 @@ def parse_message(datagram: bytes, own: bytes) -> Message:
     if len(datagram) < 20 or datagram[:4] != b"RTPS":
         raise MessageError(f"{len(datagram)} bytes are no message of RTPS")
     try:
-        return Message(datagram[8:20], tuple(_submessages(datagram, own)))
+        return Message(datagram[8:20], tuple(_parse_submessages(datagram, own)))
     except (struct.error, IndexError) as error:
         raise MessageError(f"{len(datagram)} bytes are a truncated message of RTPS: {error}") from error
 
 
-def _submessages(datagram: bytes, own: bytes) -> Iterator[Submessage]:
+def _parse_submessages(datagram: bytes, own: bytes) -> Iterator[Submessage]:
     at, is_ours = 20, True
     while at + 4 <= len(datagram):
         kind, flags, length = struct.unpack_from("<BBH", datagram, at)

@@ -81,7 +81,7 @@ class DdsTransport(Transport):
         """GUIDs of the reader and the writer of each service."""
         self._info = self._writer(INFO_TOPIC, payload_type(INFO_TYPE), LATCHED)
         self._closed = False
-        self._announce()
+        self._announce_node()
 
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
         type_ = payload_type(row.type)
@@ -89,7 +89,7 @@ class DdsTransport(Transport):
         topic = f"rt{row.topic}"
         writer = self._writer(topic, type_, quality, row.type)
         self._writers.append(writer)
-        self._announce()
+        self._announce_node()
         return _Publisher(writer, type_, None if row.latched else partial(self._discovery.is_read, topic))
 
     def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
@@ -97,13 +97,15 @@ class DdsTransport(Transport):
             receive(payload, self._discovery.sender(participant))
 
         self._topics.add(f"rt{row.topic}")
-        self._readers.append(self._services.subscribe(row.topic, row.type, _typehash(row.type), on_message))
-        self._announce()
+        self._readers.append(
+            self._services.subscribe(row.topic, row.type, _type_hash_data(row.type), on_message)
+        )
+        self._announce_node()
 
     def serve(self, row: Row, handle: ServiceHandler) -> None:  # noqa: D102
         self._topics |= {f"rq{row.topic}Request", f"rr{row.topic}Reply"}
         self._served.append(self._services.serve(row.topic, row.type, handle))
-        self._announce()
+        self._announce_node()
 
     def clients(self) -> tuple[Client, ...]:  # noqa: D102
         return self._discovery.clients(self._topics)
@@ -125,7 +127,7 @@ class DdsTransport(Transport):
             self._participant, Topic(self._participant, topic, type_), quality + _hash_type(ros_type)
         )
 
-    def _announce(self) -> None:
+    def _announce_node(self) -> None:
         """Publish the node of our readers and writers."""
         readers = [*self._readers, *(reader for reader, _ in self._served)]
         writers = [*(writer.guid.bytes for writer in self._writers), *(writer for _, writer in self._served)]
@@ -133,9 +135,9 @@ class DdsTransport(Transport):
 
 
 def _hash_type(ros_type: str) -> Qos:
-    return Qos(Policy.Userdata(_typehash(ros_type).encode())) if ros_type else Qos()
+    return Qos(Policy.Userdata(_type_hash_data(ros_type).encode())) if ros_type else Qos()
 
 
-def _typehash(ros_type: str) -> str:
+def _type_hash_data(ros_type: str) -> str:
     """Return the user data with the hash (REP-2016) of a topic's type."""
     return f"typehash={rihs01(ros_type)};"

@@ -76,7 +76,7 @@ def payload_type(ros_type: str) -> type[Payload]:
 
 
 @cache
-def _struct(ros_type: str) -> type[IdlStruct]:
+def _idl_struct(ros_type: str) -> type[IdlStruct]:
     return make_idl_struct(_class_name(ros_type), _dds_name(ros_type), _fields(ros_type))
 
 
@@ -88,7 +88,7 @@ def _type(described: Any) -> Any:
     """Return the type of a field from the description of rosbags; bounds and lengths are 0 if missing."""
     kind, of = described
     if kind == Nodetype.NAME:
-        return _struct(of)
+        return _idl_struct(of)
     if kind == Nodetype.BASE:
         name, bound = of
         return types.bounded_str[bound] if bound else _BASES[name]

@@ -126,7 +126,7 @@ class Connection:
             if self._closed:
                 return
             if self._queue:
-                self._enqueue(memoryview(frame))
+                self._enqueue_frame(memoryview(frame))
                 return
             try:
                 sent = self._socket.send(frame)
@@ -139,7 +139,7 @@ class Connection:
                 self._partly_sent = sent > 0
                 self._loop.call(partial(self._watch, writing=True))
 
-    def _enqueue(self, frame: memoryview) -> None:
+    def _enqueue_frame(self, frame: memoryview) -> None:
         if len(self._queue) > self.keep:
             del self._queue[1 if self._partly_sent else 0]
         self._queue.append(frame)

@@ -70,13 +70,13 @@ class EventLoop:
         while not self._ending:
             for key, events in self._selector.select():
                 if key.fileobj is self._woken:
-                    self._drain()
+                    self._drain_calls()
                 else:
                     self._serve(key.data, events)
             while self._calls:
                 self._guard_call(self._calls.popleft())
 
-    def _drain(self) -> None:
+    def _drain_calls(self) -> None:
         with suppress(BlockingIOError):
             self._woken.recv(4096)
 

@@ -42,7 +42,7 @@ class Ros1Params(GatewayParams):
 
     @field_validator("ip")
     @classmethod
-    def _reachable(cls, ip: IPv4Address | None) -> IPv4Address | None:
+    def _check_reachable(cls, ip: IPv4Address | None) -> IPv4Address | None:
         if ip is not None and ip.is_unspecified:
             raise ValueError(
                 f"{ip} is no address that a program could connect to; expected the address of this machine in"

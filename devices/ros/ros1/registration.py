@@ -68,7 +68,7 @@ class Registration:
     def _run(self) -> None:
         while not self._ending:
             try:
-                self._register()
+                self._register_missing()
                 self._problem = ""
             # TypeError: a master that returns no list of publishers
             except (DeviceError, TypeError) as error:
@@ -79,7 +79,7 @@ class Registration:
             self._wake.wait(_CHECK_S)
             self._wake.clear()
 
-    def _register(self) -> None:
+    def _register_missing(self) -> None:
         """Register all entries unknown to the master. Raises DeviceError on failure."""
         known = self._master.call("lookupNode", self._node)
         if known.code != 1:

@@ -187,7 +187,7 @@ class Subscriptions:
         """
         client, links, has_warned = ApiClient(uri, self._node), self._links[uri], False
         try:
-            while (link := self._due(uri, links)) is not None:
+            while (link := self._wait_for_due_link(uri, links)) is not None:
                 try:
                     self._connect(client, link)
                 except (OSError, DeviceError, ValueError) as error:
@@ -198,11 +198,11 @@ class Subscriptions:
                         log.debug(_UNREACHED, uri, link.subscription.topic, error, "")
                     else:
                         has_warned = True
-                        log.warning(_UNREACHED, uri, link.subscription.topic, error, _hint(error))
+                        log.warning(_UNREACHED, uri, link.subscription.topic, error, _connection_hint(error))
         finally:
             client.close()
 
-    def _due(self, uri: str, links: dict[str, _PublisherLink]) -> _PublisherLink | None:
+    def _wait_for_due_link(self, uri: str, links: dict[str, _PublisherLink]) -> _PublisherLink | None:
         """Wait for a link due to be connected; None: the program has no links any more."""
         with self._changing:
             while not self._closed:
@@ -272,6 +272,6 @@ def _has_ended(error: Exception) -> bool:
     return isinstance(error.__cause__ or error, ConnectionError | HTTPException)
 
 
-def _hint(error: Exception) -> str:
+def _connection_hint(error: Exception) -> str:
     """Return the remedy for an address leading nowhere; empty: the program answers, but wrongly."""
     return _ADDRESS_HINT if isinstance(error.__cause__ or error, OSError | ValueError) else ""

@@ -47,7 +47,7 @@ class Ros1Transport(Transport):
         self._connections: dict[Connection, Publication | None] = {}
         """Connections of programs to us after the header, with their publication; None: a service."""
         self._closed = False
-        self._server = ApiServer(host, self._methods())
+        self._server = ApiServer(host, self._slave_methods())
         self._loop = EventLoop(f"ROS 1 {node}")
         self._subscriptions = Subscriptions(self._loop, node)
         self._listener = Listener(self._loop, host, self._on_connection)
@@ -113,24 +113,24 @@ class Ros1Transport(Transport):
             publication.remove(connection)
             self.changed()
 
-    def _methods(self) -> dict[str, Callable[..., ApiResult]]:
+    def _slave_methods(self) -> dict[str, Callable[..., ApiResult]]:
         """Return the methods of the Slave API; the first argument of each is the caller's id."""
         return {
-            "getBusInfo": _getter(self._bus),
-            "getBusStats": _getter(lambda: ((), (), ())),
-            "getMasterUri": _getter(lambda: self._master),
-            "getPid": _getter(os.getpid),
-            "getPublications": _getter(
+            "getBusInfo": _value_getter(self._bus_info),
+            "getBusStats": _value_getter(lambda: ((), (), ())),
+            "getMasterUri": _value_getter(lambda: self._master),
+            "getPid": _value_getter(os.getpid),
+            "getPublications": _value_getter(
                 lambda: [[each.topic, each.type] for each in tuple(self._publications.values())]
             ),
-            "getSubscriptions": _getter(lambda: self._subscriptions.topics),
+            "getSubscriptions": _value_getter(lambda: self._subscriptions.topics),
             "paramUpdate": lambda *_: success(),
             "publisherUpdate": self._publisher_update,
             "requestTopic": self._request_topic,
             "shutdown": self._shut_down,
         }
 
-    def _bus(self) -> list[list[Any]]:
+    def _bus_info(self) -> list[list[Any]]:
         """Return our connections in the form of `rosnode info`."""
         readers = [
             (reader.program, "o", publication.topic)
@@ -164,7 +164,7 @@ class Ros1Transport(Transport):
         return success()
 
 
-def _getter(value: Callable[[], object]) -> Callable[[str], ApiResult]:
+def _value_getter(value: Callable[[], object]) -> Callable[[str], ApiResult]:
     """Return a method without arguments returning `value()`."""
 
     def get(_caller: str) -> ApiResult:

@@ -29,7 +29,7 @@ _HEADER = "std_msgs/msg/Header"
 
 
 @cache
-def _noetic() -> Typestore:
+def _noetic_types() -> Typestore:
     store = get_typestore(Stores.ROS1_NOETIC)
     for name, model in message_types().items():
         if name not in store.types and not name.startswith("trocar_msgs/"):
@@ -46,12 +46,12 @@ def ros1_name(type_: str) -> str:
 
 def definition(type_: str) -> str:
     """Return the definition of a message and of all field types, as in connection headers and bags."""
-    return _noetic().generate_msgdef(type_, ros_version=1)[0]
+    return _noetic_types().generate_msgdef(type_, ros_version=1)[0]
 
 
 def checksum(type_: str) -> str:
     """Return the MD5 sum of a message's definition; both sides of a connection must have the same."""
-    return _noetic().generate_msgdef(type_, ros_version=1)[1]
+    return _noetic_types().generate_msgdef(type_, ros_version=1)[1]
 
 
 def service_checksum(type_: str) -> str:
@@ -81,7 +81,7 @@ class Wire:
         self._type, self._store = type_, typestore()
         fields = self._store.fielddefs[type_][1]
         self._counted = bool(fields) and fields[0][1][1] == _HEADER
-        self._is_same = is_same_wireformat(_noetic(), self._store, type_, type_)
+        self._is_same = is_same_wireformat(_noetic_types(), self._store, type_, type_)
         self._defaults: dict[str, object] = {}
         """Defaults of rosbags for fields missing on a side, by type."""
 
@@ -117,7 +117,7 @@ class Wire:
 
     def _migrate_definition(self, message: bytes, *, to_ros2: bool) -> memoryview:
         """Return a message in the layout of the far side, field by field: far slower than as bytes."""
-        source, target = (_noetic(), self._store) if to_ros2 else (self._store, _noetic())
+        source, target = (_noetic_types(), self._store) if to_ros2 else (self._store, _noetic_types())
         return migrate_bytes(
             source,
             target,

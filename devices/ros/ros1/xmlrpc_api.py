@@ -56,20 +56,20 @@ class ApiClient:
 
     def call(self, method: str, *arguments: Any) -> ApiResult:
         """Call a method. Raises DeviceError if there is no result."""
-        return self._result(self._call(method, self._caller_id, *arguments))
+        return self._call_result(self._call_server(method, self._caller_id, *arguments))
 
     def call_all(self, calls: Sequence[tuple[str, Sequence[Any]]]) -> list[ApiResult]:
         """Call methods of a master in a single request. Raises DeviceError if there is no result."""
         requests = [
             {"methodName": method, "params": [self._caller_id, *arguments]} for method, arguments in calls
         ]
-        match self._call("system.multicall", requests):
+        match self._call_server("system.multicall", requests):
             case [*results] if len(results) == len(calls):
-                return [self._result(result) for result in results]
+                return [self._call_result(result) for result in results]
             case other:
-                raise self._invalid(other)
+                raise self._invalid_result(other)
 
-    def _call(self, method: str, *arguments: Any) -> Any:
+    def _call_server(self, method: str, *arguments: Any) -> Any:
         try:
             if self._proxy is None:
                 self._proxy = xmlrpc.client.ServerProxy(self.uri, transport=_Timed())
@@ -78,15 +78,15 @@ class ApiClient:
         except Exception as error:
             raise DeviceError(f"{self.uri} does not answer '{method}' ({error})") from error
 
-    def _result(self, result: Any) -> ApiResult:
+    def _call_result(self, result: Any) -> ApiResult:
         match result:
             # system.multicall returns each in a list of its own
             case [int(code), str(status_message), value] | [[int(code), str(status_message), value]]:
                 return ApiResult(code, status_message, value)
             case _:
-                raise self._invalid(result)
+                raise self._invalid_result(result)
 
-    def _invalid(self, result: Any) -> DeviceError:
+    def _invalid_result(self, result: Any) -> DeviceError:
         return DeviceError(f"{self.uri} returns an invalid result, none of ROS 1: {result!r:.200}")
 
     def close(self) -> None:

@@ -56,14 +56,14 @@ class Diagnostics:
         now_ns = monotonic_ns()
         seconds, self._last_ns = max(now_ns - self._last_ns, 1) * 1e-9, now_ns
         statuses = [
-            self._simulation(now_ns, seconds),
+            self._simulation_status(now_ns, seconds),
             self._published_states(seconds),
             *self._cameras(seconds),
         ]
         header = Header(stamp=Time.from_ns(stamp_ns))
         return encode(DiagnosticArray(header=header, status=statuses))
 
-    def _simulation(self, now_ns: int, seconds: float) -> DiagnosticStatus:
+    def _simulation_status(self, now_ns: int, seconds: float) -> DiagnosticStatus:
         written = [state.written_ns for state in self._states.values() if state.written_ns]
         rate = max(
             (self._rate(port, state.writes, seconds) for port, state in self._states.items()), default=0

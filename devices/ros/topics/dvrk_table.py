@@ -65,9 +65,11 @@ def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
     """
     rows: list[Row] = []
     for name, arm in params.arms.shown.items():
-        rows += _simulated_arm(name, arm, _reference(name, params))
+        rows += _simulated_arm(name, arm, _reference_frame(name, params))
     for carried in get_args(CartArm):
-        rows += _setup_joints(carried, _reference(carried, params) if carried in params.arms.shown else "")
+        rows += _setup_joints(
+            carried, _reference_frame(carried, params) if carried in params.arms.shown else ""
+        )
     for part, topics in PARTS.items():
         if part not in params.listen:
             rows += _events_and_commands(part, topics.events, topics.commands)
@@ -90,7 +92,7 @@ def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
     )
 
 
-def _reference(arm: CartArm, params: GatewayParams) -> str:
+def _reference_frame(arm: CartArm, params: GatewayParams) -> str:
     """Return the `frame_id` of Cartesian states other than `local/`.
 
     The plan refuses a scenario with another frame in the motion controller.

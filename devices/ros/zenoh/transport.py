@@ -101,7 +101,7 @@ class ZenohTransport(Transport):
                 address, encoding=cdr, congestion_control=drop, priority=priority
             )
         self._entities.append(publisher)
-        gid = gid_of(self._announce("MP", row, LATCHED if row.latched else VOLATILE))
+        gid = gid_of(self._announce_entity("MP", row, LATCHED if row.latched else VOLATILE))
         advertised = _Publisher(publisher, gid)
         if isinstance(publisher, zenoh.Publisher) and (row.periodic or row.is_picture):
             self._watch(publisher, advertised)
@@ -138,7 +138,7 @@ class ZenohTransport(Transport):
                 key(self._domain, topic, row.type), Callback(on_sample, indirect=False)
             )
         )
-        self._announce("MS", row, VOLATILE)
+        self._announce_entity("MS", row, VOLATILE)
 
     def serve(self, row: Row, handle: ServiceHandler) -> None:  # noqa: D102
         address = key(self._domain, row.topic, row.type)
@@ -158,7 +158,7 @@ class ZenohTransport(Transport):
         self._entities.append(
             self._session.declare_queryable(address, Callback(on_query, indirect=True), complete=True)
         )
-        self._announce("SS", row, VOLATILE)
+        self._announce_entity("SS", row, VOLATILE)
 
     def clients(self) -> tuple[Client, ...]:  # noqa: D102
         return self._graph.clients(self._topics)
@@ -171,7 +171,7 @@ class ZenohTransport(Transport):
             self._session.close()
             self._pictures.close()
 
-    def _announce(self, kind: EntityKind, row: Row, quality: str) -> str:
+    def _announce_entity(self, kind: EntityKind, row: Row, quality: str) -> str:
         """Declare the liveliness token of a publisher, subscriber or server; return the token's key."""
         self._number += 1
         self._topics.add(row.topic)

@@ -23,7 +23,7 @@ _LARGE_RESIDUAL = 0.1
 app = typer.Typer(help="Materials from your own measurements.", no_args_is_help=True)
 
 
-def _quantity(unit: str) -> Any:
+def _quantity_parser(unit: str) -> Any:
     """Return the parser of an option such as `5 mm`, as a float in `unit`."""
 
     def parse(text: str | float) -> float:
@@ -53,14 +53,16 @@ def tissue(
     ],
     *,
     shape: Annotated[str, typer.Option(help="Of the indenter: sphere, or punch, which is flat and round.")],
-    radius: Annotated[float, typer.Option(parser=_quantity("m"), metavar="LENGTH", help="Such as '5 mm'.")],
+    radius: Annotated[
+        float, typer.Option(parser=_quantity_parser("m"), metavar="LENGTH", help="Such as '5 mm'.")
+    ],
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE", help="The file for the scenario, .yaml.")
     ],
     thickness: Annotated[
         float | None,
         typer.Option(
-            parser=_quantity("m"),
+            parser=_quantity_parser("m"),
             metavar="LENGTH",
             help="Of a layer bonded to something rigid, under a sphere; thick unless given.",
         ),
@@ -70,7 +72,9 @@ def tissue(
     ] = 0.4,
     density: Annotated[
         float,
-        typer.Option(parser=_quantity("kg/m^3"), metavar="DENSITY", help="An indenter cannot measure it."),
+        typer.Option(
+            parser=_quantity_parser("kg/m^3"), metavar="DENSITY", help="An indenter cannot measure it."
+        ),
     ] = 1000.0,
     two_parameters: Annotated[
         bool, typer.Option("--two-parameters", help="Fit a stiffening beside the neo-Hookean modulus.")

@@ -98,11 +98,11 @@ def calibrate(measured: Measured, indenter: Indenter, *, two_parameters: bool = 
             "the force does not grow with the depth: both must be positive where the indenter presses"
         )
     model = _Model(measured, indenter)
-    bounds = _bounds(measured.time, modulus, two_parameters=two_parameters)
-    x, jacobian = _solved(model, bounds, scale)
+    bounds = _parameter_bounds(measured.time, modulus, two_parameters=two_parameters)
+    x, jacobian = _solve_bounded(model, bounds, scale)
     predicted = model.force(x)
     error = predicted - measured.force
-    deviations = _deviations(model, x, jacobian * scale, error, bounds)
+    deviations = _parameter_deviations(model, x, jacobian * scale, error, bounds)
     friction, deviation = _friction(measured)
     values = model.named(x)
     return Calibration(
@@ -117,7 +117,7 @@ def calibrate(measured: Measured, indenter: Indenter, *, two_parameters: bool = 
     )
 
 
-def _bounds(time: Vector, modulus: float, *, two_parameters: bool) -> tuple[Vector, Vector]:
+def _parameter_bounds(time: Vector, modulus: float, *, two_parameters: bool) -> tuple[Vector, Vector]:
     """Return the least and the largest parameters, shape (7,); `modulus` (Pa) is a first guess."""
     length, step = float(time[-1] - time[0]), float(np.median(np.diff(time)))
     most = _LARGEST_STIFFENING if two_parameters else _NO_STIFFENING
@@ -127,7 +127,7 @@ def _bounds(time: Vector, modulus: float, *, two_parameters: bool) -> tuple[Vect
     )
 
 
-def _solved(model: _Model, bounds: tuple[Vector, Vector], scale: float) -> tuple[Vector, Vector]:
+def _solve_bounded(model: _Model, bounds: tuple[Vector, Vector], scale: float) -> tuple[Vector, Vector]:
     """Return the best parameters, shape (7,), and the derivatives of the force over `scale` there."""
     time = model.measured.time
     length, step = float(time[-1] - time[0]), float(np.median(np.diff(time)))
@@ -150,7 +150,7 @@ def _solved(model: _Model, bounds: tuple[Vector, Vector], scale: float) -> tuple
     return np.asarray(best.x, np.float64), np.asarray(best.jac, np.float64)
 
 
-def _deviations(
+def _parameter_deviations(
     model: _Model, x: Vector, jacobian: Vector, error: Vector, bounds: tuple[Vector, Vector]
 ) -> dict[str, float]:
     """Return the standard deviations of the reported values, from the linearised fit.

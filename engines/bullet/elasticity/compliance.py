@@ -59,7 +59,7 @@ class SurfaceCompliance:
             if anchored[node]:
                 return 0.0
             held = -point_displacement(mesh.nodes[anchored] - mesh.nodes[node], inward, material).ravel()
-            load = _cancelling(mesh.nodes, faces, node, inward, material).ravel() - tied @ held
+            load = _cancelling_forces(mesh.nodes, faces, node, inward, material).ravel() - tied @ held
             return float(inward @ blocks[node].reshape(3, -1) @ load)
 
         self._normals = normals = _normals(mesh, faces, surface)
@@ -170,7 +170,9 @@ def _normals(mesh: TetMesh, faces: Indices, surface: Indices) -> Vector:
     return sums / np.linalg.norm(sums, axis=1)[:, None]
 
 
-def _cancelling(nodes: Vector, faces: Indices, node: int, inward: Vector, material: Material) -> Vector:
+def _cancelling_forces(
+    nodes: Vector, faces: Indices, node: int, inward: Vector, material: Material
+) -> Vector:
     """Return the forces (N), shape (n, 3), against the stress on the faces of 1 N along `inward` on a node.
 
     Faces around the node itself are left out: they are the surface of the half-space.

@@ -95,7 +95,7 @@ def point_displacement(away: Vector, inward: Vector, material: Material) -> Vect
     m, shape (n, 3). inward: direction of the force, into the half-space, shape (3,).
     """
     nu, shear = material.poisson_ratio, material.lame[0]
-    R, depth, across, above = _cylindrical(away, inward)
+    R, depth, across, above = _cylindrical_coordinates(away, inward)
     along = depth**2 / R**3 + 2.0 * (1.0 - nu) / R
     out = depth / R**3 - (1.0 - 2.0 * nu) / (R * above)
     return (along[:, None] * inward + out[:, None] * across) / (4.0 * np.pi * shear)
@@ -107,7 +107,7 @@ def point_stress(away: Vector, inward: Vector, material: Material) -> Vector:
     Arguments and source: see `point_displacement`.
     """
     free = 1.0 - 2.0 * material.poisson_ratio
-    R, depth, across, above = _cylindrical(away, inward)
+    R, depth, across, above = _cylindrical_coordinates(away, inward)
     radius = np.linalg.norm(across, axis=1)
     outward = across / np.maximum(radius, 1e-12)[:, None]
     hoop_line = np.cross(inward, outward)
@@ -125,7 +125,7 @@ def point_stress(away: Vector, inward: Vector, material: Material) -> Vector:
     return stress / (2.0 * np.pi)
 
 
-def _cylindrical(away: Vector, inward: Vector) -> tuple[Vector, Vector, Vector, Vector]:
+def _cylindrical_coordinates(away: Vector, inward: Vector) -> tuple[Vector, Vector, Vector, Vector]:
     """Return distance R, depth z, the vector across the axis, and R + z, all in m."""
     R = np.linalg.norm(away, axis=1)
     depth = away @ inward

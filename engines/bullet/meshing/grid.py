@@ -35,7 +35,7 @@ def block(size: Vector, nodes: int) -> TetMesh:
     is symmetric in both, without a preferred diagonal.
     """
     cells = block_cells(size, nodes)
-    points = (_grid(cells[0] + 1, cells[1] + 1, cells[2] + 1) / cells - [0.5, 0.5, 1.0]) * size
+    points = (_grid_indices(cells[0] + 1, cells[1] + 1, cells[2] + 1) / cells - [0.5, 0.5, 1.0]) * size
     return TetMesh(points, tetrahedra_of_cells(cells))
 
 
@@ -49,7 +49,7 @@ def tetrahedra_of_cells(cells: tuple[int, int, int], *, closed: bool = False) ->
         closed: the second direction runs around: the last cells (an even number) end on the first nodes.
     """
     rows = cells[1] + (0 if closed else 1)
-    origins = _grid(*cells)  # (c, 3)
+    origins = _grid_indices(*cells)  # (c, 3)
     corners = origins[:, None] + _CORNERS  # (c, 8, 3)
     corners[:, :, 1] %= rows if closed else rows + 1
     numbers = corners @ np.array([rows * (cells[2] + 1), cells[2] + 1, 1])  # (c, 8)
@@ -76,7 +76,7 @@ def block_cells(size: Vector, nodes: int) -> tuple[int, int, int]:
     return min(candidates, key=unfitness)
 
 
-def _grid(nx: int, ny: int, nz: int) -> Indices:
+def _grid_indices(nx: int, ny: int, nz: int) -> Indices:
     """Return all (i, j, k) of a grid, shape (nx ny nz, 3), k the fastest."""
     return np.stack(np.meshgrid(np.arange(nx), np.arange(ny), np.arange(nz), indexing="ij"), axis=-1).reshape(
         -1, 3

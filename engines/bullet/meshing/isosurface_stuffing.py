@@ -38,16 +38,16 @@ def fill(field: Field, low: Vector, high: Vector, spacing: float) -> TetMesh:
         high: opposite corner of the box, m, shape (3,).
         spacing: edge length (m) of the lattice's cubes; the body gets about two nodes per cube.
     """
-    points, tetrahedra = _lattice(low, high, spacing)
+    points, tetrahedra = _cubic_lattice(low, high, spacing)
     values = field(points)
     tetrahedra = tetrahedra[(values[tetrahedra] > 0.0).any(axis=1)]
-    points, signs, edges, cuts = _snapped(
+    points, signs, edges, cuts = _snap_vertices(
         field, points, np.sign(values).astype(np.int64), tetrahedra, spacing
     )
-    return compact(*_cut(points, signs, tetrahedra, edges, cuts))
+    return compact(*_cut_tetrahedra(points, signs, tetrahedra, edges, cuts))
 
 
-def _lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices]:
+def _cubic_lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices]:
     """Return vertices and tetrahedra of a body-centred lattice over a box.
 
     Corners and centres of the cubes are symmetric about the middle of the box.
@@ -55,9 +55,9 @@ def _lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices
     cubes = np.ceil((high - low) / spacing).astype(np.int64) + 2
     shape = 2 * cubes + 1  # places at half the spacing; corners of cubes are at even, centres at odd ones
     strides = np.array([shape[1] * shape[2], shape[2], 1])
-    places = _grid(np.zeros(3, np.int64), shape, 1)
+    places = _grid_indices(np.zeros(3, np.int64), shape, 1)
     points = (places - cubes) * (0.5 * spacing) + 0.5 * (low + high)
-    centres = _grid(np.ones(3, np.int64), shape - 1, 2)
+    centres = _grid_indices(np.ones(3, np.int64), shape - 1, 2)
     parts: list[Indices] = []
     for axis in range(3):
         # towards the next centre, and along the square between
@@ -70,13 +70,13 @@ def _lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices
     return points, np.concatenate(parts)
 
 
-def _grid(start: Indices, stop: Indices, step: int) -> Indices:
+def _grid_indices(start: Indices, stop: Indices, step: int) -> Indices:
     """Return all (i, j, k) from `start` to before `stop`, shape (n, 3), k the fastest."""
     i, j, k = (np.arange(int(start[axis]), int(stop[axis]), step) for axis in range(3))
     return np.stack(np.meshgrid(i, j, k, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _snapped(
+def _snap_vertices(
     field: Field, points: Vector, signs: Indices, tetrahedra: Indices, spacing: float
 ) -> tuple[Vector, Indices, Indices, Vector]:
     """Move vertices near the surface onto the surface.
@@ -135,7 +135,7 @@ _CUTS: dict[tuple[int, int], dict[str, str]] = {
 }
 
 
-def _cut(
+def _cut_tetrahedra(
     points: Vector, signs: Indices, tetrahedra: Indices, edges: Indices, cuts: Vector
 ) -> tuple[Vector, Indices]:
     """Return points and the inner tetrahedra."""

@@ -44,7 +44,7 @@ def checked_mesh(nodes: Vector, tetrahedra: Indices) -> TetMesh:
     return TetMesh(nodes, tetrahedra)
 
 
-def _some(indices: Indices) -> str:
+def _first_indices(indices: Indices) -> str:
     listed = ", ".join(str(i) for i in indices[:_SHOWN].tolist())
     return listed + (" ..." if len(indices) > _SHOWN else "")
 
@@ -58,12 +58,12 @@ def _numbers(nodes: Vector, tetrahedra: Indices) -> list[str]:
         ]
     infinite = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
     if len(infinite):
-        return [f"{len(infinite)} nodes are not finite: {_some(infinite)}"]
+        return [f"{len(infinite)} nodes are not finite: {_first_indices(infinite)}"]
     outside = np.flatnonzero(((tetrahedra < 0) | (tetrahedra >= len(nodes))).any(axis=1))
     if len(outside):
         return [
             f"{len(outside)} tetrahedra name nodes that there are not (there are 0 to {len(nodes) - 1}):"
-            f" {_some(outside)}"
+            f" {_first_indices(outside)}"
         ]
     return []
 
@@ -93,15 +93,17 @@ def _shapes(nodes: Vector, tetrahedra: Indices) -> list[str]:
             " normal of 0, 1, 2 points)"
         )
     elif len(inverted):
-        problems.append(f"{len(inverted)} of {len(tetrahedra)} tetrahedra are inverted: {_some(inverted)}")
+        problems.append(
+            f"{len(inverted)} of {len(tetrahedra)} tetrahedra are inverted: {_first_indices(inverted)}"
+        )
     if len(flat):
         problems.append(
             f"{len(flat)} of {len(tetrahedra)} tetrahedra are degenerate, with a shape quality below"
-            f" {_FLATTEST:g} (1 is regular): {_some(flat)}"
+            f" {_FLATTEST:g} (1 is regular): {_first_indices(flat)}"
         )
     unused = np.setdiff1d(np.arange(len(nodes)), tetrahedra)
     if len(unused):
-        problems.append(f"{len(unused)} nodes belong to no tetrahedron: {_some(unused)}")
+        problems.append(f"{len(unused)} nodes belong to no tetrahedron: {_first_indices(unused)}")
     return problems
 
 
@@ -131,9 +133,9 @@ def _surface(nodes: Vector, mesh: TetMesh) -> list[str]:
         pairs = np.sort(order[1:][near])
         problems.append(
             f"{len(pairs)} nodes lie where others are, so the mesh is cracked there; merge them:"
-            f" {_some(pairs)}"
+            f" {_first_indices(pairs)}"
         )
-    pieces = _pieces(mesh)
+    pieces = _count_pieces(mesh)
     if pieces > 1:
         problems.append(
             f"it is in {pieces} pieces, which share no face; an organ is one: make them organs of their own"
@@ -141,7 +143,7 @@ def _surface(nodes: Vector, mesh: TetMesh) -> list[str]:
     return problems
 
 
-def _pieces(mesh: TetMesh) -> int:
+def _count_pieces(mesh: TetMesh) -> int:
     """Return the number of parts of the mesh without a common face."""
     face = mesh.face_numbers
     label = np.arange(len(face))

@@ -28,15 +28,15 @@ def smoothed(mesh: TetMesh, field: Field, spacing: float) -> TetMesh:
     nodes, surface = mesh.nodes.copy(), np.unique(mesh.triangles)
     step = 0.02 * spacing
     nodes[surface] = _onto_surface(field, nodes[surface])
-    cost, slope = _distortion(nodes, mesh.tetrahedra)
+    cost, slope = _mesh_distortion(nodes, mesh.tetrahedra)
     for _ in range(_SMOOTHINGS):
-        normal = _gradient(field, nodes[surface])
+        normal = _field_gradient(field, nodes[surface])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         slope[surface] -= np.einsum("ni,ni->n", slope[surface], normal)[:, None] * normal
         length = np.linalg.norm(slope, axis=1, keepdims=True)
         moved = nodes - step * slope / (length + 0.1 * length.max())
         moved[surface] = _onto_surface(field, moved[surface])
-        new_cost, new_slope = _distortion(moved, mesh.tetrahedra)
+        new_cost, new_slope = _mesh_distortion(moved, mesh.tetrahedra)
         if new_cost < cost:
             nodes, cost, slope, step = moved, new_cost, new_slope, 1.3 * step
         else:
@@ -48,7 +48,7 @@ _REGULAR = np.linalg.inv(np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 
 """Inverse of the edge vectors (columns) of a regular tetrahedron."""
 
 
-def _distortion(nodes: Vector, tetrahedra: Indices) -> tuple[float, Vector]:
+def _mesh_distortion(nodes: Vector, tetrahedra: Indices) -> tuple[float, Vector]:
     """Return the distortion of all tetrahedra, and the gradient by the nodes, shape (n, 3).
 
     The distortion is the sum of (|F|^2 / (3 det F^(2/3)))^4, F from a regular tetrahedron; inf for an
@@ -74,7 +74,7 @@ def _distortion(nodes: Vector, tetrahedra: Indices) -> tuple[float, Vector]:
     return float((ratio**4).sum()), slope
 
 
-def _gradient(field: Field, points: Vector) -> Vector:
+def _field_gradient(field: Field, points: Vector) -> Vector:
     slope = np.empty_like(points)
     for i in range(3):
         step = np.zeros(3)
@@ -86,6 +86,6 @@ def _gradient(field: Field, points: Vector) -> Vector:
 def _onto_surface(field: Field, points: Vector) -> Vector:
     """Return points moved onto the surface by two of Newton's steps."""
     for _ in range(2):
-        slope = _gradient(field, points)
+        slope = _field_gradient(field, points)
         points = points - (field(points) / np.einsum("ni,ni->n", slope, slope))[:, None] * slope
     return points

@@ -77,7 +77,7 @@ class _Reader:
             elif keyword == "CELLS":
                 cells = self._cells(words)
             elif keyword == "CELL_TYPES":
-                types = self._integers(self._count(words, 1), "int")
+                types = self._read_integers(self._count(words, 1), "int")
         if nodes is None or cells is None or types is None:
             missing = [
                 name
@@ -102,9 +102,9 @@ class _Reader:
         """Return the nodes of every cell; since version 5 a list of offsets precedes the nodes."""
         count, size = self._count(words, 1), self._count(words, 2)
         if self._content[self._at : self._at + 40].lstrip().startswith(b"OFFSETS"):
-            offsets = self._integers(count, self._kind("OFFSETS"))
-            return np.split(self._integers(size, self._kind("CONNECTIVITY")), offsets[1:-1])
-        flat, cells, at = self._integers(size, "int"), list[Indices](), 0
+            offsets = self._read_integers(count, self._kind("OFFSETS"))
+            return np.split(self._read_integers(size, self._kind("CONNECTIVITY")), offsets[1:-1])
+        flat, cells, at = self._read_integers(size, "int"), list[Indices](), 0
         while at < size and len(cells) < count:
             cells.append(flat[at + 1 : at + 1 + flat[at]])
             at += 1 + max(int(flat[at]), 0)
@@ -137,7 +137,7 @@ class _Reader:
             raise ValueError("ends too early")
         return count
 
-    def _integers(self, count: int, kind: str) -> Indices:
+    def _read_integers(self, count: int, kind: str) -> Indices:
         numbers = self._numbers(count, kind)
         if not (np.abs(numbers) < _LARGEST_FILE).all():
             raise ValueError("holds something else where numbers of nodes should be")

@@ -37,10 +37,10 @@ _LAYOUTS = [
 
 
 def _mesh(nodes: int) -> TetMesh:
-    return _tube(*min(_LAYOUTS, key=lambda cells: _unfitness(cells, nodes)))
+    return _tube_mesh(*min(_LAYOUTS, key=lambda cells: _grid_unfitness(cells, nodes)))
 
 
-def _unfitness(cells: tuple[int, int, int], nodes: int) -> float:
+def _grid_unfitness(cells: tuple[int, int, int], nodes: int) -> float:
     """Return the relative error of the number of nodes, times ten, plus the elongation of the cells."""
     around, along, layers = cells
     miss = abs(around * (along + 1) * (layers + 1) / nodes - 1.0)
@@ -49,7 +49,7 @@ def _unfitness(cells: tuple[int, int, int], nodes: int) -> float:
 
 
 @lru_cache(maxsize=16)
-def _tube(around: int, along: int, layers: int) -> TetMesh:
+def _tube_mesh(around: int, along: int, layers: int) -> TetMesh:
     i, j, k = (
         index.ravel()
         for index in np.meshgrid(

@@ -100,7 +100,7 @@ class OrganParams(BaseModel):
         return path and find_file(path, info)
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _check_consistency(self) -> Self:
         if sum(part is not None for part in (self.size, self.shape, self.mesh)) != 1:
             raise ValueError(
                 f"an organ has a size (a block), a shape ({', '.join(SHAPES)}) or a mesh (a .vtk file), one"

@@ -107,7 +107,7 @@ class Contacts:
         for probe in probes:
             loose = np.flatnonzero(~probe.held)
             probe.near = [_near(tissue.organ, probe, loose) for tissue in self._tissues]
-            found = [_touches(near, probe, loose) for near in probe.near]
+            found = [_touches_by_sphere(near, probe, loose) for near in probe.near]
             for sphere in range(len(probe.radii)):
                 here = [(i, touch[sphere]) for i, touch in enumerate(found) if sphere in touch]
                 probe.touching[sphere] = bool(here)
@@ -118,7 +118,7 @@ class Contacts:
                     probe.gains[sphere] = probe.corrections[sphere] = 1.0
         for tissue, here in zip(self._tissues, touches, strict=True):
             if here:
-                _correct(tissue, here)
+                _correct_gains(tissue, here)
             tissue.advance()
 
 
@@ -128,19 +128,19 @@ def _near(organ: Organ, probe: Probe, loose: Indices) -> NearFaces:
     return near_faces(probe.positions[loose], reach, organ.nodes, organ.touchable)
 
 
-def _touches(near: NearFaces, probe: Probe, loose: Indices) -> dict[int, _Touch]:
+def _touches_by_sphere(near: NearFaces, probe: Probe, loose: Indices) -> dict[int, _Touch]:
     """Return the touches among the spheres `loose`, by number."""
     reach = probe.radii[loose] + BAND_M
     pairs, faces, weights, distances = near.within(reach)
     starts = np.searchsorted(pairs, np.arange(len(loose) + 1)).tolist()
     return {
-        sphere: _touch(probe, sphere, reach[i], faces[start:end], weights[start:end], distances[start:end])
+        sphere: _touch_at(probe, sphere, reach[i], faces[start:end], weights[start:end], distances[start:end])
         for i, (sphere, start, end) in enumerate(zip(loose.tolist(), starts[:-1], starts[1:], strict=True))
         if start < end
     }
 
 
-def _touch(
+def _touch_at(
     probe: Probe, sphere: int, reach: float, faces: Indices, weights: Vector, distance: Vector
 ) -> _Touch:
     share, s = reach - distance, np.einsum("fi,fi->f", weights, weights)
@@ -150,7 +150,7 @@ def _touch(
     return _Touch(probe, sphere, float(distance.min()), guess, touched, parts)
 
 
-def _correct(tissue: Tissue, touches: Sequence[_Touch]) -> None:
+def _correct_gains(tissue: Tissue, touches: Sequence[_Touch]) -> None:
     """Correct the guesses by the forces on the nodes.
 
     The force on a node shared by spheres is divided by the guesses.

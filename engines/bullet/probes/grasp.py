@@ -104,7 +104,7 @@ class Grasp:
                 events = self._watch_hold(t)
         elif looked:
             events = self._watch(t)
-        self._say(events)
+        self._write_outputs(events)
 
     def untie(self) -> None:
         """Untie the held tissue, and let the holding spheres touch the tissue again."""
@@ -123,14 +123,14 @@ class Grasp:
             *(hold.nodes.astype(np.float64) for hold in self._holds),
         )
 
-    def _spread(self) -> float:
+    def _finger_spread(self) -> float:
         """Return the mean distance (m) of the middles of the instrument's fingers from the middle of all."""
         middles = self._probe.targets[self._spheres].mean(axis=1)  # (fingers, 3)
         return float(np.linalg.norm(middles - middles.mean(axis=0), axis=1).mean())
 
     def _watch_hold(self, t: int) -> tuple[TissueGrasp, ...]:
         """Release the tissue if the fingers have opened; else measure the lift."""
-        if self._spread() > self._widest + _CLOSING_M:
+        if self._finger_spread() > self._widest + _CLOSING_M:
             return self._let_go("released", t)
         self._lift[0] = np.concatenate(
             [hold.organ.nodes[hold.nodes, 2] - hold.rest for hold in self._holds]
@@ -143,27 +143,27 @@ class Grasp:
         if touching.sum() < 2:
             self._widest = 0.0
             return ()
-        spread = self._spread()
+        spread = self._finger_spread()
         self._widest = max(self._widest, spread)
         if spread > self._widest - _CLOSING_M:
             return ()
-        outward = self._outward()
+        outward = self._outward_directions()
         squeezed = touching & (
             -(self._probe.forces[self._spheres].sum(axis=1) * outward).sum(axis=1) >= _SQUEEZE_N
         )
         if squeezed.sum() >= 2:
             return self._take(squeezed, outward, spread, t)
-        if self._gap(touching) <= _SHUT_M:
+        if self._least_gap(touching) <= _SHUT_M:
             return self._take(touching, outward, spread, t)
         return ()
 
-    def _outward(self) -> Vector:
+    def _outward_directions(self) -> Vector:
         """Return the direction from the middle of all fingers to each, shape (fingers, 3)."""
         middles = self._probe.positions[self._spheres].mean(axis=1)
         arms = middles - middles.mean(axis=0)
         return arms / np.maximum(np.linalg.norm(arms, axis=1, keepdims=True), 1e-12)
 
-    def _gap(self, fingers: NDArray[np.bool_]) -> float:
+    def _least_gap(self, fingers: NDArray[np.bool_]) -> float:
         """Return the least gap (m) between spheres of different fingers."""
         spheres = self._spheres[fingers]
         of = np.repeat(np.arange(len(spheres)), spheres.shape[1])
@@ -196,10 +196,10 @@ class Grasp:
         if self._holds:
             self._widest = spread
             self._set_held(spheres, held=True)
-            probe.held_patch = self._patch(spheres)
+            probe.held_patch = self._held_patch(spheres)
         return self._events("grasped", t)
 
-    def _patch(self, spheres: NDArray[np.int64]) -> HeldPatch | None:
+    def _held_patch(self, spheres: NDArray[np.int64]) -> HeldPatch | None:
         """Return the spring in series with these spheres, given a `width` and a single held organ."""
         width = self._params.width
         if width is None:
@@ -253,7 +253,7 @@ class Grasp:
             for hold in self._holds
         )
 
-    def _say(self, events: tuple[TissueGrasp, ...]) -> None:
+    def _write_outputs(self, events: tuple[TissueGrasp, ...]) -> None:
         name = self._probe.name
         self._held[0] = float(bool(self._holds))
         self.outputs = {

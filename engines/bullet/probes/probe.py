@@ -87,7 +87,7 @@ class Probe:
         """Faces of each organ near the free spheres at the last reading of the contacts."""
         self._placed = False
         self._client = client
-        self.bodies: list[int] = [self._sphere(radius) for radius in self.radii.tolist()]
+        self.bodies: list[int] = [self._create_sphere(radius) for radius in self.radii.tolist()]
         """Bullet's number of every proxy."""
         self._read_velocity, self._apply, self._frame = (
             bullet.getBaseVelocity,
@@ -226,7 +226,7 @@ class Probe:
             bullet.resetBaseVelocity(body, velocity, [0.0, 0.0, 0.0], physicsClientId=self._client)
         self._placed = True
 
-    def _sphere(self, radius: float) -> int:
+    def _create_sphere(self, radius: float) -> int:
         """Create a proxy of `radius` (m); return the number in Bullet."""
         import pybullet as bullet
 

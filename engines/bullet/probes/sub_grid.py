@@ -148,7 +148,7 @@ class SubGrid:
         """
         places = [
             (self._place(surface, faces), forces)
-            for (surface, forces), faces in zip(self._laws, near, strict=True)
+            for (surface, forces), faces in zip(self._force_laws, near, strict=True)
             if len(faces.spheres)
         ]
         if not places:
@@ -162,7 +162,7 @@ class SubGrid:
         self._is_new = True
 
     @property
-    def _laws(self) -> Sequence[tuple[Surface, Vector]]:
+    def _force_laws(self) -> Sequence[tuple[Surface, Vector]]:
         return list(zip(self._surfaces, self._half_spaces, strict=True))
 
     def _at_rim(self, place: _Place, centre: Vector) -> _Place:

@@ -98,7 +98,7 @@ class Servos:
         self._inputs = np.concatenate([start, start, np.zeros(n)])
         self.setpoint, self._previous, self._effort = np.split(self._inputs, 3)
         self._reach, self._ways = np.empty((2, n)), np.outer((-1.0, 1.0), speed * period)
-        self._layout, self._measure = self._matrices(shares, n, period)
+        self._layout, self._measure = self._servo_matrices(shares, n, period)
         self._springs, self._rest = self._elasticity(shares, n)
         self._gains = model.actuator_gainprm.copy(), model.actuator_biasprm.copy()
         self._gravity_compensation = model.body_gravcomp.copy()
@@ -132,7 +132,9 @@ class Servos:
         group.weighed += [i for i in group.bodies if model.body(i).name == "ECM/roll"]
         self._groups.append(group)
 
-    def _matrices(self, shares: list[tuple[int, int, float]], n: int, period: float) -> tuple[Vector, Vector]:
+    def _servo_matrices(
+        self, shares: list[tuple[int, int, float]], n: int, period: float
+    ) -> tuple[Vector, Vector]:
         """Return two matrices, from the servos' inputs to `ctrl` and from `qpos` to the drives' positions.
 
         The servos' inputs are the setpoint, the setpoint a step ago, and the effort.

@@ -23,10 +23,10 @@ def file_of(mesh: str) -> str:
 
 def meshes(spec: mujoco.MjSpec) -> dict[str, str]:
     """Return the content of every mesh's file, by file name."""
-    return {file_of(mesh.name): _obj(mesh) for mesh in spec.meshes}
+    return {file_of(mesh.name): _to_obj(mesh) for mesh in spec.meshes}
 
 
-def _obj(mesh: mujoco.MjsMesh) -> str:
+def _to_obj(mesh: mujoco.MjsMesh) -> str:
     vertices, faces = np.reshape(mesh.uservert, (-1, 3)), np.reshape(mesh.userface, (-1, 3)) + 1
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices.tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in faces.tolist()]

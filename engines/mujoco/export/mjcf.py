@@ -42,16 +42,16 @@ def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
         "key": spec.key,
     }
     for element in root.iterfind("equality/joint"):
-        _restore(element, spec.equality(element.attrib["name"]), _EQUALITY)
+        _restore_digits(element, spec.equality(element.attrib["name"]), _EQUALITY)
     for element in root.iter():
         if element.tag in by_tag and (name := element.get("name")):
-            _restore(element, by_tag[element.tag](name), {})
+            _restore_digits(element, by_tag[element.tag](name), {})
             if (inertial := element.find("inertial")) is not None:
-                _restore(inertial, model.body(name), _INERTIAL)
+                _restore_digits(inertial, model.body(name), _INERTIAL)
     return root
 
 
-def _restore(element: ElementTree.Element, source: Any, names: dict[str, str]) -> None:
+def _restore_digits(element: ElementTree.Element, source: Any, names: dict[str, str]) -> None:
     """Give the numbers of `element` all digits of `source`.
 
     `names`: names in `source` of attributes, where different.

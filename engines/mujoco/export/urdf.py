@@ -155,7 +155,7 @@ def _add_joint(
     leads: Mapping[str, _Lead],
 ) -> None:
     moving = next(iter(body.joints), None)
-    name = _joint(moving.name if moving else body.name)
+    name = _joint_element(moving.name if moving else body.name)
     joint = SubElement(robot, "joint", name=name, type=_KINDS[moving.type] if moving else "fixed")
     compiled = model.body(body.name)
     _add_origin(joint, compiled.pos, compiled.quat)
@@ -166,7 +166,7 @@ def _add_joint(
     SubElement(joint, "axis", xyz=numbers(moving.axis))
     lead = leads.get(moving.name) or _lead_by_tie(spec, moving.name)
     if lead.joint:
-        SubElement(joint, "mimic", joint=_joint(lead.joint), multiplier=repr(lead.ratio), offset="0")
+        SubElement(joint, "mimic", joint=_joint_element(lead.joint), multiplier=repr(lead.ratio), offset="0")
     is_slide_of_turn = moving.name in leads and joint.get("type") == "prismatic"
     _add_limit(joint, spec, moving.range, lead.servo, lead.ratio if is_slide_of_turn else 1.0)
     SubElement(
@@ -197,7 +197,7 @@ def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, servo_name: st
 def _add_leader(robot: Element, spec: mujoco.MjSpec, follower: mujoco.MjsBody, lead: _Lead) -> None:
     """Add the leading joint of `follower` and of the opposite link."""
     _add_frame_link(robot, _link(lead.joint))
-    joint = SubElement(robot, "joint", name=_joint(lead.joint), type="revolute")
+    joint = SubElement(robot, "joint", name=_joint_element(lead.joint), type="revolute")
     SubElement(joint, "parent", link=_link(follower.parent.name))
     SubElement(joint, "child", link=_link(lead.joint))
     SubElement(joint, "axis", xyz="0 0 1")
@@ -240,5 +240,5 @@ def _link(body: str) -> str:
     return _WORLD if body == "world" else f"{body.replace('/', '_')}_link"
 
 
-def _joint(joint: str) -> str:
+def _joint_element(joint: str) -> str:
     return joint.replace("/", "_")

@@ -25,7 +25,7 @@ class ContactSpheresBond:
     def __init__(self, arm: str, motion: MotionSide, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Let `motion` act on the spheres of the instrument of `arm`."""
         self.motion, self.bond = motion, f"{arm}/{CONTACT}"
-        sites = _sites(arm, model)
+        sites = _sphere_sites(arm, model)
         n, carriers = len(sites), model.site_bodyid[sites]
         first = int(model.sensor(f"{model.site(sites[0]).name}/position").adr[0])
         self._position, self._velocity = (
@@ -79,7 +79,7 @@ class ContactSpheresBond:
     @staticmethod
     def least_mass(arm: str, model: mujoco.MjModel, data: mujoco.MjData) -> float:
         """Return the least mass (kg) under forces on the spheres of `arm`, in any directions."""
-        sites = _sites(arm, model)
+        sites = _sphere_sites(arm, model)
         jacobian = np.zeros((len(sites), 3, model.nv))
         for rows, site in zip(jacobian, sites, strict=True):
             mujoco.mj_jacSite(model, data, rows, None, site)
@@ -113,7 +113,7 @@ class ContactSpheresBond:
         self._to_base.dot(np.add.reduce(self._about_tip, 0), self._tip_torque)
 
 
-def _sites(arm: str, model: mujoco.MjModel) -> list[int]:
+def _sphere_sites(arm: str, model: mujoco.MjModel) -> list[int]:
     """Return the sites of the spheres in the order of their sensors, the order of the instrument's list."""
     sensors = [model.sensor(i) for i in range(model.nsensor)]
     return [

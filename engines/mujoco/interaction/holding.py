@@ -138,7 +138,7 @@ class Holding:
         self._values[:, :3] = 0.0
         for i, holder in enumerate(map(int, self._holder.tolist())):
             if holder >= 0:
-                self._values[i, :3] = self._numbers[holder], self._slip(i, holder), self._turn(i, holder)
+                self._values[i, :3] = self._numbers[holder], self._grip_slip(i, holder), self._turn(i, holder)
 
     def holder(self, thing: str) -> str | None:
         """Return the holding arm of an object, the first of two; None without."""
@@ -169,7 +169,7 @@ class Holding:
             self._weld_data[i * len(self._fingers) + j] = self._model.eq_data[weld]
             data.eq_active[weld] = 1
 
-    def _slip(self, i: int, j: int) -> float:
+    def _grip_slip(self, i: int, j: int) -> float:
         data, body, finger = self._data, self._bodies[i], self._fingers[j]
         point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self._grip[i, j, :3]
         return float(

@@ -40,7 +40,7 @@ class WireBond:
         self._marks = _marks(params)
         self._dofs = slice(first := int(model.joint(thing).dofadr[0]), first + 6)
         self._speed, self._damping = data.qvel[self._dofs], model.dof_damping[self._dofs]
-        self._drag = _drag(params)
+        self._needle_drag = _needle_drag(params)
         self._place, self._axes = data.xpos[body], data.xmat[body].reshape(3, 3)
         self._centre, self._load = data.xipos[body], data.xfrc_applied[body]
         self._position, self._velocity, self._last = np.zeros(9), np.zeros(9), np.zeros(9)
@@ -56,7 +56,7 @@ class WireBond:
         self._push(0.0)
         is_pushed = bool(self._force.any())
         self._is_free = self.motion.is_even and not is_pushed
-        self._damping[:] = self._drag if is_pushed else 0.0
+        self._damping[:] = self._needle_drag if is_pushed else 0.0
         self.wrench[:] = 0.0
         self._substeps = 0
 
@@ -88,7 +88,9 @@ class WireBond:
         first, arms = int(model.joint(thing).dofadr[0]), _marks(params)
         inertia = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, inertia)
-        inertia = inertia[first : first + 6, first : first + 6] + model.opt.timestep * np.diag(_drag(params))
+        inertia = inertia[first : first + 6, first : first + 6] + model.opt.timestep * np.diag(
+            _needle_drag(params)
+        )
         turning = np.zeros((3, 3, 3))  # velocity of each point by the three turns, axes of the needle
         for point, (x, y, z) in zip(turning, arms.tolist(), strict=True):
             point[:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
@@ -117,6 +119,6 @@ def _marks(params: NeedleParams) -> Vector:
     return NeedleShape(params.radius, params.arc, params.wire_radius).bond_points
 
 
-def _drag(params: NeedleParams) -> Vector:
+def _needle_drag(params: NeedleParams) -> Vector:
     """Return the damping of the needle's six degrees of freedom, N s/m and N m s/rad."""
     return params.drag * np.repeat([1.0, params.radius**2], 3)

@@ -32,25 +32,25 @@ _BULK = ("column", "housing", "deck")
 def cart() -> Collisions:
     """Return the collision shapes of the cart."""
     return {
-        body: tuple(_hull(p.name, (p,)) for p in shown if p.name in _BULK)
+        body: tuple(_convex_hull(p.name, (p,)) for p in shown if p.name in _BULK)
         for body, shown in cart_look.parts().items()
     }
 
 
 def setup_joint(arm: CartArm) -> Collisions:
     """Return the collision shapes of the setup joint under `arm`."""
-    return {body: (_hull(body, shown),) for body, shown in setup_look.parts(arm).items() if shown}
+    return {body: (_convex_hull(body, shown),) for body, shown in setup_look.parts(arm).items() if shown}
 
 
 def psm() -> Collisions:
     """Return the collision shapes of a PSM without instrument."""
-    return {body: (_hull(body, shown),) for body, shown in psm_look.parts().items()}
+    return {body: (_convex_hull(body, shown),) for body, shown in psm_look.parts().items()}
 
 
 def ecm() -> Collisions:
     """Return the collision shapes of an ECM with endoscope."""
     hulls: dict[str, tuple[Part | Primitive, ...]] = {
-        body: (_hull(body, shown),) for body, shown in ecm_look.parts().items()
+        body: (_convex_hull(body, shown),) for body, shown in ecm_look.parts().items()
     }
     shaft = next(p for p in ecm_look.parts()["roll"] if p.name == "endoscope_shaft").vertices[:, 2]
     hulls["roll"] += (_upright("shaft", _ECM_SHAFT_RADIUS, float(shaft.min()), float(shaft.max())),)
@@ -63,7 +63,7 @@ def instrument(tool: Instrument) -> Collisions:
     chain = psm_arm.chain(tool)
     shaft = looks["roll"][0].vertices[:, 2]
     collisions: dict[str, tuple[Part | Primitive, ...]] = {
-        "insertion": (_hull("housing", looks["insertion"]),)
+        "insertion": (_convex_hull("housing", looks["insertion"]),)
     }
     if tool.has_wrist:
         frames = chain.frames(np.zeros(len(chain.joints)))
@@ -71,15 +71,15 @@ def instrument(tool: Instrument) -> Collisions:
         wrist, last = tool.joints[1].name, tool.joints[-1].name
         collisions["roll"] = (_upright("shaft", SHAFT_RADIUS, pitch, float(shaft.max())),)
         collisions[wrist] = (_upright("wrist", WRIST_RADIUS, yaw, pitch),)
-        collisions[last] = (_hull(last, looks[last]),)
+        collisions[last] = (_convex_hull(last, looks[last]),)
     else:
         collisions["roll"] = (_upright("shaft", SHAFT_RADIUS, float(shaft.min()), float(shaft.max())),)
     return {**collisions, **end_effectors.collision(tool.end_effector, tool.name, Mount.on(chain))}
 
 
-def _hull(name: str, shown: tuple[Part, ...]) -> Part:
+def _convex_hull(name: str, shown: tuple[Part, ...]) -> Part:
     points = np.concatenate([p.vertices for p in shown if p.name not in _THIN])
-    return hull(f"{name}_hull", points, shown[0].material)
+    return hull(f"{name}_convex_hull", points, shown[0].material)
 
 
 def _upright(name: str, radius: float, low: float, high: float) -> Primitive:

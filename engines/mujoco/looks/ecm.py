@@ -43,8 +43,8 @@ def parts() -> Looks:
         "pitch_bottom": _pitch_bottom(),
         "pitch_top": _pitch_top(),
         "pitch": _column(),
-        "insertion": _carriage(),
-        "roll": _endoscope(),
+        "insertion": _carriage_solids(),
+        "roll": _endoscope_solids(),
     }
 
 
@@ -218,7 +218,7 @@ def _column() -> tuple[Part, ...]:
     )
 
 
-def _carriage() -> tuple[Part, ...]:
+def _carriage_solids() -> tuple[Part, ...]:
     """Carriage at the upper end of its way."""
     body = plate(
         "z", outline([(-0.028, -0.061), (0.026, -0.061), (0.026, -0.034), (-0.028, -0.034)]), 0.3729, 0.4909
@@ -226,7 +226,7 @@ def _carriage() -> tuple[Part, ...]:
     return (part("carriage", union(body, rod((0.0, -0.036, 0.43), (0.0, -0.028, 0.43), 0.020)), GREY),)
 
 
-def _endoscope() -> tuple[Part, ...]:
+def _endoscope_solids() -> tuple[Part, ...]:
     """Endoscope along the z axis: 12 mm shaft, sterile adapter, camera head with two light cables.
 
     Its tip is just below the remote centre.

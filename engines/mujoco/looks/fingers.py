@@ -147,7 +147,11 @@ def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
     The face is exactly the plane of the pad, or behind the plane.
     """
     centre = np.array(
-        [side * (form.tip_thickness + form.recess) / 2.0, _curve(form, 0.7), (_ROOT + form.length) / 2.0]
+        [
+            side * (form.tip_thickness + form.recess) / 2.0,
+            _finger_curve(form, 0.7),
+            (_ROOT + form.length) / 2.0,
+        ]
     )
     box = pose.copy()
     box[:3, 3] += pose[:3, :3] @ centre
@@ -176,10 +180,10 @@ def _top_view(form: Shape, start: float, end: float = 1.0, share: float = 1.0) -
     right, left = list[tuple[float, float]](), list[tuple[float, float]]()
     for s in np.linspace(start, end, 5 if form.curve else 2).tolist():
         half = share * (form.width + (form.tip_width - form.width) * (s - root) / (1.0 - root))
-        right.append((_curve(form, s) - half, s * form.length))
-        left.append((_curve(form, s) + half, s * form.length))
+        right.append((_finger_curve(form, s) - half, s * form.length))
+        left.append((_finger_curve(form, s) + half, s * form.length))
     return [*left, *reversed(right)]
 
 
-def _curve(form: Shape, s: float) -> float:
+def _finger_curve(form: Shape, s: float) -> float:
     return form.curve * s**2

@@ -30,9 +30,9 @@ _SEGMENTS = 10
 
 def parts(hand: Hand, _instrument: str, mount: Mount) -> Looks:
     """Return the meshes of palm and phalanges by body."""
-    looks: dict[str, tuple[Part, ...]] = {mount.link: (_palm(hand, mount.pose),)}
+    looks: dict[str, tuple[Part, ...]] = {mount.link: (_palm_solids(hand, mount.pose),)}
     for link in hand.bones:
-        looks[link.name] = _phalanx(hand, link, mount.pose @ link.pose)
+        looks[link.name] = _phalanx_solids(hand, link, mount.pose @ link.pose)
     return looks
 
 
@@ -49,24 +49,26 @@ def collision(hand: Hand, _instrument: str, mount: Mount) -> Collisions:
     return shapes
 
 
-def _palm(hand: Hand, shaft: Vector) -> Part:
+def _palm_solids(hand: Hand, shaft: Vector) -> Part:
     """A disc wider than the shaft, with a pair of ears for each finger."""
     radius, top = TROCAR_RADIUS - 1e-4, hand.palm - hand.radius
     body = revolve(
         [(0.0, -0.004), (SHAFT_RADIUS, -0.004), (radius, 0.0), (radius, top), (0.0, top)], segments=14
     )
     first = [link for link in hand.bones if link.parent == "roll"]
-    ears = [place_solid(_ears(0.0, top - hand.palm), link.pose[:3, :3], link.pose[:3, 3]) for link in first]
+    ears = [
+        place_solid(_ear_solids(0.0, top - hand.palm), link.pose[:3, :3], link.pose[:3, 3]) for link in first
+    ]
     return part("palm", place_solid(union(body, *ears), shaft[:3, :3], shaft[:3, 3]), STEEL)
 
 
-def _ears(end: float, start: float) -> Manifold:
+def _ear_solids(end: float, start: float) -> Manifold:
     """Return two cheeks beside a hub at x = `end`, from x = `start`."""
     cheek = block((start, -0.0012, _EAR - 0.0003), (end + 0.0012, 0.0012, _EAR_END - 0.0002))
     return cheek + cheek.mirror((0.0, 0.0, 1.0))
 
 
-def _phalanx(hand: Hand, link: HandLink, pose: Vector) -> tuple[Part, ...]:
+def _phalanx_solids(hand: Hand, link: HandLink, pose: Vector) -> tuple[Part, ...]:
     """Return a hub in the joint, a barrel, a pad on the closing side, and ears or a round fingertip.
 
     The ears hold the next joint.
@@ -87,7 +89,7 @@ def _phalanx(hand: Hand, link: HandLink, pose: Vector) -> tuple[Part, ...]:
     pad = barrel ^ block((gap + 0.0012, 0.55 * radius, -1.0), (1.0 if is_last else end - 0.0010, 1.0, 1.0))
     solids = [hub, neck, barrel - pad]
     if not is_last:
-        solids.append(_ears(length, end - 0.0004))
+        solids.append(_ear_solids(length, end - 0.0004))
     finished = ((link.name, union(*solids), STEEL), (f"{link.name}_pad", pad, DARK if not is_last else BLACK))
     return tuple(
         part(name, place_solid(solid, pose[:3, :3], pose[:3, 3]), material)

@@ -54,8 +54,8 @@ def parts() -> Looks:
         "pitch_bottom": _pitch_bottom(),
         "pitch_top": _pitch_top(),
         "pitch": _column(),
-        "insertion": _carriage(),
-        "counterweight": _counterweight(),
+        "insertion": _carriage_solids(),
+        "counterweight": _counterweight_solid(),
     }
 
 
@@ -260,7 +260,7 @@ def _column() -> tuple[Part, ...]:
     )
 
 
-def _carriage() -> tuple[Part, ...]:
+def _carriage_solids() -> tuple[Part, ...]:
     """Carriage at the upper end of its travel: slider, plate, and the sterile adapter of the instrument."""
     slider = block((-0.0200, -0.0360, 0.420), (0.0200, -0.0280, 0.492))
     body = plate(
@@ -273,7 +273,7 @@ def _carriage() -> tuple[Part, ...]:
     return part("carriage", union(slider, body), GREY), part("sterile_adapter", adapter, IVORY)
 
 
-def _counterweight() -> tuple[Part, ...]:
+def _counterweight_solid() -> tuple[Part, ...]:
     """Steel block of 0.179 kg (the mass of Fontanelli et al.) that runs inside the column."""
     _, y, z = next(joint.pivot for joint in PSM.joints if joint.name == "counterweight")
     return (

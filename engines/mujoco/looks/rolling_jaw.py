@@ -23,7 +23,7 @@ def parts(jaw: RollingJaw, instrument: str, mount: Mount) -> Looks:
     """Return the meshes of fingers and pads."""
     pose = finger_frame(mount)
     looks = dict(fingers(_shape(instrument, jaw), pose))
-    for name, centre, half in _pads(jaw):
+    for name, centre, half in _pad_boxes(jaw):
         solid = block(tuple((centre - half).tolist()), tuple((centre + half).tolist()))
         looks[name] = (part(name, place_solid(solid, pose[:3, :3], pose[:3, 3]), DARK),)
     return looks
@@ -33,7 +33,7 @@ def collision(jaw: RollingJaw, instrument: str, mount: Mount) -> Collisions:
     """Return the boxes of fingers and pads: the face of a pad lies in the plane x = 0."""
     pose = finger_frame(mount)
     boxes = dict(grips(_shape(instrument, jaw), pose))
-    for name, centre, half in _pads(jaw):
+    for name, centre, half in _pad_boxes(jaw):
         box = pose.copy()
         box[:3, 3] += pose[:3, :3] @ centre
         boxes[name] = (Primitive(name, "box", tuple(half.tolist()), box),)
@@ -44,7 +44,7 @@ def _shape(instrument: str, jaw: RollingJaw) -> Shape:
     return shape(instrument, jaw, recess=jaw.size[2])
 
 
-def _pads(jaw: RollingJaw) -> Iterator[tuple[str, Vector, Vector]]:
+def _pad_boxes(jaw: RollingJaw) -> Iterator[tuple[str, Vector, Vector]]:
     """Yield name, centre and half extents (m) of each pad."""
     along, across, thickness = jaw.size
     for name, side in zip(PADS, (1, -1), strict=True):

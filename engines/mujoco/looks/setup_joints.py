@@ -48,10 +48,10 @@ def parts(arm: CartArm) -> Looks:
     frames = chain(arm).frames(np.zeros(len(JOINT_NAMES)))
     drawn: Solids = {
         "lift": _lift(0.2549 if arm == "PSM3" else 0.3311),
-        "shoulder": _shoulder(chain(arm).joints[2].a, 0.1733 if arm == "PSM3" else 0.2084),
-        "elbow": _elbow(chain(arm).joints[3].a, upside_down=arm == "PSM3"),
+        "shoulder": _shoulder_solids(chain(arm).joints[2].a, 0.1733 if arm == "PSM3" else 0.2084),
+        "elbow": _elbow_solids(chain(arm).joints[3].a, upside_down=arm == "PSM3"),
         "wrist": _ecm_wrist() if arm == "ECM" else _wrist(above=arm == "PSM3"),
-        "tilt": () if arm == "ECM" else _tilt(),
+        "tilt": () if arm == "ECM" else _tilt_solids(),
         "mount": ((rod((0.0, 0.0, -0.014), (0.0, 0.0, 0.0), 0.050), DARK),),
     }
     return {
@@ -71,7 +71,7 @@ def _lift(height: float) -> tuple[tuple[Manifold, Material], ...]:
     return (union(post, neck), IVORY), (sledge, DARK)
 
 
-def _shoulder(length: float, top: float) -> tuple[tuple[Manifold, Material], ...]:
+def _shoulder_solids(length: float, top: float) -> tuple[tuple[Manifold, Material], ...]:
     """Upper arm from the shoulder to the elbow."""
     low, high = _UPPER_ARM
     beam = plate("z", taper(((0.0, 0.0), _HUB), ((length, 0.0), 0.0668)), low + 0.004, high)
@@ -79,7 +79,7 @@ def _shoulder(length: float, top: float) -> tuple[tuple[Manifold, Material], ...
     return (union(beam, cap), IVORY), (rod((0.0, 0.0, low), (0.0, 0.0, low + 0.010), 0.066), DARK)
 
 
-def _elbow(length: float, *, upside_down: bool) -> tuple[tuple[Manifold, Material], ...]:
+def _elbow_solids(length: float, *, upside_down: bool) -> tuple[tuple[Manifold, Material], ...]:
     """Forearm from the elbow to the wrist, with the wrist's brake in a cap on the side away from the arm.
 
     PSM3's forearm is turned over.
@@ -125,7 +125,7 @@ def _ecm_wrist() -> tuple[tuple[Manifold, Material], ...]:
     )
 
 
-def _tilt() -> tuple[tuple[Manifold, Material], ...]:
+def _tilt_solids() -> tuple[tuple[Manifold, Material], ...]:
     """Bracket from the tilt axis, -z, down (-y) and forward under the manipulator, to the mount's axis.
 
     The origin of the frame is on the mount's axis.

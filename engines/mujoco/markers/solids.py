@@ -88,28 +88,28 @@ def solids(marker: ShownMarker, pose_of: PoseOf, camera: Vector, shapes_of: Shap
     half = 0.5 * marker.scale
     match marker.type:
         case MarkerType.ARROW if len(points):
-            yield from _rods(points[:1], points[1:], half[0], marker.color[None], _ARROW)
+            yield from _rod_solids(points[:1], points[1:], half[0], marker.color[None], _ARROW)
         case MarkerType.ARROW:
             end = position + marker.scale[0] * turn[:, 0]
-            yield from _rods(position[None], end[None], half[1], marker.color[None], _ARROW)
+            yield from _rod_solids(position[None], end[None], half[1], marker.color[None], _ARROW)
         case MarkerType.ARROW_STRIP:
-            yield from _rods(points[:-1], points[1:], half[0], _colors(marker, len(points)), _ARROW)
+            yield from _rod_solids(points[:-1], points[1:], half[0], _colors(marker, len(points)), _ARROW)
         case MarkerType.LINE_STRIP:
-            yield from _rods(points[:-1], points[1:], half[0], _colors(marker, len(points)), _BOX)
+            yield from _rod_solids(points[:-1], points[1:], half[0], _colors(marker, len(points)), _BOX)
         case MarkerType.LINE_LIST:
             colors = _colors(marker, len(points))[::2]
-            yield from _rods(points[::2], points[1::2], half[0], colors, _BOX)
+            yield from _rod_solids(points[::2], points[1::2], half[0], colors, _BOX)
         case MarkerType.CUBE_LIST | MarkerType.SPHERE_LIST:
             for point, color in zip(points, _colors(marker, len(points)), strict=True):
                 yield Solid(_SOLID[marker.type], half, point, turn, color)
         case MarkerType.POINTS:
-            facing, size = _facing(camera), half[[0, 1, 0]]
+            facing, size = _facing_axes(camera), half[[0, 1, 0]]
             for point, color in zip(points, _colors(marker, len(points)), strict=True):
                 yield Solid(_BOX, size, point, facing, color, _FLAT)
         case MarkerType.TRIANGLE_LIST:
             yield from _triangles(marker.points * marker.scale @ turn.T + position, marker)
         case MarkerType.TEXT_VIEW_FACING:
-            yield from _text(marker, position, _facing(camera))
+            yield from _text(marker, position, _facing_axes(camera))
         case MarkerType.MESH_RESOURCE:
             scale = marker.scale[0]
             for shape in shapes_of(marker.text):
@@ -135,12 +135,12 @@ def _colors(marker: ShownMarker, count: int) -> NDArray[np.float32]:
     return marker.colors if len(marker.colors) else np.broadcast_to(marker.color, (count, 4))
 
 
-def _facing(camera: Vector) -> Vector:
+def _facing_axes(camera: Vector) -> Vector:
     """Return the axes right, up and towards the camera, shape (3, 3)."""
     return camera[:3, :3] * [1.0, -1.0, -1.0]
 
 
-def _rods(
+def _rod_solids(
     starts: Vector, ends: Vector, radius: float, colors: NDArray[np.float32], kind: int
 ) -> Iterator[Solid]:
     """Yield arrows, or bars for lines, between points, shape (n, 3)."""

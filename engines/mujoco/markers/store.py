@@ -102,10 +102,10 @@ class MarkerStore:
     def _apply_action(self, marker: Marker, t_ns: int, pose_of: PoseOf) -> None:
         if marker.action == MarkerAction.DELETEALL:
             for key in [key for key in self._markers if marker.ns in ("", key[0])]:
-                self._remove(key)
+                self._remove_marker(key)
         elif marker.action == MarkerAction.DELETE:
             if (marker.ns, marker.id) in self._markers:
-                self._remove((marker.ns, marker.id))
+                self._remove_marker((marker.ns, marker.id))
         elif marker.action == MarkerAction.ADD:
             self._add((marker.ns, marker.id), self._shown_marker(marker, t_ns, pose_of))
         else:
@@ -127,7 +127,7 @@ class MarkerStore:
         self._markers[key] = made
         self._weight = weight
 
-    def _remove(self, key: tuple[str, int]) -> None:
+    def _remove_marker(self, key: tuple[str, int]) -> None:
         self._weight -= self._markers.pop(key).weight
 
     def _shown_marker(self, marker: Marker, t_ns: int, pose_of: PoseOf) -> ShownMarker:
@@ -146,18 +146,18 @@ class MarkerStore:
             frame=frame,
             pose=pose,
             scale=np.array([marker.scale.x, marker.scale.y, marker.scale.z]),
-            color=_rgba([marker.color])[0],
+            color=_rgba_rows([marker.color])[0],
             expires_ns=t_ns + lifetime if lifetime else 0,
             text=marker.text if is_text else marker.mesh_resource if kind == MarkerType.MESH_RESOURCE else "",
             points=points,
-            colors=_rgba(marker.colors),
+            colors=_rgba_rows(marker.colors),
         )
 
     def expire(self, t_ns: int) -> None:
         """Remove what has reached the end of its lifetime at simulated time `t_ns`."""
         if self._next_ns and t_ns >= self._next_ns:
             for key in [key for key, one in self._markers.items() if 0 < one.expires_ns <= t_ns]:
-                self._remove(key)
+                self._remove_marker(key)
             self._note_change(t_ns)
 
     def _note_change(self, t_ns: int) -> None:
@@ -178,7 +178,7 @@ def _points(marker: Marker) -> Vector:
     return np.array([[point.x, point.y, point.z] for point in marker.points]).reshape(-1, 3)
 
 
-def _rgba(colors: list[ColorRGBA]) -> NDArray[np.float32]:
+def _rgba_rows(colors: list[ColorRGBA]) -> NDArray[np.float32]:
     return np.array([[c.r, c.g, c.b, c.a] for c in colors], np.float32).reshape(-1, 4)
 
 

@@ -66,16 +66,16 @@ def _carry(
         inertias.append(inertia)
     for leader in {follow.joint for follow in follows.values()}:
         velocity = np.zeros(whole.nv)
-        velocity[_dof(whole, leader)] = 1.0
+        velocity[_degree_of_freedom(whole, leader)] = 1.0
         for name, follow in follows.items():
             if follow.joint == leader:
-                velocity[_dof(whole, name)] = follow.ratio
-        dof = _dof(model, leader)
+                velocity[_degree_of_freedom(whole, name)] = follow.ratio
+        dof = _degree_of_freedom(model, leader)
         model.dof_armature[dof] += velocity @ inertias[0] @ velocity - inertias[1][dof, dof]
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def _dof(model: mujoco.MjModel, joint: str) -> int:
+def _degree_of_freedom(model: mujoco.MjModel, joint: str) -> int:
     return int(model.joint(joint).dofadr[0])
 
 

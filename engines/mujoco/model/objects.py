@@ -89,7 +89,7 @@ def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
     half = [extent / 2.0 for extent in params.size]
     bits = _PAD if params.soft else LEVEL
     if params.friction is not None:  # before that of things, and with sliding friction alone
-        bits = bits | _rubbing(params.friction) | {"condim": 3, "priority": CONTACT["priority"] + 1}
+        bits = bits | _contact_friction(params.friction) | {"condim": 3, "priority": CONTACT["priority"] + 1}
     body = spec.worldbody.add_body(name="table", pos=[x, y, z - half[2]])
     body.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, rgba=_RGBA["table"], **bits)
 
@@ -134,7 +134,7 @@ def add(spec: mujoco.MjSpec, name: str, params: ObjectParams, seed: int | None =
                 mass=PIECE.mass,
                 rgba=_colour(name),
                 **_SOLID,
-                **_rubbing(PIECE.friction),
+                **_contact_friction(PIECE.friction),
             )
         case TriangleParams():
             _add_triangle(body, params.measures, _colour(name))
@@ -145,7 +145,7 @@ def _colour(name: str) -> list[float]:
     return _COLOURS[(int(number or 1) - 1) % len(_COLOURS)]
 
 
-def _rubbing(friction: float) -> dict[str, Any]:
+def _contact_friction(friction: float) -> dict[str, Any]:
     """Return how an object with this Coulomb coefficient touches."""
     return CONTACT | {"friction": [friction, *CONTACT["friction"][1:]]}
 
@@ -159,7 +159,7 @@ def _add_triangle(body: mujoco.MjsBody, ring: Ring, rgba: list[float]) -> None:
     middle, half, edge = ring.inradius + ring.thickness / 2.0, ring.height / 2.0, ring.thickness / 2.0
     length = sqrt(3.0) * middle
     bits = {"contype": _THINGS | _WIRES, "conaffinity": _WIRES}
-    contact = _rubbing(ring.friction)
+    contact = _contact_friction(ring.friction)
     for k in range(3):
         turn = (2.0 * k + 0.5) * pi / 3.0  # of the outward normal; a corner lies on y
         normal, along = (

@@ -61,15 +61,19 @@ def render(
     from hub.recording.recording import Recording
 
     scene = RecordedScene(Recording(recording), robot, trust=trust)
-    eyes = None if position is None else _point(position, "--from")
+    eyes = None if position is None else _parse_point(position, "--from")
     picture = scene.picture(
-        round(time * 1e9), camera, (width, height), eyes, None if target is None else _point(target, "--at")
+        round(time * 1e9),
+        camera,
+        (width, height),
+        eyes,
+        None if target is None else _parse_point(target, "--at"),
     )
     Image.fromarray(picture).save(output)
     typer.echo(output)
 
 
-def _point(text: str, option: str) -> tuple[float, float, float]:
+def _parse_point(text: str, option: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(number) for number in text.replace(",", " ").split())
     except ValueError:

@@ -96,7 +96,7 @@ class Endoscope(Stepped):
         found = opengl.find()
         self._gl = found.name
         if found.name and not self._bodies:
-            self._build()
+            self._build_scene()
         elif not found.name:
             _log.warning(
                 "participant '%s' publishes no pictures: no OpenGL works here (%s). To fix it: %s",
@@ -106,7 +106,7 @@ class Endoscope(Stepped):
             )
         return self._outputs({})
 
-    def _build(self) -> EndoscopeScene:
+    def _build_scene(self) -> EndoscopeScene:
         from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 
         self._scene = EndoscopeScene(self.params, self._gl, self._bodies)
@@ -124,7 +124,7 @@ class Endoscope(Stepped):
             self._shown = cast("ShownMarkers | None", inputs.message("markers"))
         if not self._gl:
             return self._outputs({})
-        scene = self._scene or self._build()
+        scene = self._scene or self._build_scene()
         header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
         markers = () if self._shown is None else tuple(shown_markers(self._shown))
         pictures = scene.draw(self._positions, markers)
@@ -154,13 +154,13 @@ class Endoscope(Stepped):
         if params.images != "raw":
             yield (
                 "image_raw/compressed",
-                CompressedImage(header=header, format=params.format, data=self._compress(pixels)),
+                CompressedImage(header=header, format=params.format, data=self._compress_picture(pixels)),
             )
 
     def _outputs(self, messages: Mapping[str, Message]) -> Outputs:
         return {port.name: (messages[port.name],) if messages else () for port in self._pictures}
 
-    def _compress(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _compress_picture(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         from PIL import Image as Picture
 
         file = BytesIO()

@@ -53,7 +53,7 @@ class EndoscopeScene:
             self._carrier, self._mounting = self._model.body("ECM/roll").id, optical_in_roll(ecm.endoscope)
             far = far or FAR
         else:
-            self._mounting = look_at(_overview(self._model))
+            self._mounting = look_at(_overview_camera(self._model))
         far = far or float(
             np.linalg.norm(self._mounting[:3, 3] - self._model.stat.center) + 2.0 * self._model.stat.extent
         )
@@ -119,7 +119,7 @@ def look_at(view: ViewParams) -> Vector:
     return rigid_transform(np.column_stack([right, np.cross(ahead, right), ahead]), position)
 
 
-def _overview(model: mujoco.MjModel) -> ViewParams:
+def _overview_camera(model: mujoco.MjModel) -> ViewParams:
     """Return the camera with which MuJoCo's viewer starts."""
     camera = mujoco.MjvCamera()
     mujoco.mjv_defaultFreeCamera(model, camera)

@@ -71,7 +71,7 @@ class RecordedScene:
             raise TypeError(f"{params} are no parameters of kind mujoco")
         self._params, self._files = params, parameters.files
         self._qpos = f"/engine/{name}/out/qpos"
-        self._looks, self._lens = _looks(participants), _lens(participants)
+        self._looks, self._recorded_lens = _looks(participants), _recorded_lens(participants)
         self._nodes = _by_body(
             [topic for topic, kind in recording.topics.items() if kind == SoftBodyState.ros_type]
         )
@@ -101,16 +101,16 @@ class RecordedScene:
         width, height = size
         shown: dict[str, Any] = {"width": _OVERSAMPLING * width, "height": _OVERSAMPLING * height}
         if camera == "overview":
-            shown |= {"view": self._overview(bodies, position, target), "baseline": 0.0}
+            shown |= {"view": self._overview_camera(bodies, position, target), "baseline": 0.0}
         elif not self._has_endoscope:
             raise RecordingError(
                 f"'{self._recording.file}': no ECM in the scene, so there is no '{camera}' picture of an"
                 " endoscope; take the overview"
             )
         else:
-            shown |= self._lens
+            shown |= self._recorded_lens
         ((left, right),) = self._draw([time_ns], shown, bodies)
-        return _reduced(right if camera == "right" else left)
+        return _reduce_picture(right if camera == "right" else left)
 
     def stereo(
         self, times_ns: Iterable[int], size: tuple[int, int]
@@ -130,9 +130,9 @@ class RecordedScene:
         bodies = self._bodies_at(0)
         shown: dict[str, Any] = {"width": size[0], "height": size[1]}
         if self._has_endoscope:
-            shown |= self._lens
+            shown |= self._recorded_lens
         elif bodies or self._params.objects:
-            shown["view"] = self._overview(bodies, None, None)
+            shown["view"] = self._overview_camera(bodies, None, None)
         yield from self._draw(times_ns, shown, bodies)
 
     @property
@@ -195,7 +195,7 @@ class RecordedScene:
         except MessageError as error:
             raise RecordingError(f"'{self._recording.file}': topic '{message.topic}': {error}") from error
 
-    def _overview(
+    def _overview_camera(
         self, bodies: Mapping[str, SoftBody], position: Point | None, target: Point | None
     ) -> ViewParams | None:
         if position is not None and target is not None:
@@ -249,7 +249,7 @@ def _looks(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
     }
 
 
-def _lens(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
+def _recorded_lens(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
     """Return the scenario's parameters of the cameras of its endoscope, if it has one."""
     for spec in participants.values():
         if spec.kind == "endoscope" and "view" not in spec.params:
@@ -257,7 +257,7 @@ def _lens(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
     return {}
 
 
-def _reduced(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _reduce_picture(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     height, width, _ = picture.shape
     blocks = picture.reshape(height // _OVERSAMPLING, _OVERSAMPLING, width // _OVERSAMPLING, _OVERSAMPLING, 3)
     return blocks.mean(axis=(1, 3)).astype(np.uint8)

@@ -45,7 +45,7 @@ class SkinMesh:
             rest: the nodes at rest, shape (n, 3), m.
             triangles: of the surface, node indices, shape (f, 3), counter-clockwise from outside.
         """
-        faces, self._node = _split(rest, triangles)
+        faces, self._node = _split_vertices(rest, triangles)
         self._divisions: list[_Division] = []
         while not self._divisions or 4 * len(faces) <= _ENOUGH:
             division = _Division(faces)
@@ -94,7 +94,7 @@ class _Division:
         return np.concatenate([points, 0.5 * (points[start] + points[end]) - self._curved * bend])
 
 
-def _split(rest: Vector, triangles: Indices) -> tuple[Indices, Indices]:
+def _split_vertices(rest: Vector, triangles: Indices) -> tuple[Indices, Indices]:
     """Return the triangles as vertex indices, shape (f, 3), and the node of each vertex, shape (v,).
 
     Two corners at a node are one vertex if a path across edges that are not sharp leads from one to the

@@ -31,24 +31,24 @@ def solid_mesh(kind: mujoco.mjtGeom, size: Vector) -> Triangles:
     """Return the mesh of a geometry; `size`, shape (3,), m, as MuJoCo means it. Others are empty."""
     geom, (a, b, c) = mujoco.mjtGeom, size.tolist()
     if kind == geom.mjGEOM_BOX:
-        return _revolve([(a, -c), (a, c)], corners=4, flat=(a, b))
+        return _revolve_profile([(a, -c), (a, c)], corners=4, flat=(a, b))
     if kind == geom.mjGEOM_PLANE:
-        return _plane(a or _PLANE_M, b or _PLANE_M)
+        return _plane_through(a or _PLANE_M, b or _PLANE_M)
     if kind == geom.mjGEOM_CYLINDER:
-        return _revolve([(0.0, -b), (a, -b), (a, b), (0.0, b)])
+        return _revolve_profile([(0.0, -b), (a, -b), (a, b), (0.0, b)])
     angles = np.linspace(-np.pi / 2, np.pi / 2, _RINGS + 1)
     profile: list[tuple[float, float]] = np.column_stack([np.cos(angles), np.sin(angles)]).tolist()
     if kind == geom.mjGEOM_CAPSULE:
-        return _revolve([(a * r, a * z + (b if z > 0.0 else -b)) for r, z in profile])
+        return _revolve_profile([(a * r, a * z + (b if z > 0.0 else -b)) for r, z in profile])
     if kind == geom.mjGEOM_SPHERE:
-        return _revolve([(a * r, a * z) for r, z in profile])
+        return _revolve_profile([(a * r, a * z) for r, z in profile])
     if kind == geom.mjGEOM_ELLIPSOID:
-        round_ = _revolve(profile)
+        round_ = _revolve_profile(profile)
         return Triangles(round_.vertices * size, round_.faces)
     return Triangles(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
 
 
-def _revolve(
+def _revolve_profile(
     profile: list[tuple[float, float]], corners: int = _AROUND, flat: tuple[float, float] | None = None
 ) -> Triangles:
     """Return the solid between rings (radius, height), closed at both ends.
@@ -78,6 +78,6 @@ def _revolve(
     return Triangles(vertices, np.concatenate(faces))
 
 
-def _plane(a: float, b: float) -> Triangles:
+def _plane_through(a: float, b: float) -> Triangles:
     corners = np.array([[a, b, 0.0], [-a, b, 0.0], [-a, -b, 0.0], [a, -b, 0.0]])
     return Triangles(corners, np.array([[0, 1, 2], [0, 2, 3]]))

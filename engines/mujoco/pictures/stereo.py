@@ -98,7 +98,7 @@ class StereoRenderer:
         what = mujoco.mjtCatBit.mjCAT_STATIC | mujoco.mjtCatBit.mjCAT_DYNAMIC
         mujoco.mjv_updateScene(self._model, data, self._options, None, self._anywhere, what, self._scene)
         _add(self._scene, solids)
-        self._aim(pose)
+        self._aim_cameras(pose)
         mujoco.mjr_render(self._viewport, self._scene, self._context)
         mujoco.mjr_readPixels(self._pixels, None, self._viewport, self._context)
         width, upright = self._camera.width, self._pixels[::-1]
@@ -117,7 +117,7 @@ class StereoRenderer:
         in_depth = (ahead + reach > near) & (ahead - reach < far)
         return in_depth & (aside * self._from_sides < reach[:, None]).all(axis=1)
 
-    def _aim(self, pose: Vector) -> None:
+    def _aim_cameras(self, pose: Vector) -> None:
         right, down, ahead, middle = pose[:3, :4].T
         top, near, far = self._frustum
         for eye, side in zip(self._scene.camera, (-0.5, 0.5), strict=True):

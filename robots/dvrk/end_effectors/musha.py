@@ -59,7 +59,7 @@ def _bend_finger(spread: float, bend: float) -> tuple[float, float]:
     return closing, spread - first.pulley * tension / first.stiffness
 
 
-def _mode(*fingers: tuple[tuple[float, float], tuple[float, float]]) -> Mode:
+def _closing_mode(*fingers: tuple[tuple[float, float], tuple[float, float]]) -> Mode:
     """Return the mode from closing and spread of each finger, open and closed."""
     opened, closed = zip(*fingers, strict=True)
     return Mode(*(tuple(finger[part] for part in (0, 1) for finger in state) for state in (opened, closed)))
@@ -70,10 +70,10 @@ _PARALLEL = _bend_finger(radians(-70.0), radians(35.0)), _bend_finger(0.0, 1e-9)
 _CURL = _bend_finger(radians(-60.0), radians(1e-9)), _bend_finger(radians(-15.0), radians(80.0))
 
 _MODES = {
-    "folded": _mode(*[(_STRAIGHT, _STRAIGHT)] * 3),
-    "retractor": _mode(*[(_FAN, _STRAIGHT)] * 3),
-    "grasp": _mode(*[_CURL] * 3),
-    "caliper": _mode(_PARALLEL, _PARALLEL, (_FAN, _FAN)),
+    "folded": _closing_mode(*[(_STRAIGHT, _STRAIGHT)] * 3),
+    "retractor": _closing_mode(*[(_FAN, _STRAIGHT)] * 3),
+    "grasp": _closing_mode(*[_CURL] * 3),
+    "caliper": _closing_mode(_PARALLEL, _PARALLEL, (_FAN, _FAN)),
 }
 """folded: through the trocar. retractor: straight fingers fan out, over half a turn. grasp: all curl about
 what lies between them. caliper: the distal phalanges of the two opposed fingers close on what is measured,
