@@ -23,8 +23,9 @@ import numpy as np
 from bench.ros_figures import cpu_s
 from bench.ros_parts import EYES, picture
 from devices.ros.gateway import Gateway
-from hub.planning.registry import make
+from hub.planning.session_parameters import SessionParameters
 from hub.transport.zenoh_session import open_session
+from schemas.files import Files
 from schemas.trocar_msgs import GatewayStatus
 from schemas.vectors import VectorCodec
 
@@ -42,7 +43,8 @@ def every(period_s: float, until: float, do: Any) -> None:
 
 def main() -> None:
     kind, endpoint, params, seconds = sys.argv[1:5]
-    gateway = make(kind, "ros", json.loads(params), Path.cwd())
+    parameters = SessionParameters({"ros": kind}, {"ros": json.loads(params)}, (), Files(Path.cwd()))
+    gateway, _ = parameters.make("ros")
     assert isinstance(gateway, Gateway)
     gateway.learn_hub(partial(open_session, "client", connect=[endpoint]))
     gateway.open(Path.cwd())

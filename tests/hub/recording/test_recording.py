@@ -70,7 +70,7 @@ def test_payloads_are_not_trusted(tmp_path: Path) -> None:
     ("attachments", "problem"),
     [
         ({}, "holds no scenario: it was not recorded by `trocar run`"),
-        ({"scenario.json": b"{"}, "this version cannot read the scenario in it: JSONDecodeError"),
+        ({"scenario.json": b"{"}, "this version cannot read the scenario in it: ValueError"),
         ({"scenario.json": b"[1]"}, "this version cannot read the scenario in it: TypeError"),
         ({"scenario.json": b"{}"}, "this version cannot read the scenario in it: KeyError: 'participants'"),
         (

@@ -8,11 +8,13 @@ from time import sleep
 import pytest
 
 from hub.planning.scenario_file import load
+from hub.planning.session_parameters import SessionParameters
 from hub.security.access import access_settings
 from hub.session.joined_hosts import JoinedHosts
 from hub.session.launch import launch, plan_of
 from hub.transport.control_messages import JoinRequest
 from schemas.errors import ConnectError, MessageError
+from schemas.files import Files
 from tests.hub.authorities import Authority, free_port
 
 SCENARIO = """\
@@ -101,7 +103,7 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
     joined_hosts = JoinedHosts(
         file.scenario,
         plan,
-        file.source.directory,
+        SessionParameters.of_scenario(file.scenario, Files(file.source.directory)),
         1,
         [("near", "out"), ("hand", "hand")],
         lambda *_: None,
