@@ -65,8 +65,10 @@ def test_the_next_wait_has_the_whole_limit_and_no_delay_from_before(clock):
 @contextmanager
 def busy_processes(count):
     with ExitStack() as stack:
-        started = [stack.enter_context(subprocess.Popen(BUSY)) for _ in range(count)]
-        stack.callback(lambda: [process.kill() for process in started])
+        started = list[subprocess.Popen[bytes]]()
+        for _ in range(count):
+            started.append(stack.enter_context(subprocess.Popen(BUSY)))
+            stack.callback(started[-1].kill)  # also if the next one does not start: the loops are endless
         yield started
 
 
