@@ -57,7 +57,7 @@ class Link:
                 self._way, (t + self._delay + self._chance.random() * self._jitter, self._sent, message)
             )
 
-    def arrived(self, t: float) -> Iterator[tuple[int, object]]:
+    def pop_arrivals(self, t: float) -> Iterator[tuple[int, object]]:
         """Yield number and message of all that has come by `t`."""
         while self._way and self._way[0][0] <= t + 1e-9:
             yield heapq.heappop(self._way)[1:]

@@ -79,7 +79,7 @@ def instrument(tool: Instrument) -> Collisions:
 
 def _convex_hull(name: str, shown: tuple[Part, ...]) -> Part:
     points = np.concatenate([p.vertices for p in shown if p.name not in _THIN])
-    return hull(f"{name}_convex_hull", points, shown[0].material)
+    return hull(f"{name}_hull", points, shown[0].material)
 
 
 def _upright(name: str, radius: float, low: float, high: float) -> Primitive:
