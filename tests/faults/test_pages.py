@@ -74,10 +74,15 @@ def test_sessions_of_a_page_end_with_its_server(server, tmp_path, number):
     said = tmp_path / "said"
     start_session(until(lambda: re.search(r"http://127\S+", said.read_text()), 100.0)[0])
     assert len(living(tmp_path.name)) >= 3, "server, hub and page of the session"
+    temporary = tmp_path / "temporary"
+
+    def left():
+        return [file for file in temporary.rglob("*") if file.name.startswith("tmp")]
+
+    until(lambda: not left(), 100.0)  # of the output of a prepared process that starts
     server.send_signal(number)
     server.wait(100)
     until(lambda: not living(tmp_path.name), 100.0)
-    temporary = tmp_path / "temporary"
     assert [file for file in temporary.rglob("*") if file.name != private_directory().name] == []
     statuses = [status for _, status in Recording(tmp_path / "table").statuses()]
     assert "interrupted" in statuses[-1].detail, "the recording was closed in order"

@@ -47,5 +47,6 @@ def test_the_program_of_the_documentation_moves_an_arm(rclpy_python, domain, tmp
     ran = programs[0].result()
     assert ran.returncode == 0, ran.stderr
     there, back = ran.stdout.splitlines()
-    assert there.startswith("at [-0.20")
-    assert back.startswith(("at [0.00", "at [-0.00"))
+    first, last = (float(line.removeprefix("at [").split(",")[0]) for line in (there, back))
+    assert first == pytest.approx(-0.2, abs=0.01)
+    assert last == pytest.approx(0.0, abs=0.01)

@@ -96,8 +96,6 @@ ROSBAG = """
 import sys
 import rosbag, rospy
 from sensor_msgs.msg import JointState
-from schemas.files import Files
-from pathlib import Path
 
 with rosbag.Bag(sys.argv[1], "w", compression="bz2") as bag:
     message = JointState(position=[0.1] * 6)
