@@ -49,9 +49,9 @@ class Publication:
 
     def __call__(self, message: bytes, /) -> None:
         """Send a message (CDR); a slow subscriber gets the newest messages."""
-        if not self.wanted:
-            return
-        with self._publishing:
+        with self._publishing:  # also around the look: a subscriber that has our header gets what follows
+            if not self.wanted:
+                return
             self._count += 1
             frame = self._wire.frame(message, self._count)
             self._last = frame if self._latched else None

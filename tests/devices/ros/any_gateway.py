@@ -18,13 +18,13 @@ from hub.planning import registry
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
 from tests.devices.ros.crtk_table import Peer
-from tests.devices.ros.helpers import until
 from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.rclpy_peer import RclpyPeer, free_domain
 from tests.devices.ros.rospy_peer import Program, master, needs_rospy
 from tests.devices.ros.rospy_peer import TablePeer as RospyPeer
 from tests.devices.ros.zenoh.test_gateway import TablePeer as ZenohTable
 from tests.devices.ros.zenoh.zenoh_peer import Peer as ZenohPeer
+from tests.waiting import until
 
 __all__ = ["Middleware", "middleware", "rclpy_python"]
 
@@ -73,8 +73,7 @@ class ZenohProgram(ZenohTable):
 
     def join(self, rows):
         wanted = {row.topic for row in rows}
-        there = until(lambda: wanted <= {entry[2] for entry in self.peer.graph() if len(entry) > 2})
-        assert there, f"not all of {wanted} are there"
+        until(lambda: wanted <= {entry[2] for entry in self.peer.graph() if len(entry) > 2})
         super().join(rows)
 
 

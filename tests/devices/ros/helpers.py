@@ -1,14 +1,6 @@
-"""What tests of several gateways share: waiting, joint positions as fields, and samples of a topic."""
+"""What tests of several gateways share: joint positions as fields, and samples of a topic."""
 
 import time
-
-
-def until(condition, seconds=60.0):
-    """Wait until `condition` holds; return its last value."""
-    end = time.monotonic() + seconds
-    while not (held := condition()) and time.monotonic() < end:
-        time.sleep(0.005)
-    return held
 
 
 def joint_fields(values, stamp_ns=None):

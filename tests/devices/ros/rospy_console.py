@@ -164,6 +164,22 @@ def raw(kind, octets):
     return type("Raw", (kind,), {"serialize": lambda self, buffer: buffer.write(bytes(octets))})()
 
 
+def connected(ends, seconds=60.0):
+    """Wait until each publisher and subscriber has a peer; return the topics of those without.
+
+    rospy counts a subscriber's connection before it is made (`create_transport`), so `get_num_connections` is
+    no answer. The limit counts naps: a machine that stood still has not waited.
+    """
+    for _ in range(round(seconds / 0.01)):
+        missing = [
+            end.name for end in ends if not any(each.remote_endpoint[1] for each in end.impl.connections)
+        ]
+        if not missing:
+            break
+        time.sleep(0.01)
+    return missing
+
+
 class Arm:
     """Enables, homes and moves one arm, and waits as crtk_python_client does: for busy told after the order,
     then for not busy.
@@ -212,11 +228,7 @@ class Arm:
 
     def connected(self, seconds=60.0):
         """Wait for a peer of everything; say whether all have one."""
-        end = time.time() + seconds
-        ends = [*self.kept, self.state_command, *self.movers.values()]
-        while not (there := all(each.get_num_connections() for each in ends)) and time.time() < end:
-            time.sleep(0.01)
-        return there
+        return not connected([*self.kept, self.state_command, *self.movers.values()], seconds)
 
     def _until(self, holds, seconds):
         with self.changed:
@@ -290,13 +302,7 @@ class Console:
                 self.services[topic] = rospy.ServiceProxy(topic, service_class(type_), persistent=True)
         for topic in self.services:
             rospy.wait_for_service(topic, 60.0)
-        ends = heard + [self.publishers[topic] for topic, _, way in rows if way == "subscribe"]
-        end = time.time() + 60.0
-        while (
-            missing := [each.name for each in ends if not each.get_num_connections()]
-        ) and time.time() < end:
-            time.sleep(0.02)
-        return missing
+        return connected(heard + [self.publishers[topic] for topic, _, way in rows if way == "subscribe"])
 
     def listen(self, topic, type_):
         self.subscribe(topic, type_)
@@ -317,10 +323,6 @@ class Console:
             return flat(self.heard_of[topic].get(timeout=seconds))
         except queue.Empty:
             return None
-
-    def all_heard(self, topic):
-        heard = self.heard_of[topic]
-        return [flat(heard.get()) for _ in range(heard.qsize())]
 
     def sequence(self, topic):
         """Return the counters in the headers of what was heard."""
@@ -343,11 +345,8 @@ class Console:
             return str(error)
         return ""
 
-    def wait_for_peers(self, topic, seconds=60.0):
-        end = time.time() + seconds
-        while not self.publishers[topic].get_num_connections() and time.time() < end:
-            time.sleep(0.01)
-        return self.publishers[topic].get_num_connections()
+    def wait_for_peers(self, topic):
+        return not connected([self.publishers[topic]])
 
     def arm(self, name, method, *arguments):
         if name not in self.arms:

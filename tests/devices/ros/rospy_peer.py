@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from schemas.codec import message_type
-from tests.devices.ros.helpers import until
 from tests.hub.authorities import free_port
+from tests.waiting import until
 
 CONSOLE = Path(__file__).with_name("rospy_console.py")
 NOETIC = "/opt/ros/noetic/lib/python3/dist-packages"

@@ -19,11 +19,11 @@ from hub.planning.scenario_file import load
 from hub.session.launch import plan_of
 from tests.devices.ros.bags.test_player import joints
 from tests.devices.ros.crtk_table import WHOLE
-from tests.devices.ros.helpers import until
 from tests.devices.ros.zenoh.test_console import gated
 from tests.devices.ros.zenoh.test_gateway import JOINTS, STATE
 from tests.devices.ros.zenoh.zenoh_peer import Peer
 from tests.hub.recording.ros_bags import write
+from tests.waiting import until
 
 __all__ = ["gated"]
 

@@ -27,11 +27,11 @@ from hub.verify import verify
 from schemas.codec import message_type, validate_message
 from schemas.errors import MessageError, RecordingError
 from schemas.vectors import VectorCodec
-from tests.devices.ros.helpers import until
 from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.rospy_peer import environment, needs_rospy, rospy_python
 from tests.devices.ros.zenoh.test_gateway import JOINTS, STATE_TYPE, joints
 from tests.devices.ros.zenoh.zenoh_peer import TYPES, Peer, built
+from tests.waiting import until
 
 pytestmark = pytest.mark.xdist_group("bags")  # its fixtures are expensive: made once, in one process
 

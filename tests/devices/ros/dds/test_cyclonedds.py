@@ -26,8 +26,8 @@ from devices.ros.dds.gateway import DdsGateway
 from devices.ros.dds.graph import Graph, entities_info
 from devices.ros.topics.dvrk_table import dvrk_table
 from schemas.errors import DeviceError, MessageError
-from tests.devices.ros.helpers import until
 from tests.devices.ros.rclpy_peer import free_domain
+from tests.waiting import until
 
 pytestmark = pytest.mark.xdist_group("network")  # an interface that others add and remove stops DDS
 

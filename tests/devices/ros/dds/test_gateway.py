@@ -13,9 +13,10 @@ from devices.ros.dds.gateway import DdsGateway
 from schemas.codec import message_type, rihs01
 from schemas.ros import Header, JointState, StringMessage, Time
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
-from tests.devices.ros.helpers import received, until, wanted
+from tests.devices.ros.helpers import received, wanted
 from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.rclpy_peer import RclpyPeer, environment, free_domain
+from tests.waiting import until
 
 __all__ = ["rclpy_python"]
 

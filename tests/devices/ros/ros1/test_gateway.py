@@ -16,9 +16,10 @@ from schemas.codec import message_type
 from schemas.crtk import OperatingState
 from schemas.ros import StringMessage
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
-from tests.devices.ros.helpers import joint_fields, received, until, wanted
+from tests.devices.ros.helpers import joint_fields, received, wanted
 from tests.devices.ros.rospy_peer import Program, TablePeer, master, needs_rospy
 from tests.hub.authorities import free_port
+from tests.waiting import LIMIT_S, until, within
 
 pytestmark = [pytest.mark.ros, needs_rospy]
 
@@ -72,17 +73,17 @@ def order(word, stamp_ns=0):
     return {"header": {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": ""}, "string": word}
 
 
-def came_in(gateway, topic, seconds=60.0):
-    return until(lambda: received(gateway, topic), seconds)
+def came_in(gateway, topic, seconds=LIMIT_S):
+    return within(lambda: received(gateway, topic), seconds)
 
 
-def complaint(gateway, seconds=60.0):
+def complaint(gateway):
     """Return why the last message that was refused was so."""
 
     def reasons():
         return [count.reason for count in gateway._counters._counts.values() if count.refused]
 
-    return reasons()[0] if until(reasons, seconds) else ""
+    return until(reasons)[0]
 
 
 def clients(gateway):

@@ -7,8 +7,8 @@ from pydantic import ValidationError
 
 from devices.ros.ros1.gateway import Ros1Gateway
 from schemas.errors import DeviceError
-from tests.devices.ros.helpers import until
 from tests.hub.authorities import free_port
+from tests.waiting import until
 
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
 

@@ -8,7 +8,7 @@ import pytest
 from devices.ros.ros1 import registration as ros1_registration
 from devices.ros.ros1.registration import Entry, Registration
 from devices.ros.ros1.xmlrpc_api import ApiResult, ApiServer, success
-from tests.devices.ros.helpers import until
+from tests.waiting import until
 
 MADE_KNOWN = [[[1, "", []]], [[1, "", []]]]
 

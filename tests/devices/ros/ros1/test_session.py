@@ -13,9 +13,9 @@ from devices.ros.ros1.gateway import Ros1Gateway
 from hub.planning.wiring import make_plan
 from hub.session.session import Session
 from schemas.scenario import Scenario
-from tests.devices.ros.helpers import until
 from tests.devices.ros.ideal_robot import IdealRobot, motion
 from tests.devices.ros.rospy_peer import Program, master, needs_rospy
+from tests.waiting import until
 
 pytest.importorskip("ruckig")
 pytestmark = [pytest.mark.ros, needs_rospy]

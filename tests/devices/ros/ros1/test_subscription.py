@@ -15,8 +15,8 @@ from devices.ros.ros1.xmlrpc_api import ApiResult, ApiServer, success
 from devices.ros.topics.row import Row
 from schemas.codec import encode
 from schemas.ros import StringMessage
-from tests.devices.ros.helpers import until
 from tests.hub.authorities import free_port
+from tests.waiting import until
 
 TOPIC, WORD = "/PSM1/set_tool_type", StringMessage.ros_type
 LATCHED, HEARD = Row(TOPIC, WORD, "publish", latched=True), Row(TOPIC, WORD, "subscribe")

@@ -13,7 +13,7 @@ from hub.transport.zenoh_session import open_session
 from schemas.crtk import OperatingState
 from schemas.keys import Keys
 from schemas.ros import StringMessage
-from tests.devices.ros.helpers import received, until
+from tests.devices.ros.helpers import received
 from tests.devices.ros.zenoh.test_gateway import (
     ARM,
     COMMAND,
@@ -27,6 +27,7 @@ from tests.devices.ros.zenoh.test_gateway import (
 )
 from tests.devices.ros.zenoh.zenoh_peer import TYPES, Peer, built
 from tests.hub.authorities import Authority, free_port
+from tests.waiting import until
 
 KEYS = Keys("s")
 PLAN = Plan(

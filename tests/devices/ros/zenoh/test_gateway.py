@@ -19,9 +19,10 @@ from schemas.crtk import OperatingState
 from schemas.errors import DeviceError
 from schemas.ros import StringMessage
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
-from tests.devices.ros.helpers import joint_fields, received, until, wanted
+from tests.devices.ros.helpers import joint_fields, received, wanted
 from tests.devices.ros.zenoh.zenoh_peer import TYPES, Peer, built, flat
 from tests.hub.authorities import free_endpoint
+from tests.waiting import until
 
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
 SETPOINT = "/PSM1/setpoint_js"

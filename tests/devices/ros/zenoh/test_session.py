@@ -7,10 +7,10 @@ import time
 
 import pytest
 
-from tests.devices.ros.helpers import until
 from tests.devices.ros.zenoh.test_gateway import COMMAND, JOINTS, STATE, joints
 from tests.devices.ros.zenoh.zenoh_peer import Peer
 from tests.hub.conftest import install_plugin, prepare, toys
+from tests.waiting import until
 
 __all__ = ["install_plugin", "prepare", "toys"]
 
