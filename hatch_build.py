@@ -24,7 +24,6 @@ _EXTENSIONS = (
         include_dirs=[np.get_include()],
         extra_compile_args=_FLAGS,
     ),
-    Extension("hub.recording._chunk", ["hub/recording/_chunk.c"], extra_compile_args=_FLAGS),
     Extension("schemas._cdr", ["schemas/_cdr.c"], include_dirs=[np.get_include()], extra_compile_args=_FLAGS),
 )
 

@@ -27,7 +27,6 @@ from webconsole.felt import felt_wrenches
 from webconsole.frame import Section, SectionKind, node_content
 from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
-from webconsole.payload import first_sequence
 from webconsole.source import Outlet, Value
 
 __all__ = ["GROUP", "Stage"]
@@ -39,6 +38,8 @@ GROUP = "trocar.scenes"
 _LENGTH = struct.Struct("<I")
 _FLESH: Rgb = (0.8, 0.38, 0.33)
 """Colour of a surface without a scene."""
+_NOTE = 1000
+"""Longest reason in a note, characters: enough for a remedy at the end."""
 _GRID_M = 2.0**-16
 """Step of rounded vertices, m: 15 um are not seen, and trailing zeros compress."""
 
@@ -96,7 +97,7 @@ class Stage:
             except Exception as error:  # noqa: BLE001  # a plug-in may raise anything; the page says what
                 self.notes.append(
                     f"'{participant}' (kind {kind}) cannot be drawn: {type(error).__name__}:"
-                    f" {' '.join(str(error).split())[:300]}"
+                    f" {' '.join(str(error).split())[:_NOTE]}"
                 )
                 log.warning("%s", self.notes[-1])
         return None
@@ -122,13 +123,14 @@ class Stage:
     def section(self, name: str, value: Value) -> Section:
         """Return the section of an outlet of a surface, markers or a picture."""
         if name in self.surfaces:
-            nodes = np.frombuffer(first_sequence(value.payload, 4), "<f4")
+            nodes = decode(SoftBodyState, value.payload).nodes_m
             content = node_content(nodes) if nodes.size else b""
             return Section(SectionKind.NODES, [*self.surfaces].index(name), content)
         if name in self.markers:
             content = marker_content(decode(ShownMarkers, value.payload))
             return Section(SectionKind.MARKERS, self.markers.index(name), content)
-        return Section(SectionKind.PICTURE, self.pictures.index(name), first_sequence(value.payload, 1))
+        picture = decode(CompressedImage, value.payload).data.tobytes()
+        return Section(SectionKind.PICTURE, self.pictures.index(name), picture)
 
     def surface(self, name: str, first: Value) -> Section | None:
         """Return the triangles of a soft surface; None if this message has none."""

@@ -1,4 +1,4 @@
-"""The messages of a chunk of an MCAP file, laid out by `_chunk.c` or, without the C module, by numpy.
+"""The messages of a chunk of an MCAP file, laid out by numpy.
 
 The record types come from the `mcap` package. The package's `Writer` adds messages singly, at two to three
 times the cost (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop.
@@ -15,12 +15,7 @@ from numpy.typing import NDArray
 
 from hub.recording.vector_block import MESSAGE, RECORD_HEADER_BYTES, VectorBlock
 
-try:
-    from hub.recording import _chunk as compiled
-except ImportError:  # there was no compiler: the same bytes, and a session waits longer for its recorder
-    compiled = None
-
-__all__ = ["FIRST_BLOCK", "ChunkData", "Queued", "chunk_data", "compiled"]
+__all__ = ["FIRST_BLOCK", "ChunkData", "Queued", "chunk_data"]
 
 FIRST_BLOCK = 2**16
 """Blocks have numbers from here on; a channel's has 16 bits."""
@@ -53,18 +48,8 @@ class ChunkData:
     offsets: NDArray[np.int64]
 
 
-def chunk_data(queued: list[Queued], blocks: Sequence[VectorBlock] = ()) -> ChunkData:
-    """Return the queued messages and vectors, in this order, as the records of a chunk.
-
-    Raises ValueError if bytes are no vectors of their block, and OverflowError for a negative time.
-    """
-    if compiled is None:
-        return _by_numpy(queued, blocks)
-    records, places = compiled.lay_out(queued, [block.layout for block in blocks], FIRST_BLOCK)
-    return ChunkData(records, *np.frombuffer(places, np.int64).reshape(3, -1))
-
-
-def _by_numpy(queued: Sequence[Queued], blocks: Sequence[VectorBlock]) -> ChunkData:
+def chunk_data(queued: Sequence[Queued], blocks: Sequence[VectorBlock] = ()) -> ChunkData:
+    """Return the queued messages and vectors, at least one, in this order as the records of a chunk."""
     numbers, times, contents = zip(*queued, strict=True)
     times_ns = np.array(times, np.int64)
     kinds: NDArray[np.int64] = np.maximum(numbers, _ALONE)

@@ -13,7 +13,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from hub.recording.chunk import ChunkData, compiled
+from hub.recording.chunk import ChunkData
 from hub.recording.vector_block import RECORD_HEADER_BYTES
 
 __all__ = ["MessageIndex", "chunk_index", "message_index"]
@@ -38,14 +38,6 @@ class MessageIndex(NamedTuple):
 
 def message_index(data: ChunkData) -> MessageIndex:
     """Return the message index records of a chunk, a record for each channel."""
-    if compiled is None:
-        return _by_numpy(data)
-    columns = (data.channels, data.times_ns, data.offsets)
-    records, tables = compiled.index(*map(np.ascontiguousarray, columns))
-    return MessageIndex(records, *np.frombuffer(tables, np.int64).reshape(3, -1))
-
-
-def _by_numpy(data: ChunkData) -> MessageIndex:
     order = np.argsort(data.channels, kind="stable")
     entries = np.empty(len(order), _ENTRY)
     entries["time"], entries["offset"] = data.times_ns[order], data.offsets[order]

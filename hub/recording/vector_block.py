@@ -11,11 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from mcap.opcode import Opcode
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from schemas.vectors import VectorCodec
 
-__all__ = ["MESSAGE", "RECORD_HEADER_BYTES", "Layout", "VectorBlock"]
+__all__ = ["MESSAGE", "RECORD_HEADER_BYTES", "VectorBlock"]
 
 MESSAGE = np.dtype(
     [
@@ -33,16 +33,6 @@ RECORD_HEADER_BYTES = 9
 
 _TIME = np.dtype([("ns", "<u8"), ("sec", "<i4"), ("nanosec", "<u4")])
 """A time in MCAP, and a stamp in CDR."""
-
-
-_Span = tuple[int, int, int]
-"""Place of a span in the records, place in the vectors, and length, bytes."""
-Layout = tuple[bytes, int, bytes, bytes, bytes, bytes]
-"""Records without times and numbers, the bytes of all vectors, and tables of i64.
-
-These are: where times are, where stamps are, parts of the vectors (place in the records, place in the
-vectors, bytes), and messages (channel, place).
-"""
 
 
 class VectorBlock:
@@ -63,51 +53,25 @@ class VectorBlock:
         """Bytes of the records of a step."""
         self._template = b"".join(_header(channel, codec) + codec.template for channel, codec in vectors)
         self._vectors = slice(self.size, self.size + sum(8 * codec.size for _, codec in vectors))
-        times, stamps, spans = self._place_tables(vectors)
-        self._sources = self._places(times, stamps, spans)
+        self._sources = self._places(vectors)
         """For each byte of the records, the place in the concatenated template, vectors and time."""
         self._rows = self._new_rows(0)
         """Template, vectors and time of each step, shape (steps, bytes); the template stays."""
-        messages = np.stack((self.channels, self.offsets), axis=1)
-        size = self._vectors.stop - self._vectors.start
-        self.layout: Layout = (
-            self._template,
-            size,
-            _table(times),
-            _table(stamps),
-            _table(spans),
-            _table(messages),
-        )
-        """The same for `_chunk.c`."""
 
-    def _place_tables(
-        self, vectors: Sequence[tuple[int, VectorCodec]]
-    ) -> tuple[list[int], list[int], list[_Span]]:
-        """Return where times and stamps are in the records, and the parts of the vectors."""
-        times: list[int] = []
-        stamps: list[int] = []
-        spans: list[_Span] = []
-        number = 0
-        for start, (_, codec) in zip(self.offsets.tolist(), vectors, strict=True):
-            payload = start + MESSAGE.itemsize
-            times += payload - 16, payload - 8
-            stamps += [] if codec.stamp is None else [payload + codec.stamp.start]
-            spans += [(payload + begin, number + part.start, end - begin) for begin, end, part in codec.spans]
-            number += 8 * codec.size
-        return times, stamps, spans
-
-    def _places(
-        self, times: Sequence[int], stamps: Sequence[int], spans: Sequence[_Span]
-    ) -> NDArray[np.intp]:
+    def _places(self, vectors: Sequence[tuple[int, VectorCodec]]) -> NDArray[np.intp]:
         places = np.arange(self.size)
         number, time = self._vectors.start, self._vectors.stop
         stamp, end = time + 8, time + _TIME.itemsize
-        for at in times:
-            places[at : at + 8] = range(time, stamp)
-        for at in stamps:
-            places[at : at + 8] = range(stamp, end)
-        for at, part, size in spans:
-            places[at : at + size] = range(number + part, number + part + size)
+        for start, (_, codec) in zip(self.offsets.tolist(), vectors, strict=True):
+            payload = start + MESSAGE.itemsize
+            for at in (payload - 16, payload - 8):
+                places[at : at + 8] = range(time, stamp)
+            if codec.stamp is not None:
+                at = payload + codec.stamp.start
+                places[at : at + 8] = range(stamp, end)
+            for begin, finish, part in codec.spans:
+                places[payload + begin : payload + finish] = range(number + part.start, number + part.stop)
+            number += 8 * codec.size
         return places
 
     def _new_rows(self, steps: int) -> NDArray[np.uint8]:
@@ -127,10 +91,6 @@ class VectorBlock:
         rows[:, self._vectors] = np.frombuffer(b"".join(vectors), np.uint8).reshape(steps, -1)
         rows[:, self._vectors.stop :] = times.view(np.uint8).reshape(steps, -1)
         return rows.take(self._sources, axis=1).view(f"V{self.size}").ravel().tolist()
-
-
-def _table(numbers: ArrayLike) -> bytes:
-    return np.array(numbers, np.int64).tobytes()
 
 
 def _header(channel: int, codec: VectorCodec) -> bytes:

@@ -8,10 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.codec import encode
 from schemas.errors import MessageError
-from schemas.ros import CompressedImage, Header
-from schemas.trocar_msgs import SoftBodyState
+from schemas.ros import Header
 from tests.webconsole.recorded_scene import markers
 from webconsole.frame import (
     Section,
@@ -23,7 +21,6 @@ from webconsole.frame import (
     sections,
 )
 from webconsole.markers import marker_content
-from webconsole.payload import first_sequence
 
 PARTS = st.lists(
     st.builds(Section, st.sampled_from(SectionKind), st.integers(0, 65535), st.binary(max_size=65))
@@ -92,19 +89,6 @@ def test_markers_whose_parts_do_not_fit_are_rejected():
         cut = np.append(value[1:], 2).astype(value.dtype) if part.endswith("counts") else value[1:]
         with pytest.raises(MessageError, match="other sizes"):
             marker_content(shown.model_copy(update={part: cut}))
-
-
-@given(st.binary(max_size=60), st.text("abz", max_size=9), st.text("xy", max_size=5))
-def test_the_array_of_a_message_is_found_without_decoding_it(data, frame_id, word):
-    picture = CompressedImage(header={"frame_id": frame_id}, format=word, data=np.frombuffer(data, np.uint8))
-    payload = encode(picture)
-    assert first_sequence(payload, 1) == data
-    for size in range(len(payload)):
-        with pytest.raises(MessageError):
-            first_sequence(payload[:size], 1)
-    nodes = np.arange(3.0 * len(data), dtype=np.float32)
-    state = SoftBodyState(header={"frame_id": frame_id}, body=word, nodes_m=nodes)
-    assert first_sequence(encode(state), 4) == nodes.tobytes()
 
 
 @pytest.mark.parametrize("nodes", [[0.0, 1.0], [0.0, np.nan, 0.0], [np.inf, 0.0, 0.0]])

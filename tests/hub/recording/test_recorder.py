@@ -139,6 +139,13 @@ def test_chunk_layout_round_trips(messages: list[tuple[int, int, bytes]]) -> Non
     assert np.array_equal(data.offsets, [m.offset for m in located])
 
 
+def test_a_message_is_as_the_format_has_it() -> None:
+    data = chunk_data([(7, 5, b"abc")])
+    assert data.records == struct.pack("<BQHIQQ", 5, 25, 7, 0, 5, 5) + b"abc"
+    places = data.channels, data.times_ns, data.offsets
+    assert [column.tolist() for column in places] == [[7], [5], [0]]
+
+
 PORTS = (
     Port(name="tip", type=POSE, causality="output", frame="base"),
     Port(name="force", type="std_msgs/msg/Float64", causality="output"),
