@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from controllers.motion.frames import base_in_world
-from controllers.motion.params import Arms, MotionParams, PsmParams, SetupJoints
+from controllers.motion.params import Arms, PsmParams, SetupJoints
 from hub.participant import (
     Controller,
     Inputs,
@@ -109,8 +109,7 @@ class _Hand:
     """An arm."""
 
     def __init__(self, arm: ArmName, params: ActionsParams, held: PsmParams) -> None:
-        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        self.base = base_in_world(arm, stands)
+        self.base = base_in_world(arm, params)
         self.arm, self.chain, self.params = arm, held.chain, params
         corners = np.array(params.workspace)
         self.low, self.high = corners.min(axis=0), corners.max(axis=0)

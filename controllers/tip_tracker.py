@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from controllers.motion.frames import base_in_world
-from controllers.motion.params import Arms, EcmParams, MotionParams, SetupJoints
+from controllers.motion.params import Arms, EcmParams, SetupJoints
 from controllers.ports import measured_joints
 from hub.participant import Controller, Inputs, Outputs, Params, Setup, event_out, signal_in
 from robots.dvrk import crtk, ecm, endoscope
@@ -61,12 +61,11 @@ class TipTracker(Controller):
 
     def __init__(self, name: str, params: TipTrackerParams) -> None:
         super().__init__(name, params)
-        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.present_arms if arm != "ECM"}
+        self._bases = {arm: base_in_world(arm, params) for arm in params.arms.present_arms if arm != "ECM"}
         self._camera = StereoCamera(params.width, params.height)
         held = params.arms.ECM or EcmParams()
         self._eye = endoscope.left_camera(held.endoscope, self._camera.baseline)
-        self._stand = base_in_world("ECM", stands)
+        self._stand = base_in_world("ECM", params)
         self._outputs: dict[str, Any] = {f"{arm}/seen": () for arm in self._bases}
 
     @property

@@ -101,7 +101,7 @@ class NewDirectory:
         place: Place of the finished directory, where nothing or an empty directory stands.
         purpose: Purpose, in a word.
 
-    Raises ScenarioError as `claimed` does.
+    Raises ScenarioError as `claim_directory` does.
     """
 
     def __init__(self, place: Path, purpose: str) -> None:

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hub.participant import Inputs
-from robots import rotation
 from robots.dvrk import setup_joints
-from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.mounted import MountedEcm
 from robots.dvrk.setup_joints import CartArm
-from robots.transform import pose_to_matrix, rigid_transform
+from robots.transform import pose_to_matrix
 from schemas.ros import BoolMessage
 from schemas.vectors import Vector
 from tasks.params import TaskParams
@@ -157,5 +156,4 @@ def base_pose(params: TaskParams, arm: CartArm) -> Vector:
     if params.mounting == "cart":
         positions = params.setup_joints.get(arm, setup_joints.SIMULATED[arm])
         return setup_joints.base_pose(arm, np.array(positions))
-    mounted: MountedPsm | MountedEcm = params.arms[arm]
-    return rigid_transform(rotation.matrix(np.array(mounted.orientation)), mounted.position)
+    return params.arms[arm].pose

@@ -65,14 +65,14 @@ def console_ports(params: DvrkConsoleParams) -> tuple[Port, ...]:
     """Return the ports of a console with these parameters."""
     masters, led = (sorted({name.split("_")[i] for name in params.teleoperations}) for i in (0, 1))
     commands = (
-        _named_ports("console", CONSOLE.commands)
+        _prefixed("console", CONSOLE.commands)
         | {f"system/{name}": SYSTEM.commands[name] for name in _SYSTEM_COMMANDS}
-        | _named_ports("pedals", PEDALS.events)
+        | _prefixed("pedals", PEDALS.events)
     )
     events = (
-        _named_ports("console", CONSOLE.events)
-        | _named_ports("system", SYSTEM.events)
-        | _named_ports("footpedals", PEDALS.events)
+        _prefixed("console", CONSOLE.events)
+        | _prefixed("system", SYSTEM.events)
+        | _prefixed("footpedals", PEDALS.events)
     )
     return (
         *_events_in(commands),
@@ -101,7 +101,7 @@ def _pose(name: str, meaning: str) -> Port:
     return signal_in(name, PoseStamped, meaning, start=NO_POSE)
 
 
-def _named_ports(prefix: str, types: Mapping[str, str]) -> dict[str, str]:
+def _prefixed(prefix: str, types: Mapping[str, str]) -> dict[str, str]:
     return {f"{prefix}/{name}": type_ for name, type_ in types.items()}
 
 
@@ -115,16 +115,16 @@ def _master(master: str) -> Iterable[Port]:
             "opening of the gripper, as the motors' encoders measure it",
             start=(NO_GRIPPER,),
         ),
-        *_events_out(_named_ports(master, _MASTER_COMMANDS)),
+        *_events_out(_prefixed(master, _MASTER_COMMANDS)),
     )
 
 
 def _teleoperation_ports(name: str, params: DvrkConsoleParams) -> Iterable[Port]:
     leads, gripper = f"teleop/{name}", "to the `teleoperation`: 0 closed .. 1 open, negative: none"
     return (
-        *_events_in(_named_ports(name, TELEOPERATION.commands)),
+        *_events_in(_prefixed(name, TELEOPERATION.commands)),
         *(event_in(f"{leads}/{said}", StringMessage) for said in ("state", "warning")),
-        *_events_out(_named_ports(name, TELEOPERATION.events)),
+        *_events_out(_prefixed(name, TELEOPERATION.events)),
         event_out(f"{leads}/buttons", BUTTON),
         *(event_out(f"{leads}/lock_{motion}", BoolMessage) for motion in ("rotation", "translation")),
         signal_out(f"{leads}/scale", Float64Message, "to the `teleoperation`", start=(params.scale,)),

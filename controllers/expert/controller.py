@@ -17,7 +17,7 @@ from controllers.expert.progress import ObservedObjects, Progress, Verdict
 from controllers.expert.team import Team
 from controllers.expert.transfer import Transfer
 from controllers.motion.frames import base_in_world
-from controllers.motion.params import MotionParams, PsmParams
+from controllers.motion.params import PsmParams
 from hub.participant import Controller, Inputs, Outputs, Params, Setup
 from robots.dvrk.parameters import ArmName
 from robots.training.fixtures import DishParams
@@ -59,11 +59,10 @@ class Expert(Controller):
 
     def _hand(self, arm: ArmName) -> RobotHand:
         params = self.params
-        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
         held = cast("PsmParams", params.arms.present_arms[arm])
         if held.tool.jaw is None:
             raise SessionError(f"expert '{self.name}': {arm} holds {held.tool.name}, which has no jaw")
-        return RobotHand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
+        return RobotHand(arm, base_in_world(arm, params), held.chain, held.tool.jaw)
 
     @property
     def ports(self) -> tuple[Port, ...]:

@@ -28,7 +28,7 @@ _HELD_OPEN = 0.03
 _UNHELD = 0.25
 """Time without a holder until an object counts as lost, s."""
 _AS_WIDE = 0.9
-"""Above this fraction of full opening, a jaw still in contact is considered stuck."""
+"""Fraction of the grasp's opening above which a released jaw counts as open."""
 
 
 class Errand:

@@ -142,5 +142,5 @@ def _pose_after_carrying(tip: Vector, middle: Vector, turn: Vector, to: Vector) 
 def _turns(hand: RobotHand, tips: Vector) -> Vector:
     """Return the rotation angle from the commanded pose to each tip pose, rad."""
     now = rotation.conjugate(hand.line()[3:])
-    turns = [rotation.log(rotation.product(matrix_to_pose(tip)[3:], now)) for tip in tips]
+    turns = [rotation.log(rotation.product(rotation.from_matrix(tip), now)) for tip in tips]
     return np.linalg.norm(turns, axis=1)

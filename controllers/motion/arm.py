@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any, cast
 
 import numpy as np
 
-from controllers.motion.axes import Mode
+from controllers.motion.axes import Axes, Mode
 from controllers.motion.cartesian_commands import CartesianCommands
 from controllers.motion.commands import Commands
 from controllers.motion.drives import Drives
@@ -16,7 +16,7 @@ from controllers.motion.frames import BaseFrame, base_in_world
 from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
 from controllers.motion.operating_state import State
-from controllers.motion.params import MotionParams
+from controllers.motion.params import Gripper, MotionParams
 from controllers.motion.ports import EQUIPMENT_COMMANDS, event_names
 from controllers.motion.setpoint import Setpoint
 from controllers.motion.telemetry import KnownWeight, TelemetryRow
@@ -35,6 +35,9 @@ _ANY_TIME = crtk.SETTINGS.union(*EQUIPMENT_COMMANDS.values())
 """Commands executed in every operating state."""
 _BARE = 2.0
 """Addition to `control_mode`, position or effort, without gravity compensation."""
+
+_Commanded = tuple[int, str, Callable[[Any], None] | None]
+"""Order, name and handler of a command; None: a command of the operating state."""
 
 
 class ArmState(Record):
@@ -65,9 +68,8 @@ class Arm:
         """
         arm = params.arms.present_arms[name]
         self._period = period
-        held = arm.equipment
         self._messages = Messages(name, event_names(arm), outputs)
-        self._equipment = Equipment(*held, self._messages)
+        self._equipment = Equipment(*arm.equipment, self._messages)
         self._base = BaseFrame(name, params, camera)
         self._drives = Drives(arm, self._messages, lambda: self._base.pose)
         self.weight = KnownWeight(name, arm.chain, base_in_world(name, params))
@@ -83,20 +85,7 @@ class Arm:
             params.power_time * 1e-9,
             homed=params.initial_state == "homed",
         )
-        handlers = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
-        commands = [
-            (command, handlers.get(command)) for command in (*crtk.COMMANDS, *self._equipment.handlers)
-        ]
-        prefixes = [name]
-        if (gripper := arm.gripper) is not None:
-            prefixes.append(f"{name}/{gripper.name}")
-            commands += [
-                (f"{gripper.name}/{word}", handlers[f"gripper/{word}"]) for word in crtk.GRIPPER_COMMANDS
-            ]
-        self._commanded = {
-            f"{name}/{command}": (order, command, handler)
-            for order, (command, handler) in enumerate(commands)
-        }
+        self._commanded = self._commands_by_port(name, arm.gripper)
         self._now, self._modes = ArmState(), np.array(self._drives.modes, np.float64)
         self._condition: tuple[State, bool, bool] | None = None
         """Condition of `Lifecycle` after the last step; None: before the first step."""
@@ -111,29 +100,42 @@ class Arm:
             self._messages.state,
             *self._drives.state,
         )
-        self._sensed = [
-            (f"sense/{prefix}/measured_js", axes)
-            for prefix, axes in zip(prefixes, self._drives.groups, strict=True)
-        ]
+        prefixes = [name] if arm.gripper is None else [name, f"{name}/{arm.gripper.name}"]
+        groups = dict(zip(prefixes, self._drives.groups, strict=True))
+        self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in groups.items()]
         self._offsets = params.joint_errors.of(name, len(arm.chain.joints))
         self._is_off = bool(self._offsets.any())
         self._driven = self._drives.joints.setpoint.position
         if self._is_off:
             self._driven = self._driven.copy()
-        self._gripper_setpoint = np.zeros(0) if gripper is None else np.zeros(3 * len(gripper.joints))
+        self._gripper_setpoint = np.zeros(0 if arm.gripper is None else 3 * len(arm.gripper.joints))
         outputs[f"drive/{name}/control_mode"] = self._modes
-        for prefix, axes in zip(prefixes, self._drives.groups, strict=True):
-            outputs |= {
-                f"drive/{prefix}/servo_jp": (
-                    self._driven if axes is self._drives.joints else axes.setpoint.position
-                ),
-                f"drive/{prefix}/servo_jf": axes.effort,
-            }
-        if self._drives.gripper is not None:
-            outputs |= {
-                f"{prefixes[1]}/measured_js": self._drives.gripper.measured,
-                f"{prefixes[1]}/setpoint_js": self._gripper_setpoint,
-            }
+        outputs |= self._joint_outputs(groups)
+
+    def _commands_by_port(self, name: CartArm, gripper: Gripper | None) -> dict[str, _Commanded]:
+        """Return order, name and handler of each command, by port."""
+        handlers = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
+        commands = [
+            (command, handlers.get(command)) for command in (*crtk.COMMANDS, *self._equipment.handlers)
+        ]
+        if gripper is not None:
+            commands += [
+                (f"{gripper.name}/{word}", handlers[f"gripper/{word}"]) for word in crtk.GRIPPER_COMMANDS
+            ]
+        return {
+            f"{name}/{command}": (order, command, handler)
+            for order, (command, handler) in enumerate(commands)
+        }
+
+    def _joint_outputs(self, groups: Mapping[str, Axes]) -> Iterator[tuple[str, Vector]]:
+        """Yield the outputs of joints driven together, by the prefix of the ports."""
+        for prefix, axes in groups.items():
+            is_arm = axes is self._drives.joints
+            yield f"drive/{prefix}/servo_jp", self._driven if is_arm else axes.setpoint.position
+            yield f"drive/{prefix}/servo_jf", axes.effort
+            if not is_arm:
+                yield f"{prefix}/measured_js", axes.measured
+                yield f"{prefix}/setpoint_js", self._gripper_setpoint
 
     @property
     def chain(self) -> SerialChain:

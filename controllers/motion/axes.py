@@ -32,7 +32,7 @@ class AxesState(Record):
     """Commanded effort."""
     mode = choice(Mode.OFF)
     moving = flag()
-    """Whether a commanded move is not reported as ended by `finished` yet."""
+    """Whether a commanded move is not reported as ended by `pop_finished` yet."""
 
 
 class Axes:
@@ -60,7 +60,7 @@ class Axes:
 
     @property
     def is_moving(self) -> bool:
-        """Whether a commanded move is not reported as ended by `finished` yet."""
+        """Whether a commanded move is not reported as ended by `pop_finished` yet."""
         return self._state.moving
 
     @property

@@ -7,19 +7,20 @@ camera) (cart -> RCM), both through the setup joints. Without setup joints a cli
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
-from controllers.motion.params import MotionParams
-from robots import rotation
+from controllers.motion.params import Arms, MotionParams, SetupJoints
 from robots.dvrk import crtk, setup_joints
+from robots.dvrk.crtk import Mounting
 from robots.dvrk.setup_joints import CartArm
-from robots.transform import rigid_transform
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
 __all__ = [
     "BaseFrame",
+    "CartParams",
     "base_in_world",
     "reference_frame",
     "rotate_twist",
@@ -27,22 +28,40 @@ __all__ = [
 ]
 
 
+class CartParams(Protocol):
+    """Parameters with the arms of a cart."""
+
+    @property
+    def arms(self) -> Arms:
+        """The arms."""
+        ...
+
+    @property
+    def mounting(self) -> Mounting:
+        """Whether setup joints carry the arms."""
+        ...
+
+    @property
+    def setup_joints(self) -> SetupJoints:
+        """Positions of the setup joints."""
+        ...
+
+
 def rotate_twist(rotation_matrix: Vector, vector: Vector) -> Vector:
     """Return a twist or wrench, shape (6,), with both parts rotated by a matrix of shape (3, 3)."""
     return np.concatenate([rotation_matrix @ vector[:3], rotation_matrix @ vector[3:]])
 
 
-def setup_positions(arm: CartArm, params: MotionParams) -> Vector:
+def setup_positions(arm: CartArm, params: CartParams) -> Vector:
     """Return the positions of the setup joints under `arm`, shape (6,)."""
     return np.array(getattr(params.setup_joints, arm) or setup_joints.SIMULATED[arm])
 
 
-def base_in_world(arm: CartArm, params: MotionParams) -> Vector:
+def base_in_world(arm: CartArm, params: CartParams) -> Vector:
     """Return the pose of the arm's base frame in the world by the scenario, shape (4, 4)."""
     if params.mounting == "cart":
         return setup_joints.base_pose(arm, setup_positions(arm, params))
-    stands = params.arms.present_arms[arm]
-    return rigid_transform(rotation.matrix(np.array(stands.orientation)), stands.position)
+    return params.arms.present_arms[arm].pose
 
 
 def reference_frame(arm: CartArm, params: MotionParams) -> str:

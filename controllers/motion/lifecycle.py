@@ -216,7 +216,7 @@ class Lifecycle:
         away = np.abs(joints.setpoint.position - joints.position)
         rows = zip(joints.chain.joints, away.tolist(), self._tolerance, strict=True)
         return "tracking error, " + "; ".join(
-            _is_astray(joint, distance, most) for joint, distance, most in rows if distance > most
+            _astray_sentence(joint, distance, most) for joint, distance, most in rows if distance > most
         )
 
     def _check_home(self, h: float) -> None:
@@ -234,6 +234,6 @@ class Lifecycle:
             )
 
 
-def _is_astray(joint: Joint, distance: float, most: float) -> str:
+def _astray_sentence(joint: Joint, distance: float, most: float) -> str:
     away, allowed = distinct(distance, most, digits=3)
     return f"joint {joint.name} is {away} {joint.unit} from its setpoint, allowed are {allowed}"

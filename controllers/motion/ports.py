@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from controllers.motion.params import EcmParams, PsmParams
-from hub.participant import event_in, event_out, signal_in, signal_out
+from controllers.ports import measured_joints
+from hub.participant import event_in, event_out, signal_out
 from robots.dvrk import crtk
 from robots.dvrk.setup_joints import CartArm, joint_names
 from schemas.ports import Port
@@ -217,6 +218,6 @@ def _settings(arm: str, joints: tuple[str, ...], reference: str, period_ns: int)
 
 
 def _servo_command_ports(prefix: str, names: tuple[str, ...]) -> Iterator[Port]:
-    yield signal_in(f"sense/{prefix}/measured_js", JointState, names=names, fields=crtk.MEASURED)
+    yield measured_joints(f"sense/{prefix}/measured_js", names)
     yield signal_out(f"drive/{prefix}/servo_jp", JointState, names=names)
     yield signal_out(f"drive/{prefix}/servo_jf", JointState, names=names, fields=("effort",))

@@ -115,8 +115,8 @@ class NeedleTracker(PictureController):
         super().__init__(name, params)
         self._arc = Arc(NEEDLES[params.needle], _TIP_AHEAD)
         self._eyes: tuple[Eye, ...] = EYES if params.eyes == "both" else EYES[:1]
-        self._base = base_in_world(params.arm, params.frames)
-        self._camera_base = base_in_world("ECM", params.frames)
+        self._base = base_in_world(params.arm, params)
+        self._camera_base = base_in_world("ECM", params)
         self._chain = params.holder.chain
         self._camera = left_camera(
             cast("EcmParams", params.arms.present_arms["ECM"]).endoscope, params.baseline

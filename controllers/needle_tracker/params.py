@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from controllers.motion.params import Arms, MotionParams, PsmParams, SetupJoints
+from controllers.motion.params import Arms, PsmParams, SetupJoints
 from hub.participant import Params
 from robots.dvrk import endoscope
 from robots.dvrk.crtk import Mounting
@@ -54,11 +54,6 @@ class HeldNeedleParams(Params):
     setup_joints: SetupJoints = SetupJoints()
     arm: ArmName = Field(default="PSM1", description="the one that holds the needle")
     needle: NeedleName = Field(default=DEFAULT, description="its size")
-
-    @property
-    def frames(self) -> MotionParams:
-        """Base frames of the arms, as a motion controller has them."""
-        return MotionParams(arms=self.arms, mounting=self.mounting, setup_joints=self.setup_joints)
 
 
 class TrackerParams(HeldNeedleParams):

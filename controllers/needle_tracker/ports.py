@@ -58,10 +58,10 @@ def tracker_ports(params: TrackerParams) -> tuple[Port, ...]:
             "whenever it changes: blind (no picture), predicting (not seen), tracking",
         ),
         event_out("warning", StringMessage, "a picture that is refused, and a slip"),
-        *((_overlay_ports(),) if params.overlay else ()),
+        *((_overlay_port(),) if params.overlay else ()),
     )
 
 
-def _overlay_ports() -> Port:
+def _overlay_port() -> Port:
     meaning = "the left picture with the region, the seen wire and the estimate"
     return event_out("overlay/image_raw", Image, meaning, frame=CAMERA)

@@ -59,7 +59,7 @@ class TrackingError(Controller):
 
     def __init__(self, name: str, params: TrackingErrorParams) -> None:
         super().__init__(name, params)
-        self._base = base_in_world(params.arm, params.frames)
+        self._base = base_in_world(params.arm, params)
         self._marks = NEEDLES[params.needle].marks
         self._now = TrackingErrorState()
         self.keep(self._now)

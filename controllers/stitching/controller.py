@@ -40,7 +40,7 @@ class Stitching(TwoHands):
         if not self.params.end:
             return ""
         if state.failed[0]:
-            return "a stitch has failed"
+            return f"a stitch has failed: {self._surgeon.failure}"
         return "all stitches are made" if state.done[0] else ""
 
     def configure(self, setup: Setup) -> Outputs:

@@ -175,7 +175,7 @@ class GuidedSurgeon(Procedure):
             raise MotionError(f"'{word}' is no command, allowed: {', '.join(COMMANDS)}")
         if guided.stage not in COMMANDS[word]:
             allowed = ", ".join(name for name, stages in COMMANDS.items() if guided.stage in stages)
-            raise MotionError(f"'{word}' while {_command_words(guided.stage)}, allowed: {allowed}")
+            raise MotionError(f"'{word}' while {_stage_words(guided.stage)}, allowed: {allowed}")
         if word == "pause":
             self._stage(Stage.PAUSED)
         elif word == "take over":
@@ -201,7 +201,7 @@ class GuidedSurgeon(Procedure):
 
     def _stage(self, stage: Stage) -> None:
         self.guided.stage = stage
-        self._status.append(_command_words(stage))
+        self._status.append(_stage_words(stage))
 
     @property
     def _is_where_it_paused(self) -> bool:
@@ -274,5 +274,5 @@ class GuidedSurgeon(Procedure):
         self._enter(StitchPhase.FAILED)
 
 
-def _command_words(stage: Stage) -> str:
+def _stage_words(stage: Stage) -> str:
     return stage.name.lower().replace("_", " ")

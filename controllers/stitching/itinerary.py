@@ -64,7 +64,7 @@ class Itinerary:
 
     @property
     def margin(self) -> float:
-        """Least share of half a joint's range left; below 0 the joints cannot follow."""
+        """Least share of half a joint's range left; below `feasibility.MARGIN` the way is not feasible."""
         return best_reach(self.hand.chain, self.hand.base, np.concatenate(self._tips), self.hand.roll).margin
 
     def distance(self, place: Vector) -> float:

@@ -1,9 +1,4 @@
-"""The procedure of two hands at a needle; measurements end each phase.
-
-The needle is led by its own measured pose: the goal of the holding hand's tip follows from the goal of the
-needle and the present lie of the needle in the jaw. So slip in the jaw is made good. SI units, poses in the
-world.
-"""
+"""The procedure of two hands at a needle; measurements end each phase. SI units, poses in the world."""
 
 from __future__ import annotations
 
@@ -17,14 +12,13 @@ from controllers.expert.hand import RobotHand
 from controllers.stitching.feasibility import best_reach
 from controllers.stitching.geometry import Stitch, approach_pose
 from controllers.stitching.handing import Hold
+from controllers.stitching.leading import Leading
 from controllers.stitching.params import StitchParams
-from controllers.stitching.parts import Parts
 from controllers.stitching.phase import StitchPhase
 from controllers.stitching.plan import BEFORE, BEYOND, driving_poses
 from controllers.stitching.rejoin import BACK, OPEN, OPENED, SHUT, Rejoin
-from controllers.stitching.way_on import WayOn, behind_tip, way_on
-from robots import rotation
-from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
+from controllers.stitching.way_on import WayOn, behind_tip, present_grip, way_on
+from robots.transform import pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -40,25 +34,19 @@ _PRESSED = 0.5
 """s: for a jaw to close."""
 _HELD_OPEN = 0.02
 """rad: a jaw commanded to shut but at least this far open has an object between the fingers."""
-_UNHELD = 0.3
-"""Time without a holder after which the needle is lost, s."""
 _GENTLE = 0.35
-_LEARNING = 0.15
-"""Time constant of learning the lie of the needle in the jaw, s."""
 _PULL_SPEED = radians(45.0)
 """rad/s."""
 ATTEMPTS = 3
 """Attempts to take hold of the needle, and to continue after a loss."""
 
 
-class Procedure(Parts, ABC):
+class Procedure(Leading, ABC):
     """Two hands and a needle; subclasses choose the stitches and the phases before and after."""
 
     def __init__(self, params: StitchParams, driver: RobotHand, puller: RobotHand) -> None:
-        super().__init__((driver, puller))
-        self.params = params
+        super().__init__(params, driver, puller)
         self.rejoin = Rejoin(driver, puller)
-        self._needle = params.needle[1].shape
         self._status: list[str] = []
         self._steps: dict[StitchPhase, Callable[[], None]] = {
             StitchPhase.BEGIN: self._begin,
@@ -66,7 +54,7 @@ class Procedure(Parts, ABC):
             StitchPhase.DESCEND: self._descend,
             StitchPhase.CLOSE: self._close,
             StitchPhase.LIFT: self._lift,
-            StitchPhase.APPROACH: self._approach_needle,
+            StitchPhase.APPROACH: self._approach_skin,
             StitchPhase.ALIGN: self._align,
             StitchPhase.DRIVE: self._drive,
             StitchPhase.COME: lambda: self._come(StitchPhase.TAKE),
@@ -111,12 +99,6 @@ class Procedure(Parts, ABC):
         self._status.clear()
         return said
 
-    def sense(self, needle: Vector, holder: float) -> None:
-        """Store the measured pose of the needle, shape (7,), and the number of the holding arm."""
-        state = self.state
-        state.needle[:], state.holder = pose_to_matrix(needle), holder
-        state.unheld = 0.0 if holder else state.unheld + self.driver.period
-
     def step(self) -> None:
         """Advance the procedure."""
         state = self.state
@@ -134,10 +116,13 @@ class Procedure(Parts, ABC):
 
     @property
     def _present_hold(self) -> Hold | None:
-        """The holding hand and its grip. Raises MotionError for a hand of another part."""
+        """The holding hand and the grip; None if no arm holds the needle.
+
+        Raises MotionError if the arm with the needle is neither driver nor puller.
+        """
         for hand in self.hands:
             if hand.number == self.state.holder:
-                grip = inverse_transform(self.state.needle) @ pose_to_matrix(hand.measured)
+                grip = present_grip(hand, self.state.needle)
                 return Hold(hand, grip, behind_tip(grip, hand, self.stitch))
         if self.state.holder:
             Procedure._way_on(self)  # says that it is neither
@@ -161,34 +146,8 @@ class Procedure(Parts, ABC):
         if not self.rejoin.is_under_way:
             self._enter(self.rejoin.state.then)
 
-    def _watch(self) -> None:
-        """Learn the lie of the needle in the jaw; notice a lost needle."""
-        state, hand = self.state, self._holding
-        if hand is None:
-            return
-        if state.unheld > _UNHELD:
-            place = ", ".join(f"{1e3 * each:.0f}" for each in state.needle[:3, 3])
-            tip = state.needle[:3, :3] @ self._needle.marks[2] + state.needle[:3, 3]
-            side = "in the tissue" if (tip - self.params.phantom.pose[:3, 3])[2] < 0.0 else "outside"
-            raise MotionError(
-                f"{hand.arm} has lost the needle while it was to {state.phase.name.lower()}: its middle is at"
-                f" {place} mm, its tip {side}"
-            )
-        now = inverse_transform(state.needle) @ pose_to_matrix(hand.measured)
-        share = hand.period / _LEARNING
-        state.grip[:3, 3] += share * (now[:3, 3] - state.grip[:3, 3])
-        turn = rotation.log(rotation.from_matrix(now[:3, :3] @ state.grip[:3, :3].T))
-        state.grip[:3, :3] = rotation.matrix(rotation.exp(share * turn)) @ state.grip[:3, :3]
-
     def _enter(self, phase: StitchPhase) -> None:
         self.state.phase, self.state.waited = phase, 0.0
-
-    def _fail(self, why: str) -> None:
-        self._status.append(why)
-        self.state.failed[0] = 1.0
-        for hand in (self.driver, self.puller):
-            hand.stay()
-        self._enter(StitchPhase.FAILED)
 
     def _has_arrived(self, hand: RobotHand, within: float | None = None) -> bool:
         """Return whether a hand is at its goal, as near as possible."""
@@ -196,21 +155,6 @@ class Procedure(Parts, ABC):
             return False
         self.state.waited += hand.period
         return within is None or hand.error <= within or self.state.waited > _PATIENCE
-
-    def _lead(self, hand: RobotHand, needle: Vector, share: float = 1.0) -> None:
-        """Send a hand, on a line, so that its needle comes to a pose, shape (4, 4)."""
-        hand.go(matrix_to_pose(needle @ self.state.grip), share)
-
-    def _track_angle(self, hand: RobotHand, angle: float) -> None:
-        """Bring the needle to an angle of the way, at once."""
-        state, wanted = self.state, self.stitch.pose(angle)
-        goal = matrix_to_pose(wanted @ state.grip)
-        hand.state.start[:] = hand.state.goal[:] = goal
-        hand.state.duration = hand.state.elapsed = 0.0
-        state.angle[0] = angle
-        marks = self._needle.marks
-        off = marks @ (state.needle[:3, :3] - wanted[:3, :3]).T + state.needle[:3, 3] - wanted[:3, 3]
-        state.deviation[0] = float(np.sqrt((off * off).sum(axis=1).max()))
 
     def _pick_pose(self, away: float) -> Vector:
         """Return the tip's pose, shape (7,), for picking the needle up, or so far before."""
@@ -251,11 +195,6 @@ class Procedure(Parts, ABC):
             hand.go(self._pick_pose(HOVER))
             self._enter(StitchPhase.HOVER)
 
-    def _learn_grasp(self, hand: RobotHand) -> None:
-        """Store the present lie of the needle in a hand's jaw as the hand's hold."""
-        self.state.grip[:] = inverse_transform(self.state.needle) @ pose_to_matrix(hand.measured)
-        self.state.free = False
-
     def _lift(self) -> None:
         if not self._has_arrived(self._picker):
             return
@@ -276,32 +215,34 @@ class Procedure(Parts, ABC):
         self._lead(self.driver, stitch.pose(stitch.entry - BEFORE, self.params.lift))
         self._enter(StitchPhase.APPROACH)
 
-    def _approach_needle(self) -> None:
+    def _approach_skin(self) -> None:
         if self._has_arrived(self.driver):
-            self._require_room()
-            self.state.angle[0] = self.stitch.entry - BEFORE
-            self._lead(self.driver, self.stitch.pose(self.state.angle[0]), _GENTLE)
+            stitch = self.stitch
+            self._require_reach(stitch)
+            self.state.angle[0] = stitch.entry - BEFORE
+            self._lead(self.driver, stitch.pose(self.state.angle[0]), _GENTLE)
             self._enter(StitchPhase.ALIGN)
 
-    def _require_room(self) -> None:
+    def _require_reach(self, stitch: Stitch) -> None:
         """Raise MotionError if the joints cannot drive the needle with its present lie in the jaw."""
         params, hand = self.params, self.driver
-        way = driving_poses(self.stitch, params.emerge, params.lift, self.stitch.entry - BEFORE)
+        way = driving_poses(stitch, params.emerge, params.lift, stitch.entry - BEFORE)
         if problem := best_reach(hand.chain, hand.base, np.array(way) @ self.state.grip).failure_reason:
             raise MotionError(f"the needle has turned in the jaw of {hand.arm}, whose {problem}")
 
     def _align(self) -> None:
         if self.driver.has_arrived:
-            self._track_angle(self.driver, self.state.angle[0])
+            self._track_angle(self.driver, self.stitch, self.state.angle[0])
             self.state.waited += self.driver.period
             aligned = self.state.deviation[0] < _ALIGNED and self.state.waited > 0.2
             if aligned or self.state.waited > _PATIENCE:
                 self._enter(StitchPhase.DRIVE)
 
     def _drive(self) -> None:
-        end = self.stitch.exit + self.params.emerge
+        stitch = self.stitch
+        end = stitch.exit + self.params.emerge
         angle = min(self.state.angle[0] + self.params.drive_speed * self.driver.period, end)
-        self._track_angle(self.driver, angle)
+        self._track_angle(self.driver, stitch, angle)
         if angle == end:
             self.state.waited += self.driver.period
             if self.state.waited <= 0.3:
@@ -389,9 +330,10 @@ class Procedure(Parts, ABC):
     def _pull(self) -> None:
         if not self.driver.has_arrived:
             return
-        end = self.stitch.base_out_angle + BEYOND
+        stitch = self.stitch
+        end = stitch.base_out_angle + BEYOND
         angle = min(self.state.angle[0] + _PULL_SPEED * self.puller.period, end)
-        self._track_angle(self.puller, angle)
+        self._track_angle(self.puller, stitch, angle)
         if angle == end:
             goal = self.puller.line()
             goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from controllers.motion.frames import base_in_world
-from controllers.motion.params import MotionParams
 from controllers.stitching.params import StitchParams
 from hub.participant import Inputs, signal_in
 from robots.dvrk import crtk
@@ -33,8 +32,7 @@ class SceneFrames:
 
     def __init__(self, params: StitchParams, name: str, camera: StereoCamera) -> None:
         """Create the frames; `name`: the endoscope; `camera`: the stereo camera."""
-        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.present_arms}
+        self._bases = {arm: base_in_world(arm, params) for arm in params.arms.present_arms}
         self._fixed = {crtk.WORLD_FRAME: np.eye(4)}
         if params.mounting == "cart":
             self._fixed[crtk.CART_FRAME] = np.eye(4)

@@ -26,6 +26,8 @@ class Surgeon(Procedure):
         self.state.stitch = params.first
         self.looking: Looking | None = None
         """How the tips are shown to the tracker before a stitch; None: there is no tracker."""
+        self.failure = ""
+        """Why a stitch has failed; empty: none has."""
 
     @property
     def stitch(self) -> Stitch:
@@ -87,8 +89,11 @@ class Surgeon(Procedure):
     def _recover(self, why: str) -> None:
         """Go on from the present place of the needle, if possible and not done too often."""
         state = self.state
-        if state.phase is StitchPhase.BEGIN or state.recoveries == ATTEMPTS:
+        if state.phase is StitchPhase.BEGIN:
             self._fail(why)
+            return
+        if state.recoveries == ATTEMPTS:
+            self._fail(f"{why}; given up after {ATTEMPTS} recoveries")
             return
         state.recoveries += 1
         try:
@@ -105,6 +110,14 @@ class Surgeon(Procedure):
         for hand in (self.driver, self.puller):
             hand.stay()
         self._follow(plan)
+
+    def _fail(self, why: str) -> None:
+        self.failure = why
+        self._status.append(why)
+        self.state.failed[0] = 1.0
+        for hand in (self.driver, self.puller):
+            hand.stay()
+        self._enter(StitchPhase.FAILED)
 
     def _raise(self) -> None:
         if self._has_arrived(self.puller) and not self._made_the_last():

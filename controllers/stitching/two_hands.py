@@ -7,7 +7,7 @@ from typing import Any, cast
 from controllers.expert.hand import RobotHand
 from controllers.expert.ports import EVENTS
 from controllers.motion.frames import base_in_world
-from controllers.motion.params import MotionParams, PsmParams
+from controllers.motion.params import PsmParams
 from controllers.stitching.params import StitchParams
 from controllers.stitching.procedure import Procedure
 from controllers.stitching.sight import Sight
@@ -48,11 +48,10 @@ class TwoHands(Controller):
         self.keep(state, surgeon.handing, self._shown, *(each.state for each in kept), *more)
 
     def _hand(self, params: StitchParams, arm: ArmName) -> RobotHand:
-        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
         held = cast("PsmParams", params.arms.present_arms[arm])
         if held.tool.jaw is None:
             raise SessionError(f"stitching '{self.name}': {arm} holds {held.tool.name}, which has no jaw")
-        return RobotHand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
+        return RobotHand(arm, base_in_world(arm, params), held.chain, held.tool.jaw)
 
     def configure(self, setup: Setup) -> Outputs:
         """Start with idle hands."""

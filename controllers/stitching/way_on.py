@@ -7,6 +7,7 @@ from math import atan2, pi, radians
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controllers.expert.hand import RobotHand
 from controllers.stitching.feasibility import ArmReach
@@ -26,10 +27,19 @@ from robots.transform import inverse_transform, pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["HandOver", "WayOn", "behind_tip", "is_inside", "raise_needle", "way_on"]
+__all__ = [
+    "HandOver",
+    "WayOn",
+    "behind_tip",
+    "in_tissue",
+    "is_inside",
+    "present_grip",
+    "raise_needle",
+    "way_on",
+]
 
 _UNDER = 0.5e-3
-"""m; a needle with a point so far under the skin is in the tissue."""
+"""Least depth of a point of a needle in the tissue, m."""
 _BESIDE = 2.0e-3
 """m; deviation of a needle in the tissue that pad and jaw can make good."""
 
@@ -74,21 +84,31 @@ class WayOn:
 
 def is_inside(params: StitchParams, needle: Vector) -> bool:
     """Return whether a needle, at a pose of shape (4, 4), is in the tissue."""
-    return _lowest_height(params, needle) < -_UNDER
+    return bool(in_tissue(params, _wire_points(params, needle), _UNDER).any())
 
 
-def _lowest_height(params: StitchParams, needle: Vector) -> float:
-    """Return the height of the needle's lowest point over the skin, m."""
-    shape, pad = params.needle[1].shape, params.phantom.pose
+def in_tissue(params: StitchParams, points: Vector, depth: float = 0.0) -> NDArray[np.bool_]:
+    """Return whether points of the world, shape (..., 3), are in the pad and deeper than `depth` (m)."""
+    pad, (*sides, thickness) = params.phantom.pose, params.phantom.measures.skin
+    off = points - pad[:3, 3]
+    height, beside = off @ pad[:3, 2], np.abs(off @ pad[:3, :2]) - np.array(sides) / 2.0
+    inside: NDArray[np.bool_] = (-thickness < height) & (height < -depth) & (beside < 0.0).all(axis=-1)
+    return inside
+
+
+def _wire_points(params: StitchParams, needle: Vector) -> Vector:
+    """Return points of the needle in the world, shape (n, 3), m."""
+    shape = params.needle[1].shape
     wire = shape.points(np.linspace(-shape.arc / 2.0, shape.arc / 2.0, 60))
-    heights = (wire @ needle[:3, :3].T + needle[:3, 3] - pad[:3, 3]) @ pad[:3, 2]
-    return float(heights.min())
+    points: Vector = wire @ needle[:3, :3].T + needle[:3, 3]
+    return points
 
 
 def raise_needle(params: StitchParams, needle: Vector) -> Vector:
     """Return a pose of shape (4, 4), if need be raised until all of the needle is over the skin."""
-    up = needle.copy()
-    up[:3, 3] += max(0.0, params.lift - _lowest_height(params, needle)) * params.phantom.pose[:3, 2]
+    pad, up = params.phantom.pose, needle.copy()
+    lowest = float(((_wire_points(params, needle) - pad[:3, 3]) @ pad[:3, 2]).min())
+    up[:3, 3] += max(0.0, params.lift - lowest) * pad[:3, 2]
     return up
 
 
@@ -102,8 +122,7 @@ def way_on(
     holding = {driver.number: driver, puller.number: puller}.get(holder)
     if holder and holding is None:
         raise MotionError(f"PSM{holder:.0f} holds the needle, which is neither {driver.arm} nor {puller.arm}")
-    low = _lowest_height(params, needle)
-    inside, angle = low < -_UNDER, stitch.angle(needle)
+    inside, angle = is_inside(params, needle), stitch.angle(needle)
     if inside:
         angle = _on_its_way(stitch, needle, angle)
         if holding is None:
@@ -113,14 +132,14 @@ def way_on(
     emerge, lift = params.emerge, params.lift
     pull = pulling_poses(stitch, emerge, lift)
     if inside and holding is not None and _can_pull(params, holding, driver, puller, stitch, needle):
-        grip, margin = _present_hold(puller, needle, [pulling_poses(stitch, emerge, lift, angle)])
+        grip, margin = _kept_hold(puller, needle, [pulling_poses(stitch, emerge, lift, angle)])
         return WayOn(StitchPhase.PULL, puller, stitch.pose(angle), angle, np.eye(4), grip, margin)
     taking, pull_margin = _from_a_side(puller, params.taken, stitch, [pull])
     if holding is driver:
-        grip = inverse_transform(needle) @ pose_to_matrix(driver.measured)
+        grip = present_grip(driver, needle)
         require_room(behind_tip(grip, driver, stitch), stitch, emerge)
         drive = driving_poses(stitch, emerge, lift, angle if inside else None)
-        grip, margin = _present_hold(driver, needle, [drive] if inside else [[up], drive])
+        grip, margin = _kept_hold(driver, needle, [drive] if inside else [[up], drive])
         if not inside:
             return WayOn(StitchPhase.LIFT, driver, up, over, grip, taking, min(margin, pull_margin))
         phase = StitchPhase.DRIVE if angle < stitch.exit + emerge else StitchPhase.COME
@@ -129,7 +148,7 @@ def way_on(
     drive = driving_poses(stitch, emerge, lift)
     if holding is puller:
         shown = stitch.pose(stitch.exit + emerge, lift)
-        _, kept = _present_hold(puller, needle, [[shown]])
+        _, kept = _kept_hold(puller, needle, [[shown]])
         grip, margin = _from_a_side(driver, params.grip, stitch, [[shown], drive])
         return WayOn(StitchPhase.PRESENT, puller, shown, over, grip, taking, min(kept, margin, pull_margin))
     wrong_way_up = bool(needle[:3, 2] @ params.phantom.pose[:3, 2] > 0.0)
@@ -148,7 +167,7 @@ def _can_pull(
 ) -> bool:
     """Return whether a hand holds a needle in the tissue for pulling."""
     if driver is puller:
-        behind = behind_tip(inverse_transform(needle) @ pose_to_matrix(holding.measured), holding, stitch)
+        behind = behind_tip(present_grip(holding, needle), holding, stitch)
         return behind < (params.grip + params.taken) / 2.0
     return holding is puller
 
@@ -186,6 +205,11 @@ def _on_its_way(stitch: Stitch, needle: Vector, angle: float) -> float:
     return angle + 2.0 * pi if angle < stitch.entry - BEFORE else angle
 
 
+def present_grip(hand: RobotHand, needle: Vector) -> Vector:
+    """Return the measured pose of a hand's tip in the frame of the needle, both of shape (4, 4)."""
+    return inverse_transform(needle) @ pose_to_matrix(hand.measured)
+
+
 def behind_tip(grip: Vector, hand: RobotHand, stitch: Stitch) -> float:
     """Return how far behind the needle's tip (rad) a jaw holds; `grip`: jaw's tip in the needle's frame."""
     x, y, _ = (grip[:3, 3] + (hand.jaw.length - DEEP) * grip[:3, 2]).tolist()
@@ -202,9 +226,9 @@ def _from_a_side(
     return _feasible(hand, other if side[1].failure_reason and not other[1].failure_reason else side)
 
 
-def _present_hold(hand: RobotHand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
+def _kept_hold(hand: RobotHand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
     """Return the hand's present hold of the needle, and the margin with this hold."""
-    return _choose_hold(hand, [inverse_transform(needle) @ pose_to_matrix(hand.measured)], ways)
+    return _choose_hold(hand, [present_grip(hand, needle)], ways)
 
 
 def _choose_hold(hand: RobotHand, grips: list[Vector], ways: list[list[Vector]]) -> tuple[Vector, float]:

@@ -57,7 +57,7 @@ def measured_columns(recording: Recording) -> list[Columns]:
 
 
 def commanded_columns(recording: Recording) -> list[Columns]:
-    """Return the commanded joints of each arm, in the order of `measured`.
+    """Return the commanded joints of each arm, in the order of `measured_columns`.
 
     Columns are the arm's setpoints; without setpoints, the commands from the arm's connection. Joints
     without a command have no columns. Raises RecordingError if nothing is commanded.
@@ -83,7 +83,7 @@ def choose_columns(recording: Recording, names: Sequence[str]) -> list[Columns]:
 
     Raises RecordingError for a port or a field not recorded or without numbers.
     """
-    return [_choose_ports(recording, name) for name in names]
+    return [_choose_port(recording, name) for name in names]
 
 
 def _measured_ports(recording: Recording) -> Iterator[tuple[str, str, str, str]]:
@@ -109,7 +109,7 @@ def _joints(recording: Recording, port: str, arm: str, part: str) -> Columns:
     return _columns(recording, series, tuple(f"{prefix}.{name}" for name in names), values)
 
 
-def _choose_ports(recording: Recording, name: str) -> Columns:
+def _choose_port(recording: Recording, name: str) -> Columns:
     for port in recording.ports:
         if name == port or name.startswith(f"{port}."):
             series, field = recording[port], name.removeprefix(port).removeprefix(".")

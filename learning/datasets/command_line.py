@@ -61,6 +61,9 @@ def dataset(
             help="The same for action; default: commanded joints of all arms. May be repeated.",
         ),
     ] = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Read files other than those of the recordings.")
+    ] = False,
 ) -> None:
     """Write recordings as a LeRobotDataset: states, actions, stereo video, task text.
 
@@ -76,7 +79,7 @@ def dataset(
     from learning.datasets.episode import Wanted
 
     wanted = Wanted(fps, pixels, " ".join(task.split()), tuple(state or ()), tuple(action or ()))
-    _run(recordings, output, wanted)
+    _run(recordings, output, wanted, trust=trust)
 
 
 def _pixels(size: str) -> tuple[int, int]:
@@ -109,7 +112,7 @@ def _raise_on_sigterm() -> Generator[None]:
             signal.signal(number, handler)
 
 
-def _run(recordings: list[Path], output: Path, wanted: Wanted) -> None:
+def _run(recordings: list[Path], output: Path, wanted: Wanted, *, trust: bool) -> None:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -119,7 +122,7 @@ def _run(recordings: list[Path], output: Path, wanted: Wanted) -> None:
     console = Console(stderr=True, highlight=False)
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with NewDirectory(output, "data set") as new:
-        conversion = Conversion(new.path, wanted)
+        conversion = Conversion(new.path, wanted, trust=trust)
         try:
             with _raise_on_sigterm(), conversion as made, Progress(*columns, console=console) as bar:
                 counted = bar.add_task("recordings", total=len(recordings))

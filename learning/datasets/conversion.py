@@ -10,7 +10,7 @@ from typing import Any, Self
 from learning.datasets.episode import Episode, Wanted, open_recording
 from learning.datasets.pictures import DEFAULT_SIZE, recorded_size, stereo
 from learning.datasets.writer import Writer
-from schemas.errors import RecordingError, SessionError
+from schemas.errors import RecordingError, SessionError, TrustError
 from trocar import Recording
 
 __all__ = ["Conversion"]
@@ -19,9 +19,12 @@ __all__ = ["Conversion"]
 class Conversion:
     """A data set in the making."""
 
-    def __init__(self, directory: Path, wanted: Wanted) -> None:
-        """Begin a data set with the `wanted` parts of each recording; `directory` holds no data set."""
-        self._directory, self._wanted = directory, wanted
+    def __init__(self, directory: Path, wanted: Wanted, *, trust: bool = False) -> None:
+        """Begin a data set with the `wanted` parts of each recording; `directory` holds no data set.
+
+        `trust` allows drawn scenes of changed files.
+        """
+        self._directory, self._wanted, self._trust = directory, wanted, trust
         self._writer: Writer | None = None
         self._size = wanted.size
         self.left_out = 0
@@ -55,7 +58,7 @@ class Conversion:
                 except OSError as error:
                     raise RecordingError(f"'{path}' cannot be opened: {error}") from error
                 seconds = self._add(path, recording)
-        except (RecordingError, SessionError) as error:  # the latter of soft bodies that do not fit
+        except (RecordingError, TrustError, SessionError) as error:  # the last of unfit soft bodies
             self.left_out += 1
             return f"left out: {error}"
         return f"'{path}' was cut short: its first {seconds:g} s are taken" if cut_short else ""
@@ -65,7 +68,7 @@ class Conversion:
         wanted = self._wanted
         episode = Episode.of(recording, wanted)
         size = self._size or recorded_size(recording) or DEFAULT_SIZE
-        pictures = stereo(recording, episode.times_ns, wanted.fps, size)
+        pictures = stereo(recording, episode.times_ns, wanted.fps, size, trust=self._trust)
         if self._writer is None:
             self._writer = Writer(self._directory, wanted.fps, size, episode)
             self._size = size

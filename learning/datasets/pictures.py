@@ -38,11 +38,19 @@ class Stereo:
     pairs: Iterator[Pair]
 
 
-def stereo(recording: Recording, times_ns: NDArray[np.int64], fps: int, size: tuple[int, int]) -> Stereo:
+def stereo(
+    recording: Recording,
+    times_ns: NDArray[np.int64],
+    fps: int,
+    size: tuple[int, int],
+    *,
+    trust: bool = False,
+) -> Stereo:
     """Return the pictures at `times_ns`, shape (n,), recorded or drawn.
 
-    Recorded pictures are used if the size is right and each frame has its own picture. Raises
-    RecordingError if there is nothing to draw, TrocarError without OpenGL; so may the pictures.
+    Recorded pictures are used if the size is right and each frame has its own picture. `trust` allows a
+    drawn scene of changed files. Raises RecordingError if there is nothing to draw, TrustError for changed
+    files, TrocarError without OpenGL; so may the pictures.
     """
     ports = _ports(recording)
     if ports and recorded_size(recording) == size:
@@ -56,7 +64,7 @@ def stereo(recording: Recording, times_ns: NDArray[np.int64], fps: int, size: tu
                 for port, taken in zip(ports, picked, strict=True)
             )
             return Stereo(count, recorded=True, pairs=zip(*eyes, strict=True))
-    drawn = RecordedScene(recording).stereo(times_ns.tolist(), size)
+    drawn = RecordedScene(recording, trust=trust).stereo(times_ns.tolist(), size)
     return Stereo(len(times_ns), recorded=False, pairs=drawn)
 
 
@@ -86,7 +94,7 @@ def _ports(recording: Recording) -> tuple[str, ...]:
 def _newest(recording: Recording, port: str, times_ns: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return when the newest picture up to each time was taken; far in the past if there is none."""
     taken = (
-        _decode_pictures(recording, message.topic, message.type, message.payload).header.stamp.ns
+        _decode_picture(recording, message.topic, message.type, message.payload).header.stamp.ns
         for message in recording.messages(recording[port].topic)
     )
     taken_ns = np.array([_NEVER_NS, *taken], np.int64)
@@ -116,7 +124,7 @@ def _recorded_pictures(
 def _pictures(recording: Recording, port: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
     """Yield when each picture was taken (ns), and the picture."""
     for message in recording.messages(recording[port].topic):
-        picture = _decode_pictures(recording, message.topic, message.type, message.payload)
+        picture = _decode_picture(recording, message.topic, message.type, message.payload)
         try:
             pixels = _picture_pixels(picture)
         except (OSError, ValueError) as error:
@@ -124,7 +132,7 @@ def _pictures(recording: Recording, port: str) -> Iterator[tuple[int, NDArray[np
         yield picture.header.stamp.ns, pixels
 
 
-def _decode_pictures(
+def _decode_picture(
     recording: Recording, topic: str, type_name: str, payload: bytes
 ) -> Image | CompressedImage:
     try:

@@ -57,7 +57,8 @@ def sweep(
     ray: Annotated[
         str | None,
         typer.Option(
-            metavar="ADDRESS", help="Run the trials on this Ray cluster, such as auto or ray://head:10001."
+            metavar="ADDRESS",
+            help="Run the trials on this Ray cluster, from one of its nodes: auto, or HOST:PORT.",
         ),
     ] = None,
     record: Annotated[bool, typer.Option(help="Keep a recording of each trial.")] = True,

@@ -48,8 +48,6 @@ def write_table(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variatio
     columns: list[Any] = []
     for name in dict.fromkeys(name for row in made for name in row):
         values = [row.get(name) for row in made]
-        if len({str if isinstance(value, str) else float for value in values if value is not None}) > 1:
-            values = [None if value is None else str(value) for value in values]
         try:
             column = pa.array(values)
         except (pa.ArrowException, OverflowError):  # of several types, or a number beyond 64 bits

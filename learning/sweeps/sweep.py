@@ -1,7 +1,7 @@
 """A sweep and its directory: finished trials and their results.
 
     DIR/.trocar                 marks a sweep's directory; locked while the sweep runs
-    DIR/sweep.json              the settings of the sweep
+    DIR/sweep.json              the settings of the sweep; until all is written, sweep.part
     DIR/trials/00007.json       the row of a finished trial
     DIR/trials/00007/           its recording
     DIR/results.parquet, .png   the table and its plots, written anew after each run
@@ -24,7 +24,7 @@ import trocar
 from learning.own_directory import MARKER, whole_file
 from learning.sweeps.trial import Trial, plan_trials, run_trial
 from learning.sweeps.variation import Variation
-from schemas.errors import ScenarioError
+from schemas.errors import ConnectError, ScenarioError, SessionError
 
 __all__ = ["Sweep"]
 
@@ -98,7 +98,8 @@ class Sweep:
                 )
             return
         (self.directory / "trials").mkdir(parents=True, exist_ok=True)
-        if any(path.name not in (MARKER, "trials") for path in self.directory.iterdir()):
+        begun = (MARKER, "trials", "sweep.part")
+        if any(path.name not in begun for path in self.directory.iterdir()):
             raise ScenarioError(f"'{self.directory}' holds something else than a sweep; name a new directory")
         _write(file, json.dumps(described, indent=2) + "\n")
 
@@ -121,7 +122,8 @@ class Sweep:
     def run(self, jobs: int, *, ray: str | None = None) -> Iterator[dict[str, Any]]:
         """Run the pending trials, `jobs` at a time, and yield each row once written.
 
-        `ray` is the address of a Ray cluster with nodes for the trials; `jobs` is then left to Ray.
+        `ray` is the address of a Ray cluster with nodes for the trials; `jobs` is then left to Ray. Raises
+        ConnectError if there is no cluster, and SessionError if the cluster fails.
         """
         pending = self.pending()
         made = _on_ray(ray, self._calls(pending)) if ray else _run_here(jobs, self._calls(pending))
@@ -174,15 +176,26 @@ def _run_here(jobs: int, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str
 
 def _on_ray(address: str, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str, Any]]]:
     import ray
+    from ray.exceptions import RayError
 
     # joblib's own backend for Ray gives results only when all are there, which an interruption would lose
-    ray.init(address=address, log_to_driver=False)
+    try:
+        ray.init(address=address, log_to_driver=False)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise ConnectError(
+            f"no Ray cluster at '{address}': {error}. Run the command on a node of the cluster, with auto or"
+            " the HOST:PORT of `ray status`"
+        ) from error
     try:
         run = ray.remote(num_cpus=1)(_call_numbered)
         pending = [run.remote(number, call) for number, call in enumerate(calls)]
         while pending:
             done, pending = ray.wait(pending)
             yield ray.get(done[0])
+    except RayError as error:
+        raise SessionError(
+            f"the Ray cluster at '{address}' has failed: {error}. The same command continues the sweep"
+        ) from error
     finally:
         ray.shutdown()
 

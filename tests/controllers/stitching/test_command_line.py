@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from time import monotonic, sleep
 
 import pytest
 from typer.testing import CliRunner
@@ -13,6 +12,7 @@ from hub.remote.live_sessions import live_sessions
 from hub.transport.loopback_port import LoopbackPort
 from schemas.errors import MotionError
 from tests.devices.ros.test_stitch import scenario
+from tests.waiting import until
 
 pytestmark = pytest.mark.alone
 
@@ -28,10 +28,7 @@ def endpoint(tmp_path):
     command = [sys.executable, "-P", "-m", "trocar", "run", str(file), "--listen", place]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as hub:
         try:
-            end = monotonic() + 120.0
-            while not any(status.step > 100 for status in live_sessions([place])):
-                assert monotonic() < end, "the session does not run"
-                sleep(0.1)
+            until(lambda: any(status.step > 100 for status in live_sessions([place])))
             yield place
         finally:
             hub.terminate()

@@ -150,8 +150,16 @@ def test_a_needle_that_nobody_can_take_ends_it_with_where_it_is_and_why():
     drop(world, "PSM1")
     world.needle[:3, 3] = 0.4, 0.0, 0.0
     world.run(2)
-    assert world.lead.ended == "a stitch has failed"
+    assert world.lead.ended == f"a stitch has failed: {world.said[-1]}"
     assert re.search(r"lost the needle .* at 400, 0, 0 mm, .*; it cannot go on: .*PSM1", world.said[-1])
+
+
+def test_a_needle_under_the_skin_but_beside_the_pad_is_not_said_to_be_in_the_tissue():
+    world = World(stitches=1).run(60, until=lambda w: w.phase is StitchPhase.APPROACH)
+    drop(world, "PSM1")
+    world.needle[:3, 3] = 0.12, 0.0, -0.03
+    world.run(2)
+    assert world.said[-1].endswith("at 120, 0, -30 mm, its tip outside; it is taken again")
 
 
 def test_a_needle_that_is_always_dropped_is_given_up():
@@ -160,14 +168,25 @@ def test_a_needle_that_is_always_dropped_is_given_up():
         world.run(60, until=lambda w: w.phase is StitchPhase.DRIVE and w.needle[2, 3] < 0.01)
         drop(world, "PSM1")
         world.run(1, until=lambda w: w.phase is not StitchPhase.DRIVE)
-    assert world.lead.ended == "a stitch has failed"
+    assert world.lead.ended == f"a stitch has failed: {world.said[-1]}"
+
+
+def test_a_needle_that_is_always_dropped_in_the_tissue_is_given_up_after_three_recoveries():
+    world = World(stitches=1)
+    for _ in range(4):
+        world.run(60, until=lambda w: w.phase is StitchPhase.PULL).run(0.3, until=lambda _: False)
+        drop(world, "PSM2")
+        world.run(1, until=lambda w: w.phase is not StitchPhase.PULL)
+    assert world.lead.ended == f"a stitch has failed: {world.said[-1]}"
+    assert re.search(r"^PSM2 has lost .* to pull: .*; given up after 3 recoveries$", world.said[-1])
+    assert [each.endswith("it is taken again") for each in world.said[-4:]] == [True, True, True, False]
 
 
 def test_a_needle_out_of_reach_is_refused_before_anything_moves():
     world = World(stitches=1)
     world.needle[:3, 3] += [0.4, 0.0, 0.0]
     world.run(1)
-    assert world.lead.ended == "a stitch has failed"
+    assert world.lead.ended == f"a stitch has failed: {world.said[-1]}"
     assert "the needle cannot be picked up: of PSM1" in world.said[-1]
 
 

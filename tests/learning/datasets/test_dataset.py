@@ -23,6 +23,8 @@ from engines.mujoco.pictures.recorded_scene import RecordedScene
 from learning.datasets.command_line import app
 from learning.datasets.writer import Writer
 from learning.own_directory import claim_directory
+from robots.dvrk import arm_bodies, ecm
+from robots.dvrk.own_dynamics import BodyInertia, JointLosses, OwnDynamics
 from schemas.errors import TrocarError
 from trocar import Recording
 
@@ -189,6 +191,30 @@ def test_what_cannot_be_used_is_left_out_and_the_rest_is_whole(recordings: Path,
     assert "2 episodes" in done.stderr
     assert "2 left out" in done.stderr
     assert info(tmp_path / "set")["total_frames"] == rows(tmp_path / "set").num_rows
+
+
+def test_a_scene_of_a_changed_file_is_drawn_with_trust_alone(recordings: Path, tmp_path: Path) -> None:
+    bodies = {
+        name: BodyInertia(mass=body.mass, centre=body.centre, tensor=body.tensor)
+        for name, body in arm_bodies.ecm().items()
+    }
+    losses = JointLosses(armature=0.0, stiffness=1e-3, offset=0.0, viscous=0.3)
+    joints = dict.fromkeys(ecm.JOINT_NAMES, losses)
+    own = OwnDynamics(instrument="endoscope", bodies=bodies, joints=joints, discs=[])
+    (tmp_path / "ecm.yaml").write_text(own.text(), "utf-8")
+    scenario = SCENARIO[: SCENARIO.index("  camera:")].replace("ECM: {", "ECM: {dynamics: ecm.yaml, ")
+    (tmp_path / "own.yaml").write_text(scenario)
+    trocar.run(tmp_path / "own.yaml", record=tmp_path / "own", one_host=True)
+    assert run(tmp_path / "own", "-o", tmp_path / "same").exit_code == 0
+    (tmp_path / "ecm.yaml").write_text(f"# changed\n{own.text()}", "utf-8")
+    done = run(tmp_path / "own", recordings / "seen", "-o", tmp_path / "without")
+    assert done.exit_code == 1
+    assert "1 episode, 8 frames, 1 left out" in done.stderr
+    assert "ecm.yaml', which is missing or has other contents than those recorded" in done.stderr
+    assert "allow it with --trust" in done.stderr
+    done = run(tmp_path / "own", recordings / "seen", "-o", tmp_path / "set", "--trust")
+    assert done.exit_code == 0, done.stderr
+    assert "2 episodes" in done.stderr
 
 
 @pytest.mark.parametrize(

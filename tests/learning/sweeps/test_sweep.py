@@ -117,6 +117,21 @@ def test_another_directory_is_left_alone(scenario, tmp_path):
         Sweep(str(scenario), (parse("part.value=0,2"),), tmp_path / "results").open()
 
 
+def test_a_sweep_that_was_killed_before_its_settings_were_whole_begins(begun, command):
+    words, directory = begun
+    (directory / "trials").mkdir(parents=True)
+    (directory / MARKER).write_text("sweep")
+    (directory / "sweep.part").write_text('{"scenario"')
+    assert command(*words)[0] == 0
+    assert not (directory / "sweep.part").exists()
+
+
+def test_a_cluster_that_is_not_there_is_named(begun, command):
+    words, _ = begun
+    code, said = command(*words, "--ray", "nowhere")
+    assert (code, "no Ray cluster at 'nowhere': Invalid address" in said) == (1, True)
+
+
 def test_an_edited_scenario_is_noticed(scenario, tmp_path):
     def sweep():
         return Sweep(str(scenario), (parse("part.value=0,0.5"),), tmp_path / "results", recorded=False)
