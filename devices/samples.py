@@ -22,8 +22,8 @@ __all__ = [
     "button_sample",
     "clock_of",
     "pose_sample",
+    "stamp_message",
     "stamp_of",
-    "stamp_sample",
     "twist_sample",
 ]
 
@@ -64,7 +64,7 @@ def _header(port: Port, time_ns: int) -> Header:
     return Header(stamp=Time.from_ns(time_ns), frame_id=port.frame)
 
 
-def stamp_sample(message: Message, stamp_ns: int) -> Message:
+def stamp_message(message: Message, stamp_ns: int) -> Message:
     """Return `message` with this stamp; unchanged if its type has none."""
     header = getattr(message, "header", None)
     if not isinstance(header, Header):

@@ -1,8 +1,8 @@
 """Haptic devices of your own: a driver of some forty lines, held at 1 kHz by a process with all limits.
 
 `Driver` is the interface to a vendor's library, `StylusSpec`, `Opened` or `Unavailable`, `Reading` and
-`DriverError` are what passes; `Phase` is the condition of a stylus. `HapticDevice` is the base of the kind,
-`StylusParams` that of the parameters of one stylus, `Words` puts a driver's numbers into words.
+`DriverError` are what passes; `ServoPhase` is the condition of a stylus. `HapticDevice` is the base of the
+kind, `StylusParams` that of the parameters of one stylus, `Words` puts a driver's numbers into words.
 `docs/how-to/own-haptic-device.md` makes one.
 
 Names are imported when they are first used: a driver runs in a process that should hold little.
@@ -42,7 +42,7 @@ __all__ = [
 
 _ORIGINS = {
     "HapticDevice": ("device", "HapticDevice"),
-    "Phase": ("phase", "Phase"),
+    "ServoPhase": ("phase", "ServoPhase"),
     "StylusParams": ("params", "ServoStylusParams"),
     "Words": ("diagnoses", "Words"),
 }

@@ -48,12 +48,12 @@ class Gamepad:
             linear=(
                 -self._axis_share(pygame.CONTROLLER_AXIS_LEFTY),
                 -self._axis_share(pygame.CONTROLLER_AXIS_LEFTX),
-                self._key_pair(pygame.CONTROLLER_BUTTON_DPAD_UP, pygame.CONTROLLER_BUTTON_DPAD_DOWN),
+                self._button_pair(pygame.CONTROLLER_BUTTON_DPAD_UP, pygame.CONTROLLER_BUTTON_DPAD_DOWN),
             ),
             angular=(
                 -self._axis_share(pygame.CONTROLLER_AXIS_RIGHTY),
                 self._axis_share(pygame.CONTROLLER_AXIS_RIGHTX),
-                self._key_pair(pygame.CONTROLLER_BUTTON_DPAD_RIGHT, pygame.CONTROLLER_BUTTON_DPAD_LEFT),
+                self._button_pair(pygame.CONTROLLER_BUTTON_DPAD_RIGHT, pygame.CONTROLLER_BUTTON_DPAD_LEFT),
             ),
             gripper=max(0.0, self._axis_share(pygame.CONTROLLER_AXIS_TRIGGERLEFT)) - close,
             dead_man=bool(self._pad.get_button(pygame.CONTROLLER_BUTTON_LEFTSHOULDER)),
@@ -67,6 +67,6 @@ class Gamepad:
         beyond = max(0.0, min(abs(value), 1.0) - _DEAD_ZONE) / (1.0 - _DEAD_ZONE)
         return beyond if value > 0.0 else -beyond
 
-    def _key_pair(self, plus: int, minus: int) -> float:
+    def _button_pair(self, plus: int, minus: int) -> float:
         assert self._pad is not None
         return float(self._pad.get_button(plus)) - float(self._pad.get_button(minus))

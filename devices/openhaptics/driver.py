@@ -48,7 +48,7 @@ class HdapiDriver(Driver):
 
     def __init__(self, library: str) -> None:
         """Load the library. Raises DeviceError if the file is no HDAPI."""
-        super().__init__(library=library)
+        super().__init__()
         if sys.platform != "win32":
             os.environ.setdefault("GTDD_HOME", _CONFIGURATION)
         self.hd: Hdapi = load(Path(library))

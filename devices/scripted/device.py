@@ -13,7 +13,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from devices.samples import Playback, clock_of, stamp_sample
+from devices.samples import Playback, clock_of, stamp_message
 from hub.participant import Device, Params, Sample, VectorSample
 from hub.recording.bag import Bag, BagMessage, output_port
 from schemas.codec import decode, message_type
@@ -137,7 +137,7 @@ def _sample_makers(played: list[BagMessage], ports: Sequence[Port]) -> list[_Mak
     for port in ports:
         payloads = [played[i].payload for i in places[port.name]]
         own = _vector_makers(port, payloads) or [
-            partial(_restamp_message, port.name, decode(message_type(port.type), payload))
+            partial(_restamped_sample, port.name, decode(message_type(port.type), payload))
             for payload in payloads
         ]
         makers.update(zip(places[port.name], own, strict=True))
@@ -155,8 +155,8 @@ def _vector_makers(port: Port, payloads: list[bytes]) -> list[_Maker]:
         return []
 
 
-def _restamp_message(port: str, message: Message, time_ns: int) -> Sample:
-    return Sample(port, stamp_sample(message, time_ns))
+def _restamped_sample(port: str, message: Message, time_ns: int) -> Sample:
+    return Sample(port, stamp_message(message, time_ns))
 
 
 def _ports(bag: Bag, *, simulated_time: bool, max_age_ns: int) -> tuple[Port, ...]:

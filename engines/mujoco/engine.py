@@ -77,24 +77,33 @@ class MujocoEngine(Stepped):
 
     def configure(self, setup: Setup) -> Outputs:
         """Build and compile the model, and put the arms at their start positions."""
-        timestep, period = self.params.timestep, setup.period_ns
-        if period % timestep:
-            problem = (
-                f"timestep {timestep / 1e6:g} ms does not divide the participant's period {period / 1e6:g}"
-                f" ms; set it to {period / 1e6:g} ms or a part of it"
-            )
-            raise ScenarioError(problem, path=("participants", self.name, "timestep"))
+        self._check_timestep(setup.period_ns)
         if find_spec("mujoco") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind mujoco)", "mujoco", "mujoco")
         import_mujoco()
+        self._build_parts(setup.period_ns * 1e-9, self._build_model())
+        self._build_contacts(setup.period_ns)
+        self._couple_bonds(setup)
+        self._readings.refresh()
+        self._holding.refresh()
+        self._allocate_state()
+        return self._outputs
+
+    def _check_timestep(self, period_ns: int) -> None:
+        timestep = self.params.timestep
+        if period_ns % timestep:
+            problem = (
+                f"timestep {timestep / 1e6:g} ms does not divide the participant's period"
+                f" {period_ns / 1e6:g} ms; set it to {period_ns / 1e6:g} ms or a part of it"
+            )
+            raise ScenarioError(problem, path=("participants", self.name, "timestep"))
+
+    def _build_model(self) -> Vector | None:
+        """Compile the model, and return the matrix of a lean model to the positions of the whole model."""
         import mujoco
 
         from engines.mujoco import model
-        from engines.mujoco.arms import brakes
-        from engines.mujoco.arms.readings import Readings
-        from engines.mujoco.arms.servos import Servos
         from engines.mujoco.interaction import holding
-        from engines.mujoco.interaction.rigid_contact import RigidContact
         from engines.mujoco.model import ties
         from engines.mujoco.model.lean import lean
 
@@ -103,7 +112,7 @@ class MujocoEngine(Stepped):
         spec = model.spec(self.params)
         ties.add(spec, self.params)
         holding.prepare(spec, self.params)
-        spec.option.timestep = timestep * 1e-9
+        spec.option.timestep = self.params.timestep * 1e-9
         positions = None
         if self.params.lean:
             self._model, positions = lean(spec, self.params)
@@ -112,32 +121,44 @@ class MujocoEngine(Stepped):
         self._mujoco = mujoco
         self._data = mujoco.MjData(self._model)
         model.place(self._model, self._data, self.params.arms)
-        self._servos = Servos(self._model, self._data, self.params.arms, period * 1e-9)
-        mujoco.mj_forward(self._model, self._data)
-        self._readings = Readings(
-            self._model,
-            self._data,
-            self.params.arms,
-            self._servos,
-            positions,
-            weighs=self.params.measured_effort == "motor",
-        )
-        self._brakes = brakes.Brakes(self._model, self._data, self.params)
-        self._holding = holding.Holding(
-            self._model, self._data, self.params, self.params.publish_period * 1e-9
-        )
+        return positions
+
+    def _build_parts(self, period: float, positions: Vector | None) -> None:
+        """Make servos, readings, brakes and holding.
+
+        Args:
+            period: period of the participant, s.
+            positions: for a lean model, the matrix to the positions of the whole model.
+        """
+        from engines.mujoco.arms.brakes import Brakes
+        from engines.mujoco.arms.readings import Readings
+        from engines.mujoco.arms.servos import Servos
+        from engines.mujoco.interaction.holding import Holding
+
+        model, data, params = self._model, self._data, self.params
+        self._servos = Servos(model, data, params.arms, period)
+        self._mujoco.mj_forward(model, data)
+        weighs = params.measured_effort == "motor"
+        self._readings = Readings(model, data, params.arms, self._servos, positions, weighs=weighs)
+        self._brakes = Brakes(model, data, params)
+        self._holding = Holding(model, data, params, params.publish_period * 1e-9)
+        self._outputs.update({**self._readings.outputs, **self._holding.outputs})
+
+    def _build_contacts(self, period_ns: int) -> None:
+        """Make the sums of rigid contact forces, if the scenario wants them."""
+        from engines.mujoco.interaction.rigid_contact import RigidContact
+
         psms = [arm for arm, params in self.params.arms.items() if isinstance(params, MountedPsm)]
         fixtures = tuple(self.params.fixtures)
-        self._outputs.update({**self._readings.outputs, **self._holding.outputs})
         self._rigid = None
         self._at_once = self.params.rigid_wrench is not True
         if self.params.rigid_wrench and (psms or fixtures):
-            every = period if self._at_once else timestep
+            every = period_ns if self._at_once else self.params.timestep
             self._rigid = RigidContact(self._model, self._data, psms, fixtures=fixtures, every=every * 1e-9)
             self._outputs.update(self._rigid.outputs)
-        self._couple_bonds(setup)
-        self._readings.refresh()
-        self._holding.refresh()
+
+    def _allocate_state(self) -> None:
+        """Size the saved state by the model and by the parts with state of their own."""
         self._keepers = [
             self._servos,
             self._brakes,
@@ -145,13 +166,12 @@ class MujocoEngine(Stepped):
             *(touching.motion for touching in self._touching),
             *([] if self._rigid is None or self._rigid.collisions is None else [self._rigid.collisions]),
         ]
-        self._no_sensors = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
-        trouble = mujoco.mjtWarning
+        self._no_sensors = int(self._mujoco.mjtDisableBit.mjDSBL_SENSOR)
+        trouble = self._mujoco.mjtWarning
         self._trouble = self._data.warning.number.data[trouble.mjWARN_BADQPOS : trouble.mjWARN_BADCTRL + 1]
-        self._signature = self._what_is_state()
-        self._size = mujoco.mj_stateSize(self._model, self._signature)
+        self._signature = self._state_signature()
+        self._size = self._mujoco.mj_stateSize(self._model, self._signature)
         self._state = np.empty(self._size + sum(keeper.state.size for keeper in self._keepers))
-        return self._outputs
 
     def _couple_bonds(self, setup: Setup) -> None:
         from engines.mujoco.interaction.contact_spheres_bond import ContactSpheresBond
@@ -203,7 +223,7 @@ class MujocoEngine(Stepped):
             if self._rigid is not None and arm in self._felt:
                 self._rigid.give(arm, wire.wrench, self._felt[arm])
 
-    def _what_is_state(self) -> int:
+    def _state_signature(self) -> int:
         """Return the parts of MuJoCo's data to hash and save.
 
         Applied forces are left out without bonds: half of the numbers, all 0.

@@ -12,7 +12,7 @@ class KnobDriver(Driver):
     """One knob; its hand goes from 20 mm above the origin to 20 mm below it and back."""
 
     def __init__(self, period):
-        super().__init__(period=period)
+        super().__init__()
         self.period = period  # s
         self.height, self.speed, self.force = 0.02, 0.0, 0.0  # m, m/s, N
         self.begun = self.time = None

@@ -12,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Self
 
+import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -23,6 +24,7 @@ from pydantic import (
 )
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
+from robots import rotation
 from robots.dvrk import arm_bodies, drives, ecm, psm
 from robots.dvrk.drive import Disc, Drive
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
@@ -44,9 +46,11 @@ from robots.dvrk.parameters import (
     start_positions,
 )
 from robots.serial_chain import SerialChain
+from robots.transform import rigid_transform
 from schemas.errors import MotionError
 from schemas.files import find_file
 from schemas.quantity import Angle, Length
+from schemas.vectors import Vector
 
 __all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedArms", "MountedEcm", "MountedPsm", "PsmTool"]
 
@@ -73,6 +77,11 @@ class MountedArm(BaseModel):
         default=None,
         description="file of `trocar identify`: masses, friction, springs of your own arm; null: published",
     )
+
+    @property
+    def pose(self) -> Vector:
+        """Pose of the base frame in the world, shape (4, 4), unless setup joints carry the arm."""
+        return rigid_transform(rotation.matrix(np.array(self.orientation)), self.position)
 
     @cached_property
     @abstractmethod

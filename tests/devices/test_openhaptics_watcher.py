@@ -2,7 +2,8 @@
 the servo process, a call of the driver, the watcher itself or the device's process stands still.
 
 The bounds of the tests with processes grow with what the same run measures of the machine: how late a sleep
-ends, and how long the system takes to clear a killed process away. bench/servo.py prints absolute times.
+ends, and how long the system takes to clear a killed process away. bench/haptic_servo.py prints absolute
+times.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 from pydantic import ValidationError
 
-from devices.samples import stamp_sample
+from devices.samples import stamp_message
 from devices.scripted.device import ScriptedDevice, ScriptedParams
 from hub.participant import VectorSample
 from schemas.codec import encode, ros2msg_definition
@@ -114,7 +114,7 @@ def test_samples_have_the_bytes_of_what_was_recorded_with_a_new_stamp(tmp_path: 
     samples = device.read(SECOND)
     assert all(isinstance(sample, VectorSample) for sample in samples) == (frame == "stylus_base")
     assert [sample.encode() for sample in samples] == [
-        encode(stamp_sample(pose, i * SECOND // 100)) for i, pose in enumerate(poses)
+        encode(stamp_message(pose, i * SECOND // 100)) for i, pose in enumerate(poses)
     ]
 
 

@@ -31,7 +31,7 @@ def test_an_unloaded_finger_winds_up_what_it_is_told_or_its_tendon_is_slack(comm
         tension = HAND.tension(closing, spread)
         assert tension >= 0.0
         assert all(p.lower <= q[finger, j] <= p.upper for j, p in enumerate(HAND.phalanges))
-        wound = HAND.closing_for(q[finger])
+        wound = q[finger] @ PULLEYS / PULLEYS[0]
         assert wound == pytest.approx(closing, abs=1e-9) or (tension == 0.0 and wound > closing)
 
 
@@ -49,7 +49,7 @@ def test_an_unloaded_finger_is_in_balance(command):
 
 def test_the_motors_can_bend_a_spread_finger_all_the_way():
     first = HAND.phalanges[0]
-    bent = HAND.closing_for(np.array([first.lower, *(phalanx.upper for phalanx in HAND.phalanges[1:])]))
+    bent = np.array([first.lower, *(phalanx.upper for phalanx in HAND.phalanges[1:])]) @ PULLEYS / PULLEYS[0]
     assert HAND.tension(bent, first.lower) * first.pulley < HAND.effort
 
 

@@ -43,8 +43,6 @@ class HapticDevice(Device):
     driver: ClassVar[str]
     """The class of the driver, `module:Class`; imported by the servo process alone."""
     words: ClassVar[diagnoses.Words] = diagnoses.Words()
-    nominal: ClassVar[DeviceLimits] = TOUCH
-    """Limits in place of limits not stated by a stylus."""
     buttons: ClassVar[int] = 2
 
     def __init__(
@@ -144,7 +142,7 @@ class _Stylus:
 
     def __init__(self, device: HapticDevice, stylus: str, params: ServoStylusParams, max_age_ns: int) -> None:
         self._name, self._params = stylus, params
-        self._words, self._nominal, self._button_count = device.words, device.nominal, device.buttons
+        self._words, self._button_count = device.words, device.buttons
         participant = device.name
         self._ports = stylus_ports(participant, stylus, simulated_time=False, max_age_ns=max_age_ns)
         self._samples = StylusSamples(self._ports)
@@ -159,12 +157,12 @@ class _Stylus:
     def allow_force(self, process: ServoProcess, hardware: str, stated: dict[str, float]) -> None:
         """Allow `process` to give force within the scenario's limits, unless a limit exceeds the device's.
 
-        The kind's nominal limit stands for a limit without a statement of the device.
+        A limit not stated by the device is that of a 3D Systems Touch.
         """
         self._hardware, self._refusal = hardware, ""
         limits = DeviceLimits(
             *(
-                stated[name] if stated[name] > 0.0 else getattr(self._nominal, name)
+                stated[name] if stated[name] > 0.0 else getattr(TOUCH, name)
                 for name in ("force", "stiffness", "damping")
             )
         )

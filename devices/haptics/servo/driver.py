@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from devices.haptics.contact import ZERO
 from devices.haptics.servo.phase import ServoPhase
@@ -37,7 +37,7 @@ class StylusSpec:
 
 
 class Opened(NamedTuple):
-    """An open stylus. A limit of 0 is not stated."""
+    """An open stylus. A limit of 0 is not stated: the limit of a 3D Systems Touch applies."""
 
     handle: int
     """The driver's own number for the stylus."""
@@ -100,9 +100,11 @@ class Driver(ABC):
     rate = 1000.0
     """Ticks per second of the default loop."""
 
-    def __init__(self, **options: Any) -> None:
-        """Load the library; `options`: of the device. Raises DeviceError if the library cannot be loaded."""
-        self.options = options
+    def __init__(self) -> None:
+        """Load the library. Raises DeviceError if the library cannot be loaded.
+
+        A subclass takes the device's `driver_options` as keyword arguments.
+        """
         self._timed_loop: TimedLoop | None = None
 
     @abstractmethod

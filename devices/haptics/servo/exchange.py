@@ -71,7 +71,7 @@ class State(NamedTuple):
     time: float
     """Begin of the tick, s of time.perf_counter, shared by all processes of a machine."""
     phase: int
-    """A `devices.haptics.servo.phase.Phase`."""
+    """A `devices.haptics.servo.phase.ServoPhase`."""
     code: int
     """The driver's number: the error of the phase, the calibration style of an uncalibrated stylus, or 0."""
     buttons: int
@@ -142,12 +142,14 @@ class RingReader(_Ring):
             return []
         first = max(self._seen + 1, newest - self._slots + 1)
         found = [
-            record for number in range(first, newest + 1) if (record := self._is_intact(number)) is not None
+            record
+            for number in range(first, newest + 1)
+            if (record := self._intact_record(number)) is not None
         ]
         self._seen = newest
         return found
 
-    def _is_intact(self, number: int) -> tuple[float, ...] | None:
+    def _intact_record(self, number: int) -> tuple[float, ...] | None:
         at = number % self._slots * self._size
         slot = bytes(self._memory[at : at + self._size])
         content = slot[_HEAD.size :]

@@ -17,7 +17,7 @@ from devices.ros.topics.publications import MessageSource, State
 from devices.ros.topics.row import Row
 from devices.ros.topics.stamps import Stamps
 from devices.ros.topics.whole_robot import periods_between, robot_description, whole_robot_sources
-from devices.samples import stamp_sample
+from devices.samples import stamp_message
 from hub.planning import registry
 from hub.planning.foreign_code import names_class
 from hub.planning.plan import Plan
@@ -175,7 +175,7 @@ class _RowWriter:
 
     def write(self, row: Row, time_ns: int, message: Message) -> None:
         """Stamp and write a message. Raises RecordingError if the bag cannot be written."""
-        self.write_cdr(row, time_ns, encode(stamp_sample(message, self.stamp_ns(row, time_ns))))
+        self.write_cdr(row, time_ns, encode(stamp_message(message, self.stamp_ns(row, time_ns))))
 
     def write_cdr(self, row: Row, time_ns: int, payload: bytes) -> None:
         """Write a stamped and encoded message."""
@@ -204,9 +204,9 @@ class _Replay:
                 every = periods_between(row.name, self._period_ns)
                 self._periodic.append((row, whole_robot[row.name], every))
             elif row.name == "robot_description" and gateway.params.robot_description is not None:
-                self._describe_topic(row, gateway.params.robot_description)
+                self._write_description(row, gateway.params.robot_description)
 
-    def _describe_topic(self, row: Row, file: Path) -> None:
+    def _write_description(self, row: Row, file: Path) -> None:
         try:
             self._bag.write(row, 0, StringMessage(data=robot_description(file)))
         except DeviceError as error:

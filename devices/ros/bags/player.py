@@ -16,7 +16,7 @@ from devices.ros.bags.params import BagParams, listed_topics
 from devices.ros.topics.row import Row
 from devices.ros.topics.state_commands import RepeatedStateCommands
 from devices.ros.topics.validation import as_signal, validate
-from devices.samples import Playback, clock_of, stamp_of, stamp_sample
+from devices.samples import Playback, clock_of, stamp_message, stamp_of
 from hub.participant import Device, Sample
 from hub.recording.ros_bag_reader import RosBag
 from hub.transport.refusals import Refusals
@@ -112,7 +112,7 @@ class BagPlayer(Device):
                 self._refusals.refuse(f"'{self.name}': {topic}", f"{error} (at {time_ns / 1e9:g} s)")
                 continue
             if row.port is not None:
-                yield time_ns, Sample(row.port.name, stamp_sample(message, time_ns))
+                yield time_ns, Sample(row.port.name, stamp_message(message, time_ns))
 
 
 class _Filter:

@@ -157,7 +157,7 @@ def announced_participant(announcement: Data) -> tuple[int, int]:
 
     Raises MessageError for missing or invalid ports.
     """
-    found = _announced_endpoint(announcement, Pid.METATRAFFIC_UNICAST_LOCATOR, Pid.DEFAULT_UNICAST_LOCATOR)
+    found = _announced_parameters(announcement, Pid.METATRAFFIC_UNICAST_LOCATOR, Pid.DEFAULT_UNICAST_LOCATOR)
     metatraffic, default = (
         _port(found[locator]) for locator in (Pid.METATRAFFIC_UNICAST_LOCATOR, Pid.DEFAULT_UNICAST_LOCATOR)
     )
@@ -179,11 +179,11 @@ def announced_endpoint(announcement: Data) -> tuple[bytes, bytes]:
 
     Raises MessageError if the announcement has not both.
     """
-    found = _announced_endpoint(announcement, Pid.TOPIC_NAME, Pid.ENDPOINT_GUID)
+    found = _announced_parameters(announcement, Pid.TOPIC_NAME, Pid.ENDPOINT_GUID)
     return found[Pid.TOPIC_NAME], found[Pid.ENDPOINT_GUID][12:16]
 
 
-def _announced_endpoint(announcement: Data, *needed: Pid) -> dict[int, bytes]:
+def _announced_parameters(announcement: Data, *needed: Pid) -> dict[int, bytes]:
     found, _ = parse_parameters(announcement.payload[4:])
     if announcement.payload[:4] != PL_CDR_LE or set(needed) - found.keys():
         raise MessageError("the discovery data of a participant is not complete")

@@ -52,9 +52,9 @@ class StatefulWriter:
         self._last += 1
         self._history.append((self._last, payload, inline_qos))
         data = encode_data(self._writer_id, self._reader_id, self._last, payload, inline_qos)
-        self._send([data, self._send_heartbeat()])
+        self._send([data, self._next_heartbeat()])
 
-    def _send_heartbeat(self) -> bytes:
+    def _next_heartbeat(self) -> bytes:
         self._heartbeats += 1
         first = self._history[0][0] if self._history else self._last + 1
         return encode_heartbeat(self._writer_id, self._reader_id, first, self._last, self._heartbeats)
@@ -62,7 +62,7 @@ class StatefulWriter:
     def send_heartbeat(self) -> None:
         """Send a HEARTBEAT, if the reader has not acknowledged all samples."""
         if self._acknowledged < self._last:
-            self._send([self._send_heartbeat()])
+            self._send([self._next_heartbeat()])
 
     def on_acknack(self, acknack: AckNack) -> None:
         """Send the requested samples again."""
@@ -74,7 +74,7 @@ class StatefulWriter:
             if number in missing
         ]
         if again or not acknack.base:  # 0: a reader that has had no HEARTBEAT yet
-            self._send([*again, self._send_heartbeat()])
+            self._send([*again, self._next_heartbeat()])
 
 
 class StatefulReader:

@@ -124,7 +124,7 @@ class DdsTransport(Transport):
     ) -> DataWriter[Payload]:
         self._topics.add(topic)
         return DataWriter(
-            self._participant, Topic(self._participant, topic, type_), quality + _hash_type(ros_type)
+            self._participant, Topic(self._participant, topic, type_), quality + _type_hash_quality(ros_type)
         )
 
     def _announce_node(self) -> None:
@@ -134,7 +134,7 @@ class DdsTransport(Transport):
         self._info.write(self._info.data_type(entities_info(self._guid, NODE, readers, writers)))
 
 
-def _hash_type(ros_type: str) -> Qos:
+def _type_hash_quality(ros_type: str) -> Qos:
     return Qos(Policy.Userdata(_type_hash_data(ros_type).encode())) if ros_type else Qos()
 
 

@@ -90,7 +90,7 @@ class Wire:
         message = (
             self._store.cdr_to_ros1(memoryview(cdr), self._type)
             if self._is_same
-            else self._migrate_definition(cdr, to_ros2=False)
+            else self._migrate_message(cdr, to_ros2=False)
         )
         frame = bytearray(_LENGTH.size + len(message))
         frame[_LENGTH.size :] = message
@@ -108,14 +108,14 @@ class Wire:
         try:
             if not self._is_same:
                 check_first_sequence(message_type(self._type), message[:4], "little")
-                return bytes(self._migrate_definition(message, to_ros2=True))
+                return bytes(self._migrate_message(message, to_ros2=True))
             return bytes(self._store.ros1_to_cdr(message, self._type))
         except (SerdeError, AssertionError, IndexError, struct.error, ValueError) as error:
             raise MessageError(
                 f"{self._type}: {len(message)} bytes are no such message of ROS 1 ({error})"
             ) from error
 
-    def _migrate_definition(self, message: bytes, *, to_ros2: bool) -> memoryview:
+    def _migrate_message(self, message: bytes, *, to_ros2: bool) -> memoryview:
         """Return a message in the layout of the far side, field by field: far slower than as bytes."""
         source, target = (_noetic_types(), self._store) if to_ros2 else (self._store, _noetic_types())
         return migrate_bytes(

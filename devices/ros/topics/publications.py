@@ -10,7 +10,7 @@ from typing import Protocol
 from devices.ros.status import Count
 from devices.ros.topics.stamps import Stamps
 from devices.ros.transport import Publisher
-from devices.samples import stamp_sample
+from devices.samples import stamp_message
 from hub.participant import Value
 from schemas.codec import encode
 from schemas.errors import DeviceError
@@ -163,7 +163,7 @@ class EventTopic:
             if isinstance(message, Message):
                 with self._publishing:
                     if self._publish.wanted:
-                        self._publish(encode(stamp_sample(message, self._stamps.next_ns())))
+                        self._publish(encode(stamp_message(message, self._stamps.next_ns())))
                     self._count.messages += 1
 
 

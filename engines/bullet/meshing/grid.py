@@ -9,7 +9,7 @@ import numpy as np
 from engines.bullet.meshing.tet_mesh import Indices, TetMesh
 from schemas.vectors import Vector
 
-__all__ = ["FEWEST_NODES", "block", "block_cells", "tetrahedra_of_cells"]
+__all__ = ["FEWEST_NODES", "block", "block_cells", "grid_indices", "tetrahedra_of_cells"]
 
 FEWEST_NODES = 18
 """Nodes of the smallest symmetric block, 2 x 2 x 1 cells."""
@@ -35,7 +35,7 @@ def block(size: Vector, nodes: int) -> TetMesh:
     is symmetric in both, without a preferred diagonal.
     """
     cells = block_cells(size, nodes)
-    points = (_grid_indices(cells[0] + 1, cells[1] + 1, cells[2] + 1) / cells - [0.5, 0.5, 1.0]) * size
+    points = (grid_indices(cells[0] + 1, cells[1] + 1, cells[2] + 1) / cells - [0.5, 0.5, 1.0]) * size
     return TetMesh(points, tetrahedra_of_cells(cells))
 
 
@@ -49,7 +49,7 @@ def tetrahedra_of_cells(cells: tuple[int, int, int], *, closed: bool = False) ->
         closed: the second direction runs around: the last cells (an even number) end on the first nodes.
     """
     rows = cells[1] + (0 if closed else 1)
-    origins = _grid_indices(*cells)  # (c, 3)
+    origins = grid_indices(*cells)  # (c, 3)
     corners = origins[:, None] + _CORNERS  # (c, 8, 3)
     corners[:, :, 1] %= rows if closed else rows + 1
     numbers = corners @ np.array([rows * (cells[2] + 1), cells[2] + 1, 1])  # (c, 8)
@@ -76,11 +76,10 @@ def block_cells(size: Vector, nodes: int) -> tuple[int, int, int]:
     return min(candidates, key=unfitness)
 
 
-def _grid_indices(nx: int, ny: int, nz: int) -> Indices:
+def grid_indices(nx: int, ny: int, nz: int) -> Indices:
     """Return all (i, j, k) of a grid, shape (nx ny nz, 3), k the fastest."""
-    return np.stack(np.meshgrid(np.arange(nx), np.arange(ny), np.arange(nz), indexing="ij"), axis=-1).reshape(
-        -1, 3
-    )
+    i, j, k = np.arange(nx), np.arange(ny), np.arange(nz)
+    return np.stack(np.meshgrid(i, j, k, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def _even_neighbours(x: float) -> tuple[int, int]:

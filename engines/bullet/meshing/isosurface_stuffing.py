@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from engines.bullet.meshing.grid import grid_indices
 from engines.bullet.meshing.tet_mesh import Indices, TetMesh, compact, volumes
 from schemas.vectors import Vector
 
@@ -55,9 +56,9 @@ def _cubic_lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, I
     cubes = np.ceil((high - low) / spacing).astype(np.int64) + 2
     shape = 2 * cubes + 1  # places at half the spacing; corners of cubes are at even, centres at odd ones
     strides = np.array([shape[1] * shape[2], shape[2], 1])
-    places = _grid_indices(np.zeros(3, np.int64), shape, 1)
+    places = grid_indices(*shape.tolist())
     points = (places - cubes) * (0.5 * spacing) + 0.5 * (low + high)
-    centres = _grid_indices(np.ones(3, np.int64), shape - 1, 2)
+    centres = 2 * grid_indices(*cubes.tolist()) + 1
     parts: list[Indices] = []
     for axis in range(3):
         # towards the next centre, and along the square between
@@ -68,12 +69,6 @@ def _cubic_lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, I
             corners = [pairs, pairs + 2 * step, pairs + step + first, pairs + step + second]
             parts.append(np.stack([corner @ strides for corner in corners], axis=1))
     return points, np.concatenate(parts)
-
-
-def _grid_indices(start: Indices, stop: Indices, step: int) -> Indices:
-    """Return all (i, j, k) from `start` to before `stop`, shape (n, 3), k the fastest."""
-    i, j, k = (np.arange(int(start[axis]), int(stop[axis]), step) for axis in range(3))
-    return np.stack(np.meshgrid(i, j, k, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def _snap_vertices(

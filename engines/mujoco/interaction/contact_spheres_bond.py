@@ -5,12 +5,15 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from engines.mujoco.interaction.mechanics import TURNED, effective_mass
+from engines.mujoco.interaction.mechanics import effective_mass
 from engines.mujoco.model import CONTACT
 from hub.participant import Inputs, MotionSide
 from schemas.vectors import Vector
 
 __all__ = ["ContactSpheresBond"]
+
+_TURNED = np.array([[1, 2, 0], [2, 0, 1]])
+"""Axes y, z, x and z, x, y: a cross product is a(yzx) b(zxy) - a(zxy) b(yzx)."""
 
 
 class ContactSpheresBond:
@@ -35,11 +38,11 @@ class ContactSpheresBond:
         self._bodies = np.unique(carriers)
         self._share = (carriers == self._bodies[:, None]).astype(np.float64)  # (bodies, n)
         self._applied, self._masses = data.xfrc_applied, data.xipos.reshape(-1)
-        # (2, n, 3): where the axes in the orders of `TURNED` stand, of each sphere in `_position`, of its
+        # (2, n, 3): where the axes in the orders of `_TURNED` stand, of each sphere in `_position`, of its
         # force, and of the centre of mass of its link in `_masses`
-        self._of_sphere = 3 * np.arange(n)[:, None] + TURNED[:, None]
+        self._of_sphere = 3 * np.arange(n)[:, None] + _TURNED[:, None]
         self._of_force = self._of_sphere[::-1].copy()
-        self._of_mass = 3 * carriers[:, None] + TURNED[:, None]
+        self._of_mass = 3 * carriers[:, None] + _TURNED[:, None]
         # arms and forces with their axes in the orders whose products are the two terms of a moment
         self._arms, self._turned, self._terms = np.zeros((3, 2, n, 3))
         self._moved = np.zeros(3 * n)
@@ -107,7 +110,7 @@ class ContactSpheresBond:
 
     def _update_tip_wrench(self) -> None:
         self._position.take(self._of_sphere, None, self._arms, "clip")
-        self._arms -= self._tip.take(TURNED)[:, None]
+        self._arms -= self._tip.take(_TURNED)[:, None]
         self._set_moments(self._about_tip)
         self._to_base.dot(np.add.reduce(self._forces, 0), self._tip_force)
         self._to_base.dot(np.add.reduce(self._about_tip, 0), self._tip_torque)

@@ -7,10 +7,7 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["TURNED", "effective_mass"]
-
-TURNED = np.array([[1, 2, 0], [2, 0, 1]])
-"""Axes y, z, x and z, x, y: a cross product is a(yzx) b(zxy) - a(zxy) b(yzx)."""
+__all__ = ["effective_mass"]
 
 
 def effective_mass(jacobian: Vector, model: mujoco.MjModel, data: mujoco.MjData) -> float:

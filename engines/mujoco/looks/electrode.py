@@ -10,14 +10,11 @@ from robots.dvrk.end_effectors.end_effector import Mount
 
 __all__ = ["parts"]
 
-_LENGTH = 0.0155
-"""m; without a public model: as long as the Cadiere forceps, as jaws in `robots.dvrk.instruments`."""
 
-
-def parts(_electrode: Electrode, _instrument: str, mount: Mount) -> Looks:
+def parts(electrode: Electrode, _instrument: str, mount: Mount) -> Looks:
     """Return a stem with a hooked end."""
     pose = finger_frame(mount)
-    stem = rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.0130), 0.0008)
-    hook = block((-0.0006, -0.0018, 0.0125), (0.0006, 0.0008, _LENGTH))
+    stem = rod((0.0, 0.0, 0.0), (0.0, 0.0, electrode.length - 0.0025), 0.0008)
+    hook = block((-0.0006, -0.0018, electrode.length - 0.0030), (0.0006, 0.0008, electrode.length))
     solid = place_solid(union(stem, hook), pose[:3, :3], pose[:3, 3])
     return {mount.link: (part("electrode", solid, STEEL),)}

@@ -81,26 +81,18 @@ def _drawing_axes(pitch: Vector) -> Vector:
 
 def _wrist_link(name: str, frame: Vector, below: Vector) -> Part:
     """Link from z of `frame` to z of `below`, with a hub in the clevis above, and ears below."""
-    length = float(np.linalg.norm(below[:3, 3] - frame[:3, 3]))
+    axes, length = _drawing_axes(frame), float(np.linalg.norm(below[:3, 3] - frame[:3, 3]))
     if length < 1e-6:  # two crossed joints of a snake wrist
         return part(
             name,
-            rod((0.0, 0.0, -0.0015), (0.0, 0.0, 0.0015), 0.0019).transform(
-                _affine_transform(_drawing_axes(frame), frame)
-            ),
+            place_solid(rod((0.0, 0.0, -0.0015), (0.0, 0.0, 0.0015), 0.0019), axes, frame[:3, 3]),
             STEEL,
         )
     hub = rod((-0.0020, 0.0, 0.0), (0.0020, 0.0, 0.0), min(0.0024, 0.6 * length))
     body = rod((0.0, 0.0, -length - 0.0015), (0.0, 0.0, -0.2 * length), WRIST_RADIUS)
     waist = block((-0.0020, -0.0022, -0.6 * length), (0.0020, 0.0022, 0.0))
     slot = block((-1.0, -0.0020, -1.0), (1.0, 0.0020, -length + min(0.0032, 0.4 * length)))
-    return part(
-        name, union(hub, body - slot, waist).transform(_affine_transform(_drawing_axes(frame), frame)), STEEL
-    )
-
-
-def _affine_transform(rotation: Vector, frame: Vector) -> Vector:
-    return np.column_stack([rotation, frame[:3, 3]])
+    return part(name, place_solid(union(hub, body - slot, waist), axes, frame[:3, 3]), STEEL)
 
 
 def _pin_solid(name: str, frame: Vector) -> Part:

@@ -78,17 +78,7 @@ def dynamics(
 
     Raises ValidationError if `own` cannot be read or does not fit the arm, or if `base` is no way to stand.
     """
-    stand = dict(base)
-    what: dict[str, Any] = {"endoscope" if arm == "ECM" else "instrument": tool}
-    if "orientation" in stand:
-        what["orientation"] = stand.pop("orientation")
-    if "setup_joints" in stand:
-        stand["setup_joints"] = {arm: stand["setup_joints"]}
-    if own is not None:
-        what["dynamics"] = own
-    scene = SceneParams.model_validate(
-        {"arms": {arm: what}, "looks": False, **stand}, context=Files(Path.cwd()).context
-    )
+    scene = _scene_of(arm, tool, own, base)
     params = scene.arms[arm]
     model = build(scene)
     data = mujoco.MjData(model)
@@ -119,4 +109,19 @@ def dynamics(
         friction=np.array([moving[name] for name in joints]),
         elastic_stiffness=to_all.T @ model.jnt_stiffness,
         elastic=to_all.T @ (model.jnt_stiffness * (data.qpos - model.qpos_spring)),
+    )
+
+
+def _scene_of(arm: CartArm, tool: str, own: Path | None, base: Mapping[str, Any]) -> SceneParams:
+    """Return a scene of `arm` alone."""
+    stand = dict(base)
+    what: dict[str, Any] = {"endoscope" if arm == "ECM" else "instrument": tool}
+    if "orientation" in stand:
+        what["orientation"] = stand.pop("orientation")
+    if "setup_joints" in stand:
+        stand["setup_joints"] = {arm: stand["setup_joints"]}
+    if own is not None:
+        what["dynamics"] = own
+    return SceneParams.model_validate(
+        {"arms": {arm: what}, "looks": False, **stand}, context=Files(Path.cwd()).context
     )

@@ -10,11 +10,8 @@ import numpy as np
 from engines.mujoco.model import arm, fixtures, objects, setup_joints, shapes
 from engines.mujoco.model.tree import links
 from engines.mujoco.params import SceneParams
-from robots import rotation
 from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
-from robots.transform import rigid_transform
-from schemas.vectors import Vector
 
 __all__ = ["build", "place", "spec"]
 
@@ -39,7 +36,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     result.worldbody.add_light(pos=[0.0, 0.0, 3.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
     for name, params in scene.arms.items():
-        pose = mounts.get(name, _free_pose(params))
+        pose = mounts.get(name, params.pose)
         shapes.add_arm(result, name, params, arm.add(result, name, params, pose), seen=scene.looks)
     if scene.table is not None:
         objects.add_table(result, scene.table)
@@ -80,7 +77,3 @@ def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
 
 def _has_springs(params: MountedArm) -> bool:
     return any(link.spring is not None for link in params.end_effector_links)
-
-
-def _free_pose(params: MountedArm) -> Vector:
-    return rigid_transform(rotation.matrix(np.array(params.orientation)), params.position)

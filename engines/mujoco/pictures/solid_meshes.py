@@ -33,7 +33,7 @@ def solid_mesh(kind: mujoco.mjtGeom, size: Vector) -> Triangles:
     if kind == geom.mjGEOM_BOX:
         return _revolve_profile([(a, -c), (a, c)], corners=4, flat=(a, b))
     if kind == geom.mjGEOM_PLANE:
-        return _plane_through(a or _PLANE_M, b or _PLANE_M)
+        return _rectangle(a or _PLANE_M, b or _PLANE_M)
     if kind == geom.mjGEOM_CYLINDER:
         return _revolve_profile([(0.0, -b), (a, -b), (a, b), (0.0, b)])
     angles = np.linspace(-np.pi / 2, np.pi / 2, _RINGS + 1)
@@ -78,6 +78,6 @@ def _revolve_profile(
     return Triangles(vertices, np.concatenate(faces))
 
 
-def _plane_through(a: float, b: float) -> Triangles:
+def _rectangle(a: float, b: float) -> Triangles:
     corners = np.array([[a, b, 0.0], [-a, b, 0.0], [-a, -b, 0.0], [a, -b, 0.0]])
     return Triangles(corners, np.array([[0, 1, 2], [0, 2, 3]]))

@@ -151,7 +151,7 @@ class Hand(EndEffector):
     @property
     def joints(self) -> tuple[Joint, ...]:
         """Closings and spreads as joints, with ranges and limits."""
-        first, ratios = self.phalanges[0], self._pulley_rows / self._pulley_rows[0]
+        first, ratios = self.phalanges[0], self._pulley_radii / self._pulley_radii[0]
         limits = (self.velocity, self.effort, self.acceleration, self.jerk)
         most = float(ratios @ [phalanx.upper for phalanx in self.phalanges])
         ranges = [(name, first.lower, most) for name in self.fingers] + [
@@ -289,14 +289,10 @@ class Hand(EndEffector):
         # between these all moves in proportion
         tensions = sorted({0.0, *(stop for stop in stops if stop > 0.0)})
         closings = [
-            float(self._positions(tension, spread) @ self._pulley_rows) / float(self._pulley_rows[0])
+            float(self._positions(tension, spread) @ self._pulley_radii) / float(self._pulley_radii[0])
             for tension in tensions
         ]
         return float(np.interp(closing, closings, tensions))
-
-    def closing_for(self, positions: Vector) -> float:
-        """Return the closing (rad) of a finger whose joints are at `positions` (rad), shape (phalanges,)."""
-        return float(positions @ self._pulley_rows / self._pulley_rows[0])
 
     def contacts(self, positions: Vector) -> Vector:
         """Return the centres of the contact spheres in the hand's frame (m).
@@ -317,7 +313,7 @@ class Hand(EndEffector):
         return np.stack([radial * np.cos(azimuths), radial * np.sin(azimuths), self.palm + along], axis=-1)
 
     @cached_property
-    def _pulley_rows(self) -> Vector:
+    def _pulley_radii(self) -> Vector:
         return np.array([phalanx.pulley for phalanx in self.phalanges])
 
     def _rest(self, spread: float) -> list[float]:

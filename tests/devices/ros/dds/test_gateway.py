@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cyclonedds.qos import Policy
 
 from devices.ros.dds.gateway import DdsGateway
 from schemas.codec import message_type, rihs01
@@ -16,7 +17,7 @@ from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
 from tests.devices.ros.helpers import received, wanted
 from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.rclpy_peer import RclpyPeer, environment, free_domain
-from tests.waiting import until
+from tests.waiting import LIMIT_S, until
 
 __all__ = ["rclpy_python"]
 
@@ -176,7 +177,7 @@ def test_the_first_command_of_a_program_is_received_once(rclpy_python, psm, kind
     command = [rclpy_python, FIRST_COMMAND, "/PSM1/state_command", kind, str(count), str(length)]
     with subprocess.Popen(command, env=environment(psm.params.domain)) as programs:
         try:
-            programs.wait(timeout=60.0)
+            programs.wait(timeout=LIMIT_S)
         finally:
             programs.kill()
     heard = [sample.message for sample in received(psm, "/PSM1/state_command")]
@@ -200,6 +201,8 @@ def test_a_console_that_stops_reading_holds_up_nobody(rclpy_python, domain, tmp_
     ):
         stalled = stack.enter_context(Console(rclpy_python, gateway, "stalled"))
         stalled.join(gateway.rows)
+        never_blocks = Policy.Reliability.Reliable(0)
+        assert all(never_blocks in writer.get_qos() for writer in gateway._transport._writers)
         stalled.process.send_signal(signal.SIGSTOP)
         for word in range(120):  # 33 MB
             gateway.write(STATE[1:], np.zeros(18))
