@@ -32,7 +32,7 @@ step: {step} ms
 duration: {seconds} s
 pace: realtime
 participants:
-  hand: {{kind: "tapping:Tapping", host: hand, output: "{output}"}}
+  hand: {{kind: "latency_hand:Tapping", host: hand, output: "{output}"}}
   teleop: {{kind: teleoperation}}
   robot:
     kind: mujoco

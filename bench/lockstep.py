@@ -49,7 +49,8 @@ def trocar(participants: int, window: int, steps: int, *, one_host: bool) -> flo
             "window": window,
             "algorithm": "jacobi",
             "participants": {
-                name: {"kind": "exchange:Exchange", "host": "hub" if one_host else name} for name in names
+                name: {"kind": "lockstep_participant:Exchange", "host": "hub" if one_host else name}
+                for name in names
             },
             "connections": [
                 f"{a}.given -> {b}.taken" for a, b in zip(names, [*names[1:], names[0]], strict=True)
@@ -156,7 +157,7 @@ def _wait_for_start(
 
 def plain_loop(participants: int, steps: int) -> float:
     """Return the steps per second of calling the participants in a plain loop."""
-    from exchange import Exchange
+    from lockstep_participant import Exchange
 
     from hub.participant import Inputs, Setup
 

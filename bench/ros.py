@@ -30,8 +30,8 @@ from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
+from bench.ros_addresses import PLACES, Place
 from bench.ros_figures import cpu_s, host_process, percentiles
-from bench.ros_places import PLACES, Place
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
 from hub.session.session import Session
@@ -139,7 +139,7 @@ def bare(kind: str, place: Place, seconds: float) -> dict[str, Any]:
     with port.listen():
         command = [
             sys.executable,
-            str(HERE / "ros_bare.py"),
+            str(HERE / "ros_gateway_alone.py"),
             kind,
             endpoint,
             json.dumps(GATEWAY | FAST | place.params),
@@ -252,7 +252,7 @@ def session(kind: str, place: Place, seconds: float, *, everything: bool = False
 
     `everything`: publish all states of the arms, not only their joints.
     """
-    parts = {"camera": {"kind": "bench.ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
+    parts = {"camera": {"kind": "bench.ros_participants:Pictures", "host": "cameras", "period": "16 ms"}}
     states = ["motion.* -> ros.*"] if everything else [f"motion.{name} -> ros.{name}" for name in STATES]
     connections = [
         *states,
@@ -279,7 +279,7 @@ def servo(kind: str, place: Place, count: int) -> dict[str, Any]:
     """Measure the way of `servo_jp` to the joint."""
     with tempfile.TemporaryDirectory() as directory:
         output = Path(directory, "times.json")
-        parts = {"watch": {"kind": "bench.ros_parts:Stopwatch", "output": str(output)}}
+        parts = {"watch": {"kind": "bench.ros_participants:Stopwatch", "output": str(output)}}
         watched = [
             "ros.PSM1/servo_jp -> watch.servo_jp",
             "motion.drive/PSM1/servo_jp -> watch.setpoint",

@@ -43,15 +43,26 @@ class Files:
         """
         if str(self.directory / path).startswith(("\\\\", "//")) and self._hashes is not None:
             raise ValueError(f"the network path '{path}' is not looked at")
-        full = (self.directory / path).resolve()
+        try:
+            full = (self.directory / path).resolve()
+        except RuntimeError as error:  # before Python 3.13
+            raise ValueError(f"'{self.directory / path}' is a link in a loop of links") from error
         if full in self._allowed:
             return full
-        if (problem := _problem(full)) and full.exists():
+        if (problem := _problem(full)) and not _is_missing(full):
             raise ValueError(f"'{full}' {problem}")
         if self._hashes is not None and not has_contents(full, self._hashes):
             raise ValueError(f"the file '{full}' is missing or has other contents than those recorded")
         self._allowed.add(full)
         return full
+
+    def allows(self, path: Path) -> bool:
+        """Return whether `find` accepts a path: contents are hashed once for both."""
+        try:
+            self.find(path)
+        except ValueError:
+            return False
+        return True
 
 
 def find_file(path: Path, info: ValidationInfo) -> Path:
@@ -89,6 +100,13 @@ def file_hash(file: Path) -> str:
     """Return the SHA-256 of a file. Raises OSError if it cannot be read."""
     with file.open("rb") as content:
         return hashlib.file_digest(content, "sha256").hexdigest()
+
+
+def _is_missing(path: Path) -> bool:
+    try:
+        return not path.exists()
+    except OSError:  # a name that is too long, or a directory that may not be read
+        return False
 
 
 def _problem(path: Path) -> str:

@@ -2,7 +2,8 @@
 
 Size, names and frame fix the layout of a port's message: only the stamp and the blocks of doubles change from
 step to step. `VectorCodec` writes stamp and blocks into an encoded template (3 us against 28 us through the
-models, `bench/engine_steps.py` on a slow machine), and reads blocks after a comparison of all other bytes.
+models, `bench/mujoco_engine_cost.py` on a slow machine), and reads blocks after a comparison of all other
+bytes.
 """
 
 from __future__ import annotations

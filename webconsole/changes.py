@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from hub.planning.limits import safe_text
 from schemas.errors import MessageError, ScenarioError, did_you_mean
 from schemas.scenario import Scenario
-from webconsole.fields import Scalar, participant_fields, session_fields
+from webconsole.fields import Scalar, override_text, participant_fields, session_fields
 
 __all__ = ["overrides", "wrong_fields"]
 
@@ -43,9 +43,11 @@ def overrides(scenario: Scenario, changes: Mapping[str, Scalar]) -> list[str]:
 def wrong_fields(error: ScenarioError, changes: Mapping[str, Scalar]) -> dict[str, str]:
     """Return the messages of an error by the path of the field."""
     found: dict[str, list[str]] = {}
-    for line in str(error).splitlines():
-        override, _, message = line.removeprefix("--set ").partition(": ")
-        path = override.partition("=")[0]
-        if line.startswith("--set ") and path in changes:
-            found.setdefault(path, []).append(message.partition(": ")[2] or message)
+    lines = str(error).splitlines()
+    for path, value in changes.items():
+        place = f"--set {safe_text(override_text(path, value))}: "
+        for line in lines:
+            if line.startswith(place):
+                message = line.removeprefix(place)
+                found.setdefault(path, []).append(message.partition(": ")[2] or message)
     return {path: "; ".join(messages) for path, messages in found.items()}

@@ -47,6 +47,9 @@ def view(
     read_only: Annotated[
         bool, typer.Option("--read-only", help="The link is that of a viewer, who steers and leads nothing.")
     ] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Read files other than those of the recording, to draw its scene.")
+    ] = False,
     foxglove: Annotated[
         bool, typer.Option("--foxglove", help="Let Foxglove look at the running session too, read-only.")
     ] = False,
@@ -72,6 +75,7 @@ def view(
 
     serve(
         recording,
+        trust=trust,
         endpoint=connect,
         session=session,
         port=port,

@@ -16,7 +16,7 @@ from hub.planning.limits import safe_text
 from schemas.errors import ScenarioError
 from schemas.scenario import Scenario
 
-__all__ = ["Field", "Scalar", "participant_fields", "session_fields"]
+__all__ = ["Field", "Scalar", "override_text", "participant_fields", "session_fields"]
 
 Scalar = bool | int | float | str | None
 Control = Literal["number", "whole", "switch", "choice"]
@@ -42,7 +42,7 @@ class Field(NamedTuple):
 
     def override(self, value: Scalar) -> str:
         """Return `path=value` as on the command line; raises ScenarioError for a value of another type."""
-        text = f"{self.path}={json.dumps(value)}"
+        text = override_text(self.path, value)
         if value is None or self._allows_value(value):
             return text
         expected = {
@@ -68,6 +68,11 @@ class Field(NamedTuple):
         """Return a validated value in the unit of the field: durations are whole nanoseconds."""
         is_duration = self.control == "number" and self.unit == "s" and isinstance(value, int)
         return value * 1e-9 if is_duration else value
+
+
+def override_text(path: str, value: Scalar) -> str:
+    """Return `path=value` as on the command line."""
+    return f"{path}={json.dumps(value)}"
 
 
 def session_fields() -> Iterator[Field]:

@@ -42,9 +42,12 @@ class Recorded:
     generation = 1
     guided = None
 
-    def __init__(self, path: Path) -> None:
-        """Open the recording; raises RecordingError if it is not of a session."""
-        self.recording = Recording(path)
+    def __init__(self, path: Path, *, trust: bool = False) -> None:
+        """Open the recording; raises RecordingError if it is not of a session.
+
+        `trust` allows a drawn scene of changed files.
+        """
+        self.recording, self._trust = Recording(path), trust
         self.scenario: Scenario | None = self.recording.scenario()
         self._moments = Moments(self.recording)
         self._lock = Lock()
@@ -96,7 +99,8 @@ class Recorded:
 
     def params(self, participant: str) -> Params:
         """Return the validated parameters of a participant; raises as `trusted_parameters` does."""
-        return trusted_parameters(self.recording, [participant]).validate_last(participant)
+        parameters = trusted_parameters(self.recording, [participant], trust=self._trust)
+        return parameters.validate_last(participant)
 
     @cached_property
     def _read_statuses(self) -> tuple[list[tuple[int, SessionStatus]], list[str]]:

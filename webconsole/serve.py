@@ -40,6 +40,7 @@ _FOXGLOVE = "/foxglove"
 def serve(
     recording: Path | None,
     *,
+    trust: bool = False,
     endpoint: str | None = None,
     session: str | None = None,
     port: int | None = None,
@@ -54,6 +55,7 @@ def serve(
 
     Args:
         recording: The recording; None: a running session.
+        trust: Draw the recorded scene of changed files, too.
         endpoint: Endpoint of the hub; None: any hub of this user on this machine.
         session: Name of the session; None: the first session found.
         port: Port on loopback; None: any free port.
@@ -75,7 +77,10 @@ def serve(
             signal.signal(signal.SIGHUP, _terminate)
         listening = on_loopback(port) if listen is None else with_tls(listen, certificates)
         stack.enter_context(listening.socket)
-        source = Live(endpoint, session, parent) if recording is None else open_recording(recording, stack)
+        if recording is None:
+            source = Live(endpoint, session, parent)
+        else:
+            source = open_recording(recording, stack, trust=trust)
         _serve(source, listening, role, browse=browse, foxglove=foxglove)
 
 
@@ -83,15 +88,15 @@ def _terminate(_number: int, _frame: FrameType | None) -> None:
     signal.raise_signal(signal.SIGTERM)
 
 
-def open_recording(recording: Path, stack: ExitStack) -> Recorded:
+def open_recording(recording: Path, stack: ExitStack, *, trust: bool = False) -> Recorded:
     """Return a recording, open as long as `stack`; of a truncated recording, the whole part."""
     try:
-        return Recorded(recording)
+        return Recorded(recording, trust=trust)
     except CutShortError:
         whole = Path(stack.enter_context(TemporaryDirectory()), recording.stem)
         saved = recover(recording, whole)
         log.warning("'%s' was cut short: it is shown up to %g s", recording, saved.end_ns / 1e9)
-        return Recorded(whole)
+        return Recorded(whole, trust=trust)
 
 
 def _serve(

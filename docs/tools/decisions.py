@@ -20,7 +20,7 @@ FOLDER = Path(__file__).resolve().parents[1] / "decisions"
 MAX_WORDS = 800
 FIRST = 12
 """Number of pages to read first."""
-_LINK = r"\[\d+\]\((\d{4})-[\w-]+\.md\)"
+_LINK = r"\[\d+\]\(\d{4}-[\w-]+\.md\)"
 _STATUS = re.compile(rf"Status: (?:current|(?:revised|superseded) by {_LINK}(?:, {_LINK})*)\.")
 _ROW = re.compile(r"^\| \d+ \| \[(.+?)\]\((\d{4}-[\w-]+\.md)\) \|", re.MULTILINE)
 

@@ -71,16 +71,25 @@ def prose_words(text: str) -> list[str]:
     return re.findall(r"[a-z]+(?:'[a-z]+)?", re.sub(r"`[^`]*`", " ", text).lower())
 
 
-def measured(package: str, root: Path = ROOT) -> Words:
+def count_referring(words: list[str]) -> int:
+    """Return the number of referring words."""
+    return sum(word in REFERRING for word in words)
+
+
+def modules(package: str) -> Iterator[tuple[Path, ast.Module]]:
+    """Yield path and syntax tree of each module of a package."""
+    for file in sorted((ROOT / package).rglob("*.py")):
+        yield file.relative_to(ROOT), ast.parse(file.read_text("utf-8"))
+
+
+def measured(package: str) -> Words:
     """Return the words of a package."""
     words = Words()
-    for file in sorted((root / package).rglob("*.py")):
-        tree = ast.parse(file.read_text("utf-8"))
-        where = file.relative_to(root)
+    for where, tree in modules(package):
         for line, text, owner in docstrings(tree):
             found = prose_words(text)
             words.total += len(found)
-            words.referring += sum(word in REFERRING for word in found)
+            words.referring += count_referring(found)
             first = text.split(maxsplit=1)[0] if text.split() else ""
             if isinstance(owner, ast.Assign | ast.AnnAssign) and first in PREPOSITIONS:
                 words.faults.append(f'{where}:{line}: an attribute begins with "{first}": name its value')
@@ -95,13 +104,11 @@ def measured(package: str, root: Path = ROOT) -> Words:
 def densest(package: str) -> list[str]:
     """Return the modules of a package with the most referring words, the worst first."""
     rows: list[tuple[int, float, Path]] = []
-    for file in sorted((ROOT / package).rglob("*.py")):
-        found = [
-            w for _, text, _ in docstrings(ast.parse(file.read_text("utf-8"))) for w in prose_words(text)
-        ]
-        count = sum(word in REFERRING for word in found)
-        rows.append((count, count / max(len(found), 1), file.relative_to(ROOT)))
-    return [f"{count:4} {share:6.1%} {file}" for count, share, file in sorted(rows, reverse=True) if count]
+    for where, tree in modules(package):
+        found = [word for _, text, _ in docstrings(tree) for word in prose_words(text)]
+        count = count_referring(found)
+        rows.append((count, count / max(len(found), 1), where))
+    return [f"{count:4} {share:6.1%} {where}" for count, share, where in sorted(rows, reverse=True) if count]
 
 
 def main() -> int:

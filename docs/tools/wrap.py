@@ -6,6 +6,7 @@ nothing, and ends with exit code 1 where this script would change a file; `make 
 
 from __future__ import annotations
 
+import argparse
 import re
 import sys
 import textwrap
@@ -18,7 +19,7 @@ _GLUE = "\x00"
 _ITEM = re.compile(r"^(\s*)((?:[-*+]|\d+\.)\s+)")
 _UNITS = "%|[numk]?(?:m|s|g|N|J|W|Hz|Pa)|deg(?:rees)?|rad|[kKMG]i?B|uJ|times"
 """What stays on the line of the number before it."""
-_VERBATIM = re.compile(r"^\s*(\||#|<|!!!|\?\?\?|:::|\[[^\]]+\]:|---$)")
+_VERBATIM = re.compile(r"^\s*(\|.*\|\s*$|#|<|!!!|\?\?\?|:::|\[[^\]]+\]:|---$)")
 
 
 def pages() -> list[Path]:
@@ -66,7 +67,7 @@ def _paragraph(lines: list[str]) -> Iterator[str]:
     rest = " " * len(first)
     text = " ".join(line.strip() for line in [lines[0][len(first) :], *lines[1:]])
     text = re.sub(r"`[^`]+`", lambda code: code[0].replace(" ", _GLUE), text)
-    text = re.sub(r" (?=(?:[-+*#|]|\d+\.)(?: |$))", _GLUE, text)  # a line must not begin like a list
+    text = re.sub(r" (?=\||(?:[-+*#]|\d+\.)(?: |$))", _GLUE, text)  # no line begins like a list or table
     text = re.sub(rf"(?<=\d) (?=(?:{_UNITS})(?:\W|$))", _GLUE, text)
     filled = textwrap.fill(
         text,
@@ -79,19 +80,26 @@ def _paragraph(lines: list[str]) -> Iterator[str]:
     yield filled.replace(_GLUE, " ")
 
 
-def main(words: list[str]) -> int:
+def main() -> int:
     """Wrap the named files, or all of them; with `--check`, only name them. Return the exit code."""
-    check = "--check" in words
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="by default all pages")
+    parser.add_argument("--check", action="store_true", help="change nothing, name what would change")
+    options = parser.parse_args()
     changed = 0
-    for path in [Path(name) for name in words if name != "--check"] or pages():
+    for path in options.files or pages():
         text = path.read_text("utf-8")
         if wrapped(text) != text:
             changed += 1
-            sys.stdout.write(f"{path}: run python docs/tools/wrap.py\n" if check else f"wrapped {path}\n")
-            if not check:
+            if options.check:
+                sys.stdout.write(f"{path}: run python docs/tools/wrap.py\n")
+            else:
                 path.write_text(wrapped(text), "utf-8")
-    return 1 if check and changed else 0
+                sys.stdout.write(f"wrapped {path}\n")
+    return 1 if options.check and changed else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

@@ -15,7 +15,6 @@ from zenoh.handlers import Callback
 from hub.devices.clock_offset import ClockOffset
 from hub.devices.device_thread import DeviceThread
 from hub.devices.network_link import NetworkLink
-from hub.devices.run_info import RunInfo
 from hub.observation.latency import Latencies
 from hub.participant import Value
 from hub.planning.plan import ConnectionToDevice
@@ -23,7 +22,7 @@ from hub.transport.bundle import bundled_connections, unpack_bundle, use_mask
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.errors import MessageError
 
 __all__ = ["DeviceReceiver"]
@@ -42,17 +41,14 @@ class DeviceReceiver:
     def __init__(
         self,
         name: str,
-        run: RunInfo,
-        session: zenoh.Session,
+        run: RunConnection,
         link: NetworkLink,
         thread: DeviceThread,
-        refusals: Refusals,
         offset: ClockOffset | None,
     ) -> None:
         self.latencies = Latencies()
         """Latencies from a value to the device."""
-        self._name, self._run, self._link, self._device = name, run, link, thread
-        self._refusals, self._offset = refusals, offset
+        self._name, self._run, self._link, self._device, self._offset = name, run, link, thread, offset
         self._inputs: list[_Input] = []
         self._unused: Collection[str] = ()
         self._has_reported = False
@@ -63,11 +59,11 @@ class DeviceReceiver:
         self._thread = Thread(target=self._receive, name=f"receiver {name}", daemon=True)
         self._thread.start()
         self._subscribers = [
-            session.declare_subscriber(one.key, Callback(partial(self._put, one), indirect=False))
-            for one in self._create_subscriptions(session)
+            run.session.declare_subscriber(one.key, Callback(partial(self._put, one), indirect=False))
+            for one in self._create_subscriptions()
         ]
 
-    def _create_subscriptions(self, session: zenoh.Session) -> Iterator[_Subscription]:
+    def _create_subscriptions(self) -> Iterator[_Subscription]:
         """Yield the keys to receive: the bundle of each participant's signals, and each event port."""
         plan, keys, name = self._run.plan, self._run.keys, self._name
         outlets = [outlet for outlet in plan.to_devices if outlet.target == name]
@@ -75,7 +71,7 @@ class DeviceReceiver:
             signals = bundled_connections(plan, source, name)
             if signals:
                 inputs = [self._create_input(outlet) for outlet in signals]
-                uses = session.declare_publisher(keys.uses(name, source), express=True)
+                uses = self._run.session.declare_publisher(keys.uses(name, source), express=True)
                 self._uses.append(([outlet.target_port for outlet in signals], uses))
                 yield _Subscription(keys.signals(source, name), inputs, whole=False)
             for outlet in outlets:
@@ -84,9 +80,7 @@ class DeviceReceiver:
                     yield _Subscription(key, [self._create_input(outlet)], whole=True)
 
     def _create_input(self, outlet: ConnectionToDevice) -> _Input:
-        made = _Input(
-            outlet, self._run, self._link, self._device, self._refusals, self.latencies, self._offset
-        )
+        made = _Input(outlet, self._run, self._link, self._device, self.latencies, self._offset)
         self._inputs.append(made)
         return made
 
@@ -101,7 +95,7 @@ class DeviceReceiver:
                 try:
                     subscription.receive(sample, self._run)
                 except MessageError as error:
-                    self._refusals.refuse_sample(sample, error)
+                    self._run.refusals.refuse_sample(sample, error)
 
     def want_all_but(self, unused: Collection[str], *, again: bool = False) -> None:
         """Tell the sources the signals not needed, after a change or on `again`."""
@@ -137,7 +131,7 @@ class _Subscription:
         self.waiting: deque[zenoh.Sample] = deque(maxlen=None if whole else _MOST_WAITING)
         """Messages received but not yet handled."""
 
-    def receive(self, sample: zenoh.Sample, run: RunInfo) -> None:
+    def receive(self, sample: zenoh.Sample, run: RunConnection) -> None:
         """Give a message's values to the inputs; raises MessageError if invalid or of another run."""
         tag = Tag.of(sample)
         if tag.run != run.number:
@@ -162,10 +156,9 @@ class _Input:
     def __init__(
         self,
         outlet: ConnectionToDevice,
-        run: RunInfo,
+        run: RunConnection,
         link: NetworkLink,
         thread: DeviceThread,
-        refusals: Refusals,
         latencies: Latencies,
         offset: ClockOffset | None,
     ) -> None:
@@ -177,7 +170,7 @@ class _Input:
         self._port = target.name
         self._stream = f"{outlet.source}.{outlet.source_port} -> {outlet.target}.{target.name}"
         self._link, self._line = link, link.line(target)
-        self._device, self._refusals, self._latencies, self._offset = thread, refusals, latencies, offset
+        self._device, self._refusals, self._latencies, self._offset = thread, run.refusals, latencies, offset
         self._timed = not source.host.startswith("remote/")  # the clock of a third machine is not known here
         self._newest = (INITIAL - 1, 0)
 

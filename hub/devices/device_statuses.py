@@ -9,11 +9,9 @@ from zenoh.handlers import Callback
 
 from hub.devices.inlets import Inlets
 from hub.participant.token_bucket import TokenBucket
-from hub.planning.plan import Plan
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.codec import decode
 from schemas.errors import MessageError
-from schemas.keys import Keys
 from schemas.trocar_msgs import DeviceStatus, Latency
 
 __all__ = ["DeviceStatuses"]
@@ -25,16 +23,14 @@ _RATE = 10.0
 class DeviceStatuses:
     """Receives the statuses of all devices, and gives their clock offsets to the inlets."""
 
-    def __init__(
-        self, plan: Plan, keys: Keys, session: zenoh.Session, inlets: Inlets, refusals: Refusals
-    ) -> None:
-        self._plan, self._keys, self._inlets, self._refusals = plan, keys, inlets, refusals
+    def __init__(self, run: RunConnection, inlets: Inlets) -> None:
+        self._run, self._inlets = run, inlets
         self._statuses: dict[str, DeviceStatus] = {}
         self._latencies: dict[str, list[Latency]] = {}
         """The last latencies of each device, also of a device already gone."""
-        self._limit = TokenBucket(_RATE * (1.0 + len(plan.participants)))
-        self._subscriber = session.declare_subscriber(
-            keys.device_status("*"), Callback(self._receive, indirect=False)
+        self._limit = TokenBucket(_RATE * (1.0 + len(run.plan.participants)))
+        self._subscriber = run.session.declare_subscriber(
+            run.keys.device_status("*"), Callback(self._receive, indirect=False)
         )
 
     @property
@@ -53,12 +49,12 @@ class DeviceStatuses:
                 raise MessageError("devices report their status more often than they may")
             status = decode(DeviceStatus, sample.payload.to_bytes())
             if (
-                str(sample.key_expr) != self._keys.device_status(status.device)
-                or status.device not in self._plan.participants
+                str(sample.key_expr) != self._run.keys.device_status(status.device)
+                or status.device not in self._run.plan.participants
             ):
                 raise MessageError(f"reports on '{status.device}', which is no device of this name here")
         except MessageError as error:
-            self._refusals.refuse_sample(sample, error)
+            self._run.refusals.refuse_sample(sample, error)
             return
         # new dictionaries: other threads may be iterating over the old ones
         self._statuses = {**self._statuses, status.device: status}

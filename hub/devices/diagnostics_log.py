@@ -12,11 +12,9 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hub.participant.token_bucket import TokenBucket
-from hub.planning.plan import Plan
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.codec import decode
 from schemas.errors import MessageError
-from schemas.keys import Keys
 from schemas.ros import DiagnosticStatus
 
 __all__ = ["DiagnosticsLog"]
@@ -34,18 +32,20 @@ _RATE = 10.0
 class DiagnosticsLog:
     """Logs the diagnoses of remote devices, connected or not."""
 
-    def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, refusals: Refusals) -> None:
-        self._refusals = refusals
+    def __init__(self, run: RunConnection) -> None:
+        self._refusals = run.refusals
         ports = [
             (planned.name, port.name)
-            for planned in plan.participants.values()
+            for planned in run.plan.participants.values()
             if planned.role == "device" and planned.host.startswith("remote/")
             for port in planned.ports
             if port.causality == "output" and port.type == DiagnosticStatus.ros_type
         ]
         self._last: dict[str, tuple[int, str]] = {}
         self._subscribers = [
-            session.declare_subscriber(keys.output("device", *source), self._listener("/".join(source)))
+            run.session.declare_subscriber(
+                run.keys.output("device", *source), self._listener("/".join(source))
+            )
             for source in ports
         ]
 

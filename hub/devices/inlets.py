@@ -47,7 +47,7 @@ class _Inlet:
     """Index among all inlets."""
     simulated: bool = False
     max_age_ns: int = 0
-    queue: deque[_Queued] = field(default_factory=deque["_Queued"])
+    queue: deque[_Queued] = field(default_factory=deque[_Queued])
     arrived_ns: int | None = None
     stale: bool = True
     newest: tuple[int, int] = (0, 0)

@@ -9,10 +9,9 @@ import zenoh
 from pydantic import BaseModel, ConfigDict, Field
 
 from hub.devices.network_link import NetworkLink, NetworkLinkOrder, describe_link
-from hub.planning.plan import Plan
+from hub.transport.run_connection import RunConnection
 from schemas.codec import encode
 from schemas.errors import MessageError, did_you_mean
-from schemas.keys import Keys
 from schemas.network_link import NetworkLinkSpec, Preset
 from schemas.quantity import Duration
 from schemas.ros import StringMessage
@@ -54,19 +53,17 @@ class NetworkLinkControl:
     `simulated` are the links of the devices in simulated time; orders to all other links are published.
     """
 
-    def __init__(
-        self, plan: Plan, session: zenoh.Session, keys: Keys, simulated: Mapping[str, NetworkLink]
-    ) -> None:
+    def __init__(self, run: RunConnection, simulated: Mapping[str, NetworkLink]) -> None:
         self._specs = {
             planned.name: planned.network_link or NetworkLinkSpec()
-            for planned in plan.participants.values()
+            for planned in run.plan.participants.values()
             if planned.role == "device"
         }
         self._simulated = simulated
         away = [name for name in self._specs if name not in simulated]
         block, cdr = zenoh.CongestionControl.BLOCK, zenoh.Encoding.APPLICATION_CDR
         self._publishers = {
-            name: session.declare_publisher(keys.link(name), encoding=cdr, congestion_control=block)
+            name: run.session.declare_publisher(run.keys.link(name), encoding=cdr, congestion_control=block)
             for name in away
         }
         self._changed: set[str] = set()

@@ -15,7 +15,6 @@ from hub.devices.device_thread import DeviceThread
 from hub.devices.diagnostics_log import DiagnosticsLog
 from hub.devices.inlets import Inlets
 from hub.devices.network_link_control import NetworkLinkControl
-from hub.devices.run_info import RunInfo
 from hub.devices.simulated_devices import SimulatedDevices
 from hub.devices.uplink import DeviceUplink
 from hub.observation.monitor import Monitor
@@ -23,7 +22,7 @@ from hub.participant import Device, Sample
 from hub.participant.token_bucket import TokenBucket
 from hub.transport.envelope import Stamp
 from hub.transport.reader import DeviceInputs
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.errors import LateError, MessageError
 from schemas.lockstep import Entering
 from schemas.trocar_msgs import DeviceStatus, Latency
@@ -41,34 +40,29 @@ class SessionDevices:
     """Receives the samples of all devices, and enters them at each communication point.
 
     Args:
-        run: The run of the session.
-        session: The hub's Zenoh session.
+        run: The connection to the run.
         devices: The devices of this process, not yet open.
         inputs: The values for devices of this process in simulated time.
         monitor: Records and measures device samples.
-        refusals: Counts the samples refused.
         failed: Called with the name and the cause after a failure of a device.
     """
 
     def __init__(
         self,
-        run: RunInfo,
-        session: zenoh.Session,
+        run: RunConnection,
         devices: Mapping[str, Device],
         inputs: Mapping[str, DeviceInputs],
         monitor: Monitor,
-        refusals: Refusals,
         failed: Callable[[str, str], None],
     ) -> None:
-        plan, keys = run.plan, run.keys
-        participants = plan.participants
-        self._plan, self._monitor, self._refusals = plan, monitor, refusals
+        plan, participants = run.plan, run.plan.participants
+        self._plan, self._monitor, self._refusals = plan, monitor, run.refusals
         self._connected = {(inlet.source, inlet.source_port) for inlet in plan.from_devices}
         self._time_ns = 0
         self._switch_s = sys.getswitchinterval()
         self.inlets = Inlets(plan)
         simulated = {name: device for name, device in devices.items() if participants[name].simulated_time}
-        self._simulated = SimulatedDevices(plan, simulated, inputs, refusals)
+        self._simulated = SimulatedDevices(plan, simulated, inputs, run.refusals)
         self._threads = {
             name: DeviceThread(name, device, participants[name].read_ns, failed=failed)
             for name, device in devices.items()
@@ -76,14 +70,14 @@ class SessionDevices:
         }
         self._uplinks: list[DeviceUplink] = []
         for name, thread in self._threads.items():
-            uplink = DeviceUplink(participants[name], run, session, thread, refusals)
+            uplink = DeviceUplink(participants[name], run, thread)
             self._uplinks.append(uplink)
             thread.attach(uplink)
-        self.network_links = NetworkLinkControl(plan, session, keys, self._simulated.links)
-        self._diagnostics = DiagnosticsLog(plan, keys, session, refusals)
-        self._statuses = DeviceStatuses(plan, keys, session, self.inlets, refusals)
+        self.network_links = NetworkLinkControl(run, self._simulated.links)
+        self._diagnostics = DiagnosticsLog(run)
+        self._statuses = DeviceStatuses(run, self.inlets)
         self._subscribers = [
-            session.declare_subscriber(keys.output("device", *source), self._listener(*source))
+            run.session.declare_subscriber(run.keys.output("device", *source), self._listener(*source))
             for source in self._used_outputs()
         ]
 

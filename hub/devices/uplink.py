@@ -12,12 +12,11 @@ from hub.devices.clock_offset import ClockOffset
 from hub.devices.device_receiver import DeviceReceiver
 from hub.devices.device_thread import DeviceThread
 from hub.devices.network_link import NetworkLink, NetworkLinkOrder, describe_link
-from hub.devices.run_info import RunInfo
 from hub.participant import Sample
 from hub.planning.plan import PlannedParticipant
 from hub.transport.control_text import control_text
 from hub.transport.envelope import Stamp
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.ports import Port
@@ -33,25 +32,20 @@ class DeviceUplink:
 
     Args:
         planned: The device.
-        run: The run of the session.
-        session: The Zenoh session with the hub.
+        run: The connection to the run.
         thread: The reading thread of the device.
-        refusals: Counts the messages refused.
         offset: Offset of the hub's clock; None in the hub's own process.
     """
 
     def __init__(
         self,
         planned: PlannedParticipant,
-        run: RunInfo,
-        session: zenoh.Session,
+        run: RunConnection,
         thread: DeviceThread,
-        refusals: Refusals,
         offset: ClockOffset | None = None,
     ) -> None:
-        name, keys = planned.name, run.keys
-        self._name, self._run, self._thread = name, run, thread
-        self._refusals, self._offset = refusals, offset
+        name, session, keys = planned.name, run.session, run.keys
+        self._name, self._run, self._thread, self._offset = name, run, thread, offset
         self._link = NetworkLink(planned.network_link)
         self._reported_ns = -_STATUS_NS
         self._sequence = {port.name: 0 for port in planned.ports}
@@ -64,7 +58,7 @@ class DeviceUplink:
         self._status = session.declare_publisher(
             keys.device_status(name), encoding=zenoh.Encoding.APPLICATION_CDR
         )
-        self._receiver = DeviceReceiver(name, run, session, self._link, thread, refusals, offset)
+        self._receiver = DeviceReceiver(name, run, self._link, thread, offset)
         self._link_orders = session.declare_subscriber(
             keys.link(name), Callback(self._change_network_link, indirect=True)
         )
@@ -117,7 +111,7 @@ class DeviceUplink:
         try:
             self._link.order(NetworkLinkOrder.model_validate_json(control_text(sample.payload.to_bytes())))
         except (MessageError, ValidationError) as error:
-            self._refusals.refuse_sample(sample, error)
+            self._run.refusals.refuse_sample(sample, error)
 
     def close(self) -> None:
         """Report the device's status a last time, and send and receive no more."""

@@ -49,7 +49,7 @@ class Host:
         wire: Carries values to and from other processes; None without any.
         listeners: Returns the listeners for the values of outputs; None without listeners.
         place: A single element, the place of the participant being stepped by `run`; IDLE afterwards.
-        successors: Successors of participants, with the step before the handover of state.
+        successors: Successors of participants, each with the first step.
     """
 
     def __init__(
@@ -267,7 +267,7 @@ class Host:
         if self._wire is not None:
             for bundle in one.bundles.values():
                 if bundle.filled:
-                    bundle.send(Tag.pack(self._wire.run, 0, step, time_ns), first=step == INITIAL)
+                    bundle.send(Tag.pack(self._wire.run.number, 0, step, time_ns), first=step == INITIAL)
 
     def observe(self, name: str, time_ns: int, values: Mapping[str, Any]) -> None:
         """Step an observer from the communication point `time_ns` with `values` as inputs.

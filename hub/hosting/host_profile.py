@@ -10,9 +10,8 @@ from zenoh.handlers import Callback
 from hub.hosting.host import Host
 from hub.hosting.process_profile import WAITING, ProcessProfile
 from hub.observation.stopwatch import Phase
-from hub.planning.plan import Plan
+from hub.transport.run_connection import RunConnection
 from schemas.codec import encode
-from schemas.keys import Keys
 from schemas.trocar_msgs import Profile
 
 __all__ = ["HostProfile"]
@@ -21,12 +20,13 @@ __all__ = ["HostProfile"]
 class HostProfile:
     """Answers with the time used by this process since the first grant."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, host: str, plan: Plan, run: int) -> None:
-        self.process = ProcessProfile(host, plan, Phase("waiting for hub", WAITING))
+    def __init__(self, run: RunConnection, host: str) -> None:
+        """`run`: the connection of the process; `host`: name of the host."""
+        self.process = ProcessProfile(host, run.plan, Phase("waiting for hub", WAITING))
         self.process.restart()
         self._began = False
-        self._key, self._session_name, self._run = keys.host_profile(host), keys.session, run
-        self._queryable = session.declare_queryable(self._key, Callback(self._answer))
+        self._key, self._session_name, self._run = run.keys.host_profile(host), run.keys.session, run.number
+        self._queryable = run.session.declare_queryable(self._key, Callback(self._answer))
 
     def attach(self, host: Host, acknowledge: Callable[..., None]) -> None:
         """Time `Host.run`, and `acknowledge`, the sender of acks.

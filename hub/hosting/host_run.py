@@ -13,7 +13,6 @@ import zenoh
 
 from hub.devices.clock_sync import ClockSync
 from hub.devices.device_thread import DeviceThread
-from hub.devices.run_info import RunInfo
 from hub.devices.uplink import DeviceUplink
 from hub.hosting.host import Host
 from hub.hosting.host_profile import HostProfile
@@ -26,16 +25,13 @@ from hub.planning.session_parameters import SessionParameters
 from hub.transport.control_client import ask, ask_as_child
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.host_link import HostLink
-from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
+from hub.transport.run_connection import RunConnection
 from hub.transport.wire import Wire
 from hub.transport.zenoh_session import open_session
-from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError
 from schemas.files import Files
-from schemas.keys import Keys
 from schemas.lockstep import Ack, Grant, unpack_grant
-from schemas.ros import StringMessage
 
 __all__ = ["HostRun"]
 
@@ -59,11 +55,10 @@ class HostRun:
         connect: Callable[[], zenoh.Session],
         link: HostLink | None = None,
     ) -> None:
-        self._session, self._request, self._directory = session, request, directory
-        self._keys, self._run, self._step_ns = Keys(reply.session), reply.run, reply.plan.step_ns
+        self._request, self._directory = request, directory
         self._next_step = 0
         self._ended: set[str] = set()
-        plan, host, keys = reply.plan, request.host, self._keys
+        plan, host = reply.plan, request.host
         mine = {name: planned for name, planned in plan.participants.items() if planned.host == host}
         parameters = SessionParameters(
             {name: planned.kind for name, planned in mine.items()},
@@ -73,14 +68,11 @@ class HostRun:
         )
         ready = {name: parameters.make(name) for name in mine}
         participants = {name: first for name, (first, _) in ready.items()}
-        first = next(iter(mine.values()))
-        refused = session.declare_publisher(
-            keys.dropped_messages(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
-        )
-        self._refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
-        wire = Wire(session, keys, reply.run, self._refusals, watched=reply.watched)
+        self._run = RunConnection.of_host(session, reply, next(iter(mine.values())))
+        keys = self._run.keys
+        wire = Wire(self._run, watched=reply.watched)
         stepped = {name: p for name, p in participants.items() if isinstance(p, Stepped)}
-        self._profile = HostProfile(session, keys, host, plan, reply.run) if reply.profile else None
+        self._profile = HostProfile(self._run, host) if reply.profile else None
         if self._profile is not None:
             self._profile.process.prepare(stepped, wire)
         self._host = Host(
@@ -100,7 +92,7 @@ class HostRun:
         self._threads = self._attach_devices(reply, devices, connect)
         self._observing: Observing | None = None
         if any(planned.observer for planned in mine.values()):
-            self._observing = Observing(self._host, session, keys, reply.run, self._refusals)
+            self._observing = Observing(self._host, self._run)
             self._stack.callback(self._observing.close)
         self._tokens = [
             session.liveliness().declare_token(keys.alive(planned.key_role, name))
@@ -114,7 +106,7 @@ class HostRun:
             return None
         if link is not None:
             return LinkChannel(link, names, self._check)
-        return ZenohChannel(self._session, self._keys, names, ack_key, self._refusals, self._check)
+        return ZenohChannel(self._run, names, ack_key, self._check)
 
     def _attach_devices(
         self, reply: JoinReply, devices: Mapping[str, Device], connect: Callable[[], zenoh.Session]
@@ -123,14 +115,13 @@ class HostRun:
         if not devices:
             return []
         threads: list[DeviceThread] = []
-        clock = self._stack.enter_context(ClockSync(self._session, self._keys))
-        run = RunInfo(reply.plan, self._keys, reply.run, reply.admission, reply.live_from_ns)
+        clock = self._stack.enter_context(ClockSync(self._run.session, self._run.keys))
         for name, device in devices.items():
             if isinstance(device, RouterClient):
                 device.learn_hub(_to_programs(reply) or connect)
             planned = reply.plan.participants[name]
             thread = DeviceThread(name, device, planned.read_ns, failed=self._report_failure)
-            uplink = DeviceUplink(planned, run, self._session, thread, self._refusals, clock.offset)
+            uplink = DeviceUplink(planned, self._run, thread, clock.offset)
             self._stack.callback(uplink.close)
             thread.attach(uplink)
             threads.append(thread)
@@ -163,7 +154,9 @@ class HostRun:
             try:
                 self._host.run(grant, done)
             except ParticipantError as error:
-                hub.acknowledge(error.participant, Ack(self._run, 0, error.step, (), (), (), error.cause))
+                hub.acknowledge(
+                    error.participant, Ack(self._run.number, 0, error.step, (), (), (), error.cause)
+                )
                 hub.flush()
                 raise
             hub.flush()
@@ -185,7 +178,7 @@ class HostRun:
             if not ready and self._host.has_initial_values():
                 ready = True
                 for planned in self._host.participants:
-                    hub.acknowledge(planned.name, Ack(self._run, 0, -1, (), (), ()))
+                    hub.acknowledge(planned.name, Ack(self._run.number, 0, -1, (), (), ()))
                 hub.flush()
             if ready and (grant := hub.grant(wait=False)) is not None:
                 return grant
@@ -200,18 +193,19 @@ class HostRun:
     def _check(self, payload: bytes) -> Grant:
         """Return the grant in `payload`; raises MessageError unless this is the next grant of the run."""
         grant = unpack_grant(payload)
-        if grant.run != self._run:
-            raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
+        if grant.run != self._run.number:
+            raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run.number:x}")
+        step_ns = self._run.plan.step_ns
         if (
             grant.step != self._next_step
-            or grant.start_ns != grant.step * self._step_ns
+            or grant.start_ns != grant.step * step_ns
             or grant.horizon_ns <= grant.start_ns
         ):
             raise MessageError(
                 f"grants step {grant.step} at {grant.start_ns} to {grant.horizon_ns} ns, when step"
                 f" {self._next_step} is next"
             )
-        self._next_step = grant.horizon_ns // self._step_ns
+        self._next_step = grant.horizon_ns // step_ns
         return grant
 
     def _acknowledge(self, hub: HubChannel, planned: PlannedParticipant, ack: Ack) -> None:
@@ -227,7 +221,7 @@ class HostRun:
 
     def _send_to_hub(self, request: JoinRequest) -> None:
         send = ask_as_child if request.is_local else ask
-        send(self._session, self._keys.join(request.host), request, Empty)
+        send(self._run.session, self._run.keys.join(request.host), request, Empty)
 
     def close(self) -> None:
         """Close devices, participants and publishers."""

@@ -10,9 +10,8 @@ from zenoh.handlers import FifoChannel
 
 from hub.transport.envelope import signature
 from hub.transport.host_link import HostLink
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.errors import MessageError
-from schemas.keys import Keys
 from schemas.lockstep import Ack, Grant, pack_ack
 
 __all__ = ["HubChannel", "LinkChannel", "ZenohChannel"]
@@ -43,19 +42,11 @@ class ZenohChannel:
     Invalid grants are refused and counted.
     """
 
-    def __init__(
-        self,
-        session: zenoh.Session,
-        keys: Keys,
-        names: Sequence[str],
-        ack_key: bytes,
-        refusals: Refusals,
-        check: CheckGrant,
-    ) -> None:
-        self._ack_key, self._refusals, self._check = ack_key, refusals, check
+    def __init__(self, run: RunConnection, names: Sequence[str], ack_key: bytes, check: CheckGrant) -> None:
+        self._ack_key, self._refusals, self._check = ack_key, run.refusals, check
         self._acks = {
-            name: session.declare_publisher(
-                keys.ack(name),
+            name: run.session.declare_publisher(
+                run.keys.ack(name),
                 encoding=zenoh.Encoding.APPLICATION_CDR,
                 congestion_control=zenoh.CongestionControl.BLOCK,
                 priority=zenoh.Priority.REAL_TIME,
@@ -63,7 +54,7 @@ class ZenohChannel:
             )
             for name in names
         }
-        self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
+        self._grants = run.session.declare_subscriber(run.keys.grant, FifoChannel(256))
 
     def grant(self, *, wait: bool) -> Grant | None:
         """Return the grant in the next message; None without a message or a valid grant."""

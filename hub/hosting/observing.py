@@ -13,9 +13,8 @@ from hub.hosting.host import Host
 from hub.observation.latency import Latencies
 from hub.planning.plan import Plan
 from hub.transport.observer_inputs import ObserverInputs, State
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.codec import encode
-from schemas.keys import Keys
 from schemas.trocar_msgs import ObserverStatus
 
 __all__ = ["Observing"]
@@ -28,21 +27,18 @@ class Observing:
 
     Args:
         host: The host, with observers alone.
-        session: The Zenoh session with the hub.
-        keys: The keys of the session.
-        run: The number of the run.
-        refusals: Counts the refused messages.
+        run: The connection to the run.
     """
 
-    def __init__(self, host: Host, session: zenoh.Session, keys: Keys, run: int, refusals: Refusals) -> None:
+    def __init__(self, host: Host, run: RunConnection) -> None:
         self._arrived = threading.Event()
         self._observers = [
             _Observer(
                 planned.name,
                 host,
-                ObserverInputs(session, keys, host.plan, planned.name, run, refusals, self._arrived.set),
-                session.declare_publisher(
-                    keys.observer_status(planned.name), encoding=zenoh.Encoding.APPLICATION_CDR
+                ObserverInputs(run, planned.name, self._arrived.set),
+                run.session.declare_publisher(
+                    run.keys.observer_status(planned.name), encoding=zenoh.Encoding.APPLICATION_CDR
                 ),
             )
             for planned in host.participants

@@ -11,6 +11,8 @@ __all__ = ["Patience"]
 
 _FIRST_LOOK_NS = 500_000_000
 """Most waits are shorter: no process is looked at before."""
+_LOOK_PERIOD_NS = 100_000_000
+"""A look at a process with many threads takes some ms."""
 
 _RUN_DELAY = 1
 """Place of the time spent waiting on a run queue, ns, in /proc/PID/task/TID/schedstat (Linux,
@@ -34,8 +36,9 @@ class Patience:
     def __init__(self, limit_ns: int) -> None:
         self.limit_ns = limit_ns
         self.begin()
-        self._checked_ns = self._begun_ns
-        """Beginning of the wait checked last; the next two attributes belong to this wait."""
+        self._checked_ns: int | None = None
+        """Beginning of the wait checked last; the next three attributes belong to this wait."""
+        self._next_look_ns = 0
         self._left_out_ns = 0
         self._run_delays: dict[Path, int] | None = None
         """Run delay by thread, ns; None before the first look."""
@@ -45,16 +48,18 @@ class Patience:
         self._begun_ns = monotonic_ns()
 
     def is_over(self, processes: Iterable[int], left_out_ns: int = 0) -> bool:
-        """Return whether `processes`, by their numbers, have had their time; to be called every 0.1 s or so.
+        """Return whether `processes`, by their numbers, have had their time.
 
-        `left_out_ns` since the last call does not count either.
+        `left_out_ns` since the last call does not count either. The processes are looked at every 0.1 s.
         """
         begun_ns = self._begun_ns
         if begun_ns != self._checked_ns:
             self._checked_ns, self._left_out_ns, self._run_delays = begun_ns, 0, None
+            self._next_look_ns = begun_ns + min(_FIRST_LOOK_NS, self.limit_ns)
         self._left_out_ns += left_out_ns
-        if monotonic_ns() - begun_ns < min(_FIRST_LOOK_NS, self.limit_ns):
+        if monotonic_ns() < self._next_look_ns:
             return False
+        self._next_look_ns = monotonic_ns() + _LOOK_PERIOD_NS
         delays, before = _run_delays(processes), self._run_delays
         if before is not None:
             self._left_out_ns += max((delays[thread] - before.get(thread, 0) for thread in delays), default=0)

@@ -15,6 +15,7 @@ The vector is hashed and saved: nothing has to be collected, and no field can be
 from __future__ import annotations
 
 import hashlib
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 from math import copysign, prod
@@ -107,7 +108,7 @@ def choice(start: E) -> E:
     return cast("E", _Choice(start))
 
 
-class _Field:
+class _Field(ABC):
     """A declared part of a record."""
 
     start: float = 0.0
@@ -120,9 +121,9 @@ class _Field:
         """Return whether `value` stands for something; 0 and -0 are not the same."""
         return True
 
+    @abstractmethod
     def accessor(self, name: str, index: int) -> property:
         """Return the property that reads and writes the field, number `index` of the record."""
-        raise NotImplementedError
 
 
 class _Array(_Field):

@@ -60,9 +60,9 @@ class SessionParameters:
         later = zip(steps, made[1:], strict=True)
         return made[0], [(step, one) for step, one in later if isinstance(one, Stepped)]
 
-    def validate_last(self, name: str, changes: Mapping[str, Any] | None = None) -> Params:
-        """Return the parameters at the end, with `changes`. Raises ScenarioError as `make` does."""
-        return self._validate_parameters(name, {**self.last[name], **(changes or {})})
+    def validate_last(self, name: str) -> Params:
+        """Return the parameters at the end. Raises ScenarioError as `make` does."""
+        return self._validate_parameters(name, self.last[name])
 
     def of(self, names: Iterable[str]) -> tuple[dict[str, dict[str, Any]], list[Renewal]]:
         """Return the parameters at the end of the participants `names`, and their part of the renewals."""

@@ -55,7 +55,7 @@ def compose_yaml(text: str) -> Any:
 
 
 def construct_yaml(root: Any) -> Any:
-    """Return the value of a node from `compose`. Raises YAMLError."""
+    """Return the value of a node from `compose_yaml`. Raises YAMLError."""
     return None if root is None else _create_parser().constructor.construct_document(root)
 
 

@@ -5,6 +5,7 @@ Topics are the session's keys without `trocar/<session>`.
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Iterator
 from contextlib import suppress
@@ -33,6 +34,8 @@ from schemas.trocar_msgs import AckMessage, CouplingEnergy, GrantMessage, Profil
 
 __all__ = ["ENERGY_PREFIX", "GRANT_TOPIC", "STATUS_TOPIC", "Recording"]
 
+log = logging.getLogger(__name__)
+
 _OUTPUT = re.compile(r"/(?:engine|device)/([^/]+)/out/(.+)")
 """Topic of an output port: participant, port."""
 
@@ -56,6 +59,8 @@ class Recording(Bag):
         recording["tissue.probe/wrench"].to_frame().plot()  # with pandas
         ```
     """
+
+    _is_age_logged = False
 
     @cached_property
     def ports(self) -> dict[str, str]:
@@ -135,6 +140,10 @@ class Recording(Bag):
 
     def scenario(self) -> Scenario:
         """Return the resolved scenario. Raises RecordingError if the recording is not of a session."""
+        return self._scenario
+
+    @cached_property
+    def _scenario(self) -> Scenario:
         if "scenario.json" not in self.attachments:
             raise RecordingError(f"'{self.file}' holds no scenario: it was not recorded by `trocar run`")
         cannot = f"'{self.file}': this version cannot read the scenario in it{self.made_by_newer()}"
@@ -158,6 +167,12 @@ class Recording(Bag):
             f" (Trocar {recorded} has made it, which is newer than {own}: update)" if recorded > own else ""
         )
 
+    def warn_if_newer(self) -> None:
+        """Log a warning, once, if a newer Trocar made the recording."""
+        if not self._is_age_logged and (remark := self.made_by_newer()):
+            log.warning("'%s'%s", self.file, remark)
+        self._is_age_logged = True
+
     def versions(self) -> dict[str, str]:
         """Return the version of each package installed at the time; empty if not recorded."""
         return self._table("versions.json")
@@ -178,6 +193,10 @@ class Recording(Bag):
 
         Raises RecordingError if the recording is not of a session, or if the plan contradicts itself.
         """
+        return self._plan
+
+    @cached_property
+    def _plan(self) -> Plan:
         try:
             plan = Plan.model_validate_json(self.attachments["plan.json"])
         except KeyError:

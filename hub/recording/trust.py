@@ -42,18 +42,12 @@ def trusted_parameters(
     Raises TrustError with the list of all demands, RecordingError if plan, scenario and renewals contradict
     each other or the installed kinds, and ScenarioError if a kind cannot be loaded.
     """
-    if remark := recording.made_by_newer():
-        log.warning("'%s'%s", recording.file, remark)
+    recording.warn_if_newer()
     files = recorded_files(recording, directory, trust=trust)
-    directory, recorded = files.directory, set(recording.files().values())
-    origin = fork_origin(recording)
-    specs, planned = recording.scenario().participants, recording.plan().participants
-    parameters = SessionParameters(
-        kinds={name: spec.kind for name, spec in specs.items()},
-        last={name: spec.params for name, spec in specs.items()},
-        renewals=() if origin is None else origin.renewals,
-        files=files,
-    )
+    recorded = set(recording.files().values())
+    origin, scenario = fork_origin(recording), recording.scenario()
+    specs, planned = scenario.participants, recording.plan().participants
+    parameters = SessionParameters.of_scenario(scenario, files, () if origin is None else origin.renewals)
     asked: list[str] = []
     for name in names:
         if name not in specs or name not in planned:
@@ -61,16 +55,16 @@ def trusted_parameters(
             raise RecordingError(f"'{recording.file}': its {lacks} has no participant '{safe_text(name)}'")
         kind, stages = specs[name].kind, list(parameters.parameter_stages(name))
         if not trust and (
-            found := [what for params in stages for what in _unseen_demands(kind, params, directory)]
+            found := [what for params in stages for what in _unseen_demands(kind, params, files.directory)]
         ):
             asked += _of(name, found)
             continue
         _check_kind(recording, planned[name], kind)
         for params in stages:
             if trust:
-                _log_other_files(kind, params, directory, recorded)
+                _log_other_files(kind, params, files.directory, recorded)
             else:
-                asked += _of(name, _installed_demands(kind, params, directory, recorded))
+                asked += _of(name, _installed_demands(kind, params, files))
     if asked := list(dict.fromkeys(asked)):
         more = f"; and {len(asked) - MAX_PROBLEMS} more" if len(asked) > MAX_PROBLEMS else ""
         raise TrustError(
@@ -121,20 +115,16 @@ def _unseen_demands(kind: str, params: Mapping[str, Any], directory: Path) -> It
             yield f"the network path '{safe_text(text)}'"
 
 
-def _installed_demands(
-    kind: str, params: Mapping[str, Any], directory: Path, recorded: set[str]
-) -> Iterator[str]:
+def _installed_demands(kind: str, params: Mapping[str, Any], files: Files) -> Iterator[str]:
     """Yield the native code of a participant of an installed kind, and the files with changed contents."""
     model = registry.load(kind).params_model
     code = {str(params[name]) for name in model.native_code if params.get(name) is not None}
     for path in sorted(code | parameter_paths(model, params)):
+        shown = safe_text(str(files.directory / path))
         if path in code:
-            yield f"native code in '{safe_text(str(directory / path))}'"
-        elif not has_contents(directory / path, recorded):
-            yield (
-                f"the file '{safe_text(str(directory / path))}', which is missing or has other contents than"
-                " those recorded"
-            )
+            yield f"native code in '{shown}'"
+        elif not files.allows(Path(path)):
+            yield f"the file '{shown}', which is missing or has other contents than those recorded"
 
 
 def _log_other_files(kind: str, params: Mapping[str, Any], directory: Path, recorded: set[str]) -> None:

@@ -15,19 +15,16 @@ from zenoh.handlers import Callback
 
 from hub.devices.clock_sync import ClockSync
 from hub.devices.device_thread import DeviceThread
-from hub.devices.run_info import RunInfo
 from hub.devices.uplink import DeviceUplink
 from hub.participant import Device
 from hub.planning.session_parameters import SessionParameters
 from hub.transport.control_client import ask, join_session
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
-from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
-from schemas.codec import encode
+from hub.transport.run_connection import RunConnection
 from schemas.errors import ConnectError, MessageError, ParticipantError
 from schemas.files import Files
 from schemas.keys import Keys
-from schemas.ros import StringMessage
 
 __all__ = ["DeviceHost"]
 
@@ -104,16 +101,12 @@ class DeviceHost:
         """Take part in a run until the end."""
         keys, planned = Keys(reply.session), reply.plan.participants[self._name]
         self._over.clear()
-        run = RunInfo(reply.plan, keys, reply.run, reply.admission, reply.live_from_ns)
         with ExitStack() as stack:
             gone = session.liveliness().declare_subscriber(
                 keys.alive("hub", "hub"), Callback(self._on_hub, indirect=True), history=True
             )
             stack.callback(gone.undeclare)
-            refused = session.declare_publisher(
-                keys.dropped_messages("device", self._name), encoding=zenoh.Encoding.APPLICATION_CDR
-            )
-            refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
+            run = RunConnection.of_host(session, reply, planned)
             try:
                 loop = self._device_loop(reply)
             except ParticipantError as error:
@@ -123,7 +116,7 @@ class DeviceHost:
                 )
                 raise
             clock = stack.enter_context(ClockSync(session, keys))
-            uplink = DeviceUplink(planned, run, session, loop, refusals, clock.offset)
+            uplink = DeviceUplink(planned, run, loop, clock.offset)
             stack.callback(uplink.close)
             loop.attach(uplink)
             token = session.liveliness().declare_token(keys.alive("device", self._name))

@@ -9,12 +9,11 @@ from hmac import compare_digest
 import zenoh
 from zenoh.handlers import FifoChannel
 
-from hub.planning.plan import Plan, PlannedParticipant
+from hub.planning.plan import PlannedParticipant
 from hub.transport.envelope import signature
 from hub.transport.host_link import HubLink
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.errors import MessageError, ParticipantError
-from schemas.keys import Keys
 from schemas.lockstep import Ack, Grant, unpack_ack
 
 __all__ = ["Accepted", "AckReceiver"]
@@ -35,26 +34,16 @@ class AckReceiver:
     the computed states. All further messages are refused and counted.
 
     Args:
-        session: The hub's Zenoh session.
-        keys: The keys of the session.
-        plan: The plan of the session.
-        run: The number of the run.
-        refusals: Counts the messages that are refused.
+        run: The hub's connection to the run.
         ack_keys: Keys of the signatures, by host.
         links: Links, by host.
     """
 
     def __init__(
-        self,
-        session: zenoh.Session,
-        keys: Keys,
-        plan: Plan,
-        run: int,
-        refusals: Refusals,
-        ack_keys: Mapping[str, bytes],
-        links: Mapping[str, HubLink],
+        self, run: RunConnection, ack_keys: Mapping[str, bytes], links: Mapping[str, HubLink]
     ) -> None:
-        self._session, self._keys, self._run, self._refusals = session, keys, run, refusals
+        keys, plan = run.keys, run.plan
+        self._run = run
         self._wake_key = keys.ack("hub")
         self._planned = {keys.ack(name): plan.participants[name] for name in plan.order}
         self._ack_keys, self._links = ack_keys, links
@@ -65,7 +54,7 @@ class AckReceiver:
         """The last ack of each participant."""
         self._step, self._steps = _READY, _NO_STEPS
         """Step of the grant awaiting acks, and the numbers of steps by participant."""
-        self._subscriber = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
+        self._subscriber = run.session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
 
     def receive(self, waiting: Sequence[str], grant: Grant, steps: Mapping[str, int]) -> Iterator[Accepted]:
         """Wait a moment for messages, and yield the valid acks of `grant` from `waiting`, which may shrink.
@@ -99,11 +88,11 @@ class AckReceiver:
 
     def _from_link(self, host: str, waiting: Sequence[str], *, wait: bool) -> Iterator[Accepted]:
         for name, payload in self._links[host].acks(wait=wait):
-            key = self._keys.ack(name)
+            key = self._run.keys.ack(name)
             try:
                 accepted = self._accept(self._planned[key], payload, waiting, signed=True)
             except MessageError as error:
-                self._refusals.refuse(key, error)
+                self._run.refusals.refuse(key, error)
             else:
                 yield accepted
 
@@ -114,7 +103,7 @@ class AckReceiver:
             planned, payload, signed = self._open_message(sample)
             accepted = self._accept(planned, payload, waiting, signed=signed)
         except MessageError as error:
-            self._refusals.refuse_sample(sample, error)
+            self._run.refusals.refuse_sample(sample, error)
         else:
             yield accepted
 
@@ -129,8 +118,8 @@ class AckReceiver:
             if signed:
                 raise ParticipantError(planned.name, self._step, f"its host has sent {error}") from error
             raise
-        if ack.run != self._run:
-            raise MessageError(f"belongs to run {ack.run:x}, this is run {self._run:x}")
+        if ack.run != self._run.number:
+            raise MessageError(f"belongs to run {ack.run:x}, this is run {self._run.number:x}")
         self._check(planned, ack, payload, signed=signed)
         if planned.name not in waiting or ack.step != self._step:
             raise ParticipantError(
@@ -176,7 +165,7 @@ class AckReceiver:
         for name, payload in self._arrived_messages():
             with suppress(MessageError):
                 ack = unpack_ack(payload, 0, 0)
-                if ack.run == self._run and ack.error:
+                if ack.run == self._run.number and ack.error:
                     raise ParticipantError(name, ack.step, ack.error)
 
     def _arrived_messages(self) -> Iterator[tuple[str, bytes]]:
@@ -201,4 +190,4 @@ class AckReceiver:
 
     def wake(self) -> None:
         """Make `receive` return."""
-        self._session.put(self._wake_key, b"")
+        self._run.session.put(self._wake_key, b"")

@@ -9,14 +9,14 @@ from hub.devices.session_devices import SessionDevices
 from hub.observation.latency import Histogram, by_way
 from hub.observation.monitor import Monitor
 from hub.observation.summary import Progress, Summary
-from hub.planning.plan import Plan, PlannedParticipant
+from hub.planning.plan import PlannedParticipant
 from hub.recording.profiles import profile_numbers
 from hub.recording.recorder import RecorderSummary
 from hub.recording.scores import score_numbers
 from hub.session.clock import Clock
 from hub.session.observer_reports import ObserverReports
 from hub.session.state_digests import StateDigests
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.lockstep import Ack
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import Latency, ParticipantStatus, Profile, SessionStatus
@@ -30,10 +30,8 @@ class Bookkeeping:
     def __init__(
         self,
         scenario: Scenario,
-        plan: Plan,
-        run: int,
+        run: RunConnection,
         clock: Clock,
-        refusals: Refusals,
         monitor: Monitor,
         devices: SessionDevices,
         observer_reports: ObserverReports,
@@ -43,16 +41,15 @@ class Bookkeeping:
         self.detail = ""
         """Cause of a failure, or the participant ending the run early."""
         self._scenario = scenario
-        self._plan = plan
+        self._plan = run.plan
         self._run = run
         self._clock = clock
-        self._refusals = refusals
         self._monitor = monitor
         self._devices = devices
         self._observer_reports = observer_reports
         self._answers = Histogram()
-        self._digests = StateDigests(plan.order)
-        self._last_steps = dict.fromkeys(plan.order, -1)
+        self._digests = StateDigests(run.plan.order)
+        self._last_steps = dict.fromkeys(run.plan.order, -1)
         self._started_ns: int | None = None
         self._wall_ns: int | None = None
 
@@ -104,7 +101,7 @@ class Bookkeeping:
         progress = self.progress()
         return SessionStatus(
             session=self._scenario.name,
-            run=self._run,
+            run=self._run.number,
             state=self.phase,
             step=progress.step,
             sim_time_ns=self._clock.time_ns,
@@ -162,4 +159,4 @@ class Bookkeeping:
 
     @property
     def _dropped(self) -> int:
-        return self._refusals.total + self._monitor.refusals.total
+        return self._run.refusals.total + self._monitor.refusals.total

@@ -29,10 +29,9 @@ from hub.transport.control_messages import (
 )
 from hub.transport.control_text import MOST_BYTES, control_text
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.codec import encode, message_type
 from schemas.errors import MessageError, TrocarError
-from schemas.keys import Keys
 from schemas.ros import StringMessage
 
 __all__ = ["ControlServer", "Joins"]
@@ -66,28 +65,24 @@ class ControlServer:
     Requests too long, too frequent or too many to wait are refused at once, unread.
 
     Args:
-        session: The hub's Zenoh session.
-        keys: The keys of the session.
+        run: The hub's connection to the run.
         state: State changed by `pause`, `resume`, `step` and `shutdown`.
         inlets: Inputs written by `set`.
         network_links: Links changed by `link`.
         joins: Answers `join`.
         description: The answer to `describe`.
-        refusals: Counts the refused requests.
     """
 
     def __init__(
         self,
-        session: zenoh.Session,
-        keys: Keys,
+        run: RunConnection,
         state: RunState,
         inlets: Inlets,
         network_links: NetworkLinkControl,
         joins: Joins,
         description: DescribeReply,
-        refusals: Refusals,
     ) -> None:
-        self._refusals = refusals
+        session, keys, self._refusals = run.session, run.keys, run.refusals
         self._inlets = inlets
         self._waiting: Queue[Callable[[], None] | None] = Queue(_MOST_WAITING)
         self._thread = Thread(target=self._run, name="control", daemon=True)

@@ -12,7 +12,6 @@ from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.zenoh_session import LEASE_MS
 from schemas.errors import MessageError
 from schemas.ports import BondSide
-from schemas.scenario import Scenario
 
 __all__ = ["JoinedHosts"]
 
@@ -21,8 +20,8 @@ class JoinedHosts:
     """The hosts of a session, without the hub's own.
 
     Args:
-        scenario: The scenario.
-        plan: The wiring of the scenario.
+        session: The name of the session.
+        plan: The wiring of the session.
         parameters: The kinds and parameters of all participants.
         run: The number of the run.
         watched: Outputs with every value needed by the hub.
@@ -37,7 +36,7 @@ class JoinedHosts:
 
     def __init__(
         self,
-        scenario: Scenario,
+        session: str,
         plan: Plan,
         parameters: SessionParameters,
         run: int,
@@ -55,7 +54,7 @@ class JoinedHosts:
         self._ack_keys = ack_keys
         self._programs_endpoint = programs_endpoint
         self._watched = list(watched)
-        self._scenario = scenario
+        self._session = session
         self._plan = plan
         self._parameters = parameters
         self._run = run
@@ -75,9 +74,7 @@ class JoinedHosts:
             hosts = (
                 ", ".join(host for host in self._plan.hosts() if host != "hub") or "none but the hub's own"
             )
-            raise MessageError(
-                f"session '{self._scenario.name}' has no host '{request.host}'; it has {hosts}"
-            )
+            raise MessageError(f"session '{self._session}' has no host '{request.host}'; it has {hosts}")
         participant, _, cause = (request.failed or request.ended).partition(": ")
         if participant and participant not in names:
             raise MessageError(
@@ -102,7 +99,7 @@ class JoinedHosts:
             return Empty()
         params, renewals = self._parameters.of(names)
         return JoinReply(
-            session=self._scenario.name,
+            session=self._session,
             run=self._run,
             admission=self._admissions,
             plan=self._plan if request.is_local else self._plan.seen_from(request.host),

@@ -10,11 +10,9 @@ from zenoh.handlers import Callback
 
 from hub.observation.summary import Observed
 from hub.participant.token_bucket import TokenBucket
-from hub.planning.plan import Plan
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.codec import decode
 from schemas.errors import MessageError
-from schemas.keys import Keys
 from schemas.trocar_msgs import Latency, ObserverStatus
 
 __all__ = ["ObserverReports"]
@@ -28,14 +26,14 @@ _RATE = 10.0
 class ObserverReports:
     """Receives the statuses of all observers, and keeps the causes of losses; from any thread."""
 
-    def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, refusals: Refusals) -> None:
-        self._keys, self._refusals = keys, refusals
-        self._names = [observer.name for observer in plan.observers()]
+    def __init__(self, run: RunConnection) -> None:
+        self._keys, self._refusals = run.keys, run.refusals
+        self._names = [observer.name for observer in run.plan.observers()]
         self._statuses: dict[str, ObserverStatus] = {}
         self._lost: dict[str, str] = {}
         self._limit = TokenBucket(_RATE * (1.0 + len(self._names)))
-        self._subscriber = session.declare_subscriber(
-            keys.observer_status("*"), Callback(self._receive, indirect=False)
+        self._subscriber = run.session.declare_subscriber(
+            run.keys.observer_status("*"), Callback(self._receive, indirect=False)
         )
 
     def lose(self, observer: str, cause: str) -> None:

@@ -8,15 +8,13 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hub.devices.session_devices import SessionDevices
-from hub.planning.plan import Plan
 from hub.session.bookkeeping import Bookkeeping
 from hub.session.first_failure import FirstFailure
 from hub.session.joined_hosts import JoinedHosts
 from hub.session.observer_reports import ObserverReports
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.codec import decode
 from schemas.errors import MessageError
-from schemas.keys import Keys
 from schemas.ros import StringMessage
 
 __all__ = ["RemoteReports"]
@@ -33,22 +31,20 @@ class RemoteReports:
 
     def __init__(
         self,
-        session: zenoh.Session,
-        keys: Keys,
-        plan: Plan,
+        run: RunConnection,
         devices: SessionDevices,
         joined_hosts: JoinedHosts,
         bookkeeping: Bookkeeping,
         failure: FirstFailure,
         observer_reports: ObserverReports,
-        refusals: Refusals,
     ) -> None:
         self._observer_reports = observer_reports
-        self._plan, self._devices, self._joined_hosts = plan, devices, joined_hosts
-        self._bookkeeping, self._failure, self._refusals = bookkeeping, failure, refusals
+        self._plan, self._devices, self._joined_hosts = run.plan, devices, joined_hosts
+        self._bookkeeping, self._failure, self._refusals = bookkeeping, failure, run.refusals
+        session = run.session
         self._subscribers = [
-            session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._token)),
-            session.declare_subscriber(keys.dropped_messages("*", "*"), Callback(self._count_refusal)),
+            session.liveliness().declare_subscriber(run.keys.alive("*", "*"), Callback(self._token)),
+            session.declare_subscriber(run.keys.dropped_messages("*", "*"), Callback(self._count_refusal)),
         ]
 
     def _token(self, sample: zenoh.Sample) -> None:

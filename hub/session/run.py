@@ -12,7 +12,6 @@ from pathlib import Path
 import zenoh
 from zenoh.handlers import Callback
 
-from hub.devices.run_info import RunInfo
 from hub.devices.session_devices import SessionDevices
 from hub.hosting.host import Host
 from hub.hosting.host_processes import HostProcesses
@@ -41,6 +40,7 @@ from hub.transport.control_messages import DescribeReply
 from hub.transport.host_link import HubLink, has_link
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
+from hub.transport.run_connection import RunConnection
 from hub.transport.wire import Wire
 from hub.transport.zenoh_session import open_session
 from schemas.files import Files
@@ -73,7 +73,7 @@ class SessionSpec:
     past: Past | None = None
     """The recorded part of this run."""
     successors: Successors = field(default_factory=dict[str, Sequence[tuple[int, Stepped]]])
-    """Successors in this process of `participants`, each with the step before the handover."""
+    """Successors in this process of `participants`, each with the first step."""
     profiled: bool = False
     """Where the time goes is measured."""
     recording: str = ""
@@ -122,53 +122,37 @@ class Run:
         recorder: Recorder | None,
     ) -> None:
         scenario, plan, keys = spec.scenario, spec.plan, Keys(spec.scenario.name)
-        self.spec, self.session, self.keys, self.state = spec, session, keys, state
-        self.number = secrets.randbits(63) | 1
-        """Number that tells the messages of this run from those of any other."""
+        self.spec, self.state = spec, state
+        self.connection = RunConnection(
+            session,
+            keys,
+            plan,
+            secrets.randbits(63) | 1,
+            Refusals(),
+            live_from_ns=(spec.live_from or 0) * plan.step_ns,
+        )
         self.recorded = recorder is not None
         answering = stack.enter_context(ExitStack())
         self.processes = HostProcesses(_links(plan))
         stack.callback(self.processes.end)
-        self.refusals = Refusals()
         self.clock = _clock(scenario, plan, spec.live_from or 0)
-        self.monitor = Monitor(plan, keys, self.number, Measures(scenario, plan), recorder)
+        self.monitor = Monitor(plan, keys, self.connection.number, Measures(scenario, plan), recorder)
         ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
-        self.acks = AckReceiver(
-            session, keys, plan, self.number, self.refusals, ack_keys, self.processes.links
-        )
-        self.profile = self._profile() if spec.profiled else None
+        self.acks = AckReceiver(self.connection, ack_keys, self.processes.links)
+        self.profile = RunProfile(self.connection, self.clock, self.monitor) if spec.profiled else None
         self.host = self._host()
         """The stepped participants of this process."""
         stack.callback(self.host.close)
         self.failure = FirstFailure(plan, self.clock, self.host, self.acks, interrupt)
         self.devices = self._devices()
         stack.callback(self.devices.close)
-        self.observer_reports = ObserverReports(plan, keys, session, self.refusals)
+        self.observer_reports = ObserverReports(self.connection)
         answering.callback(self.observer_reports.undeclare)
         self.bookkeeping = Bookkeeping(
-            scenario,
-            plan,
-            self.number,
-            self.clock,
-            self.refusals,
-            self.monitor,
-            self.devices,
-            self.observer_reports,
+            scenario, self.connection, self.clock, self.monitor, self.devices, self.observer_reports
         )
-        self.joined_hosts = JoinedHosts(
-            scenario,
-            plan,
-            spec.parameters,
-            self.number,
-            list(self.monitor.remote_outputs.values()),
-            self.fail,
-            self.end,
-            ack_keys=ack_keys,
-            programs_endpoint=spec.programs_endpoint,
-            profile=spec.profiled,
-            live_from_ns=self.live_from_ns,
-        )
-        self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.monitor)
+        self.joined_hosts = self._joined_hosts(ack_keys)
+        self.status = StatusReporter(self.connection, self.bookkeeping, self.joined_hosts, self.monitor)
         answering.callback(self.status.undeclare)
         if self.profile is not None:
             answering.callback(self.profile.undeclare)
@@ -202,19 +186,9 @@ class Run:
             log.info("%s", self.bookkeeping.detail)
         self.state.shutdown()
 
-    @property
-    def live_from_ns(self) -> int:
-        """Simulated time until which the run repeats a recorded run."""
-        return (self.spec.live_from or 0) * self.spec.plan.step_ns
-
-    def _profile(self) -> RunProfile:
-        return RunProfile(
-            self.session, self.keys, self.spec.plan, self.number, self.clock, self.monitor, self.refusals
-        )
-
     def _host(self) -> Host:
         """Return the host of this process, connected to the others over Zenoh."""
-        wire = Wire(self.session, self.keys, self.number, self.refusals)
+        wire = Wire(self.connection)
         if self.profile is not None:
             self.profile.prepare(self.spec.stepped, wire)
         spec = self.spec
@@ -229,49 +203,55 @@ class Run:
             if isinstance(device, RouterClient):
                 device.learn_hub(lambda: open_session("client", connect=[endpoint]))
         return SessionDevices(
-            RunInfo(self.spec.plan, self.keys, self.number, live_from_ns=self.live_from_ns),
-            self.session,
-            devices,
-            self.host.device_inputs,
-            self.monitor,
-            self.refusals,
-            self.failure.report,
+            self.connection, devices, self.host.device_inputs, self.monitor, self.failure.report
+        )
+
+    def _joined_hosts(self, ack_keys: Mapping[str, bytes]) -> JoinedHosts:
+        spec, run = self.spec, self.connection
+        return JoinedHosts(
+            spec.scenario.name,
+            spec.plan,
+            spec.parameters,
+            run.number,
+            list(self.monitor.remote_outputs.values()),
+            self.fail,
+            self.end,
+            ack_keys=ack_keys,
+            programs_endpoint=spec.programs_endpoint,
+            profile=spec.profiled,
+            live_from_ns=run.live_from_ns,
         )
 
     def _answer(self, answering: ExitStack) -> None:
         """Receive reports and values of remote processes, and answer control requests."""
-        session, keys = self.session, self.keys
         reports = RemoteReports(
-            session,
-            keys,
-            self.spec.plan,
+            self.connection,
             self.devices,
             self.joined_hosts,
             self.bookkeeping,
             self.failure,
             self.observer_reports,
-            self.refusals,
         )
         answering.callback(reports.undeclare)
         control = ControlServer(
-            session,
-            keys,
+            self.connection,
             self.state,
             self.devices.inlets,
             self.devices.network_links,
             self.joined_hosts,
             DescribeReply(
                 session=self.spec.scenario.name,
-                run=self.number,
+                run=self.connection.number,
                 scenario=self.spec.scenario,
                 plan=self.spec.plan,
                 recording=self.spec.recording,
             ),
-            self.refusals,
         )
         answering.callback(control.undeclare)
         for key in self.monitor.remote_outputs:
-            watch = session.declare_subscriber(key, Callback(self.monitor.sample, indirect=False))
+            watch = self.connection.session.declare_subscriber(
+                key, Callback(self.monitor.sample, indirect=False)
+            )
             answering.callback(watch.undeclare)
 
 

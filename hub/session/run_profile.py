@@ -17,14 +17,13 @@ from hub.observation.monitor import Monitor
 from hub.observation.stopwatch import Phase
 from hub.observation.thread_clocks import CoreQueue
 from hub.participant import Stepped
-from hub.planning.plan import Plan, PlannedParticipant
+from hub.planning.plan import PlannedParticipant
 from hub.session.clock import Clock
 from hub.session.run_state import RunState
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from hub.transport.wire import Wire
 from schemas.codec import decode, encode
 from schemas.errors import MessageError
-from schemas.keys import Keys
 from schemas.lockstep import Ack
 from schemas.trocar_msgs import Profile, ProfileRow
 
@@ -42,28 +41,14 @@ class RunProfile:
     The timed objects do not know of the profile: methods are replaced on their objects before the first step.
 
     Args:
-        session: The hub's Zenoh session.
-        keys: The keys of the session.
-        plan: The plan of the session.
-        run: The number of the run.
+        run: The hub's connection to the run.
         clock: The clock of the run.
         monitor: Records and measures the run.
-        refusals: Counts the refused answers of hosts.
     """
 
-    def __init__(
-        self,
-        session: zenoh.Session,
-        keys: Keys,
-        plan: Plan,
-        run: int,
-        clock: Clock,
-        monitor: Monitor,
-        refusals: Refusals,
-    ) -> None:
-        self._session, self._keys, self._plan, self._run = session, keys, plan, run
-        self._clock, self._monitor, self._refusals = clock, monitor, refusals
-        self.process = ProcessProfile("hub", plan, Phase("hub", "hub"))
+    def __init__(self, run: RunConnection, clock: Clock, monitor: Monitor) -> None:
+        self._run, self._clock, self._monitor = run, clock, monitor
+        self.process = ProcessProfile("hub", run.plan, Phase("hub", "hub"))
         self._wall_clock = self.process.watch.phase("waiting for the wall clock", "hub")
         self._late = LateSteps()
         self._computed_ns: dict[str, int] = {}
@@ -72,7 +57,7 @@ class RunProfile:
         self._waited_ns = 0
         self._queue: CoreQueue | None = None
         self._late_steps = self._time_ns = 0
-        self._queryable = session.declare_queryable(keys.profile, Callback(self._answer))
+        self._queryable = run.session.declare_queryable(run.keys.profile, Callback(self._answer))
 
     def prepare(self, stepped: Mapping[str, Stepped], wire: Wire) -> None:
         """Time participants, arriving values, and the recording; call this before making a Host."""
@@ -145,7 +130,7 @@ class RunProfile:
         """
         causes = {phase.name: ns for phase, ns in phases.items() if ns and phase is not self._wall_clock}
         for name, computed_ns in self._computed_ns.items():
-            host = self._plan.participants[name].host
+            host = self._run.plan.participants[name].host
             waited = self.process.waiting_for([host]).name
             due_ns = min(computed_ns, causes.get(waited, 0))
             if due_ns:
@@ -161,8 +146,8 @@ class RunProfile:
     def message(self) -> Profile:
         """Return the profile so far; from any thread except Zenoh's callbacks."""
         return Profile(
-            session=self._keys.session,
-            run=self._run,
+            session=self._run.keys.session,
+            run=self._run.number,
             sim_time_ns=self._clock.time_ns,
             wall_time_ns=monotonic_ns() - self._began_ns,
             steps=self._clock.step,
@@ -173,21 +158,22 @@ class RunProfile:
 
     def _rows_of_hosts(self) -> list[ProfileRow]:
         rows: list[ProfileRow] = []
-        for reply in self._session.get(self._keys.host_profile("*"), timeout=_ANSWER_S):
+        for reply in self._run.session.get(self._run.keys.host_profile("*"), timeout=_ANSWER_S):
             if reply.ok is None:
                 continue
             try:
                 profile = decode(Profile, reply.ok.payload.to_bytes())
-                if profile.run != self._run:
-                    raise MessageError(f"belongs to run {profile.run:x}, this is run {self._run:x}")
+                if profile.run != self._run.number:
+                    raise MessageError(f"belongs to run {profile.run:x}, this is run {self._run.number:x}")
                 rows += profile.rows
             except MessageError as error:
-                self._refusals.refuse_sample(reply.ok, error)
+                self._run.refusals.refuse_sample(reply.ok, error)
         return rows
 
     def _answer(self, query: zenoh.Query) -> None:
         with query:
-            query.reply(self._keys.profile, encode(self.message()), encoding=zenoh.Encoding.APPLICATION_CDR)
+            answer = encode(self.message())
+            query.reply(self._run.keys.profile, answer, encoding=zenoh.Encoding.APPLICATION_CDR)
 
     def finish(self) -> Profile:
         """Return and record the profile of the whole run; the hosts are still there."""

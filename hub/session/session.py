@@ -46,7 +46,7 @@ class Session:
         record: The directory of the recording.
         attachments: Contents of the recording beside the messages, by name.
         past: The recorded part of this run, to be simulated again before the run goes on, or instead.
-        successors: Successors in this process of `participants`, each with the step before the handover.
+        successors: Successors in this process of `participants`, each with the first step.
         on_ack: Is called with every participant's ack of every grant.
         profile: Measure the use of time, for summary, recording and `trocar ls`.
     """

@@ -8,8 +8,8 @@ from zenoh.handlers import Callback
 from hub.observation.monitor import Monitor
 from hub.session.bookkeeping import Bookkeeping
 from hub.session.joined_hosts import JoinedHosts
+from hub.transport.run_connection import RunConnection
 from schemas.codec import encode
-from schemas.keys import Keys
 
 __all__ = ["StatusReporter"]
 
@@ -19,16 +19,15 @@ class StatusReporter:
 
     def __init__(
         self,
-        session: zenoh.Session,
-        keys: Keys,
+        run: RunConnection,
         bookkeeping: Bookkeeping,
         joined_hosts: JoinedHosts,
         monitor: Monitor,
     ) -> None:
-        self._key, self._monitor = keys.status, monitor
+        self._key, self._monitor = run.keys.status, monitor
         self._bookkeeping, self._joined_hosts = bookkeeping, joined_hosts
-        self._publisher = session.declare_publisher(keys.status, encoding=zenoh.Encoding.APPLICATION_CDR)
-        self._queryable = session.declare_queryable(keys.status, Callback(self._answer))
+        self._publisher = run.session.declare_publisher(self._key, encoding=zenoh.Encoding.APPLICATION_CDR)
+        self._queryable = run.session.declare_queryable(self._key, Callback(self._answer))
 
     def _answer(self, query: zenoh.Query) -> None:
         status = self._bookkeeping.status(self._joined_hosts.pid)

@@ -36,7 +36,8 @@ class StepLoop:
     """Steps a run to the end; `on_ack` is called with every ack."""
 
     def __init__(self, run: Run, on_ack: OnAck | None) -> None:
-        plan, session, keys = run.spec.plan, run.session, run.keys
+        plan, session, keys = run.spec.plan, run.connection.session, run.connection.keys
+        self._number = run.connection.number
         self._run, self._on_ack, self._past = run, on_ack, run.spec.past
         self._step_ns = plan.step_ns
         self._participants = plan.participants
@@ -129,13 +130,13 @@ class StepLoop:
             if then is not None:
                 if self._past.live_from is not None:
                     run.devices.enter_samples(then.start_ns, then.step)  # they are where they were at its end
-                return Grant(run.number, then.epoch, then.step, then.start_ns, then.horizon_ns, then.inlets)
+                return Grant(self._number, then.epoch, then.step, then.start_ns, then.horizon_ns, then.inlets)
             if run.clock.step != self._past.live_from:
                 return None
             return self._first_live(self._past.new_devices)
         step, time_ns = run.clock.step, run.clock.time_ns
         horizon_ns = time_ns + run.clock.horizon(budget) * self._step_ns
-        return Grant(run.number, 0, step, time_ns, horizon_ns, run.devices.enter_samples(time_ns, step))
+        return Grant(self._number, 0, step, time_ns, horizon_ns, run.devices.enter_samples(time_ns, step))
 
     def _first_live(self, new_devices: Collection[str]) -> Grant:
         """Return the grant of a single step for the run to go on from the past."""
@@ -146,7 +147,7 @@ class StepLoop:
         entering = [one for one in entering if one.participant not in new_devices]
         entering += run.devices.inlets.restart(new_devices)
         log.info("live from %g s on", time_ns / 1e9)
-        return Grant(run.number, 0, step, time_ns, time_ns + self._step_ns, entering)
+        return Grant(self._number, 0, step, time_ns, time_ns + self._step_ns, entering)
 
     def _step(self, grant: Grant) -> None:
         """Give a grant, do the hub's share, and wait until all others have done theirs.

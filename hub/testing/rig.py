@@ -130,7 +130,7 @@ class Rig:
         return _Surroundings(dict(self._values), self.outputs, dict(self._bonds.work), self.time_ns)
 
     def restore_surroundings(self, saved: _Surroundings) -> None:
-        """Return to the state from `surroundings`."""
+        """Return to the state from `save_surroundings`."""
         self._values, self.outputs, self.time_ns = dict(saved.values), saved.outputs, saved.time_ns
         self._bonds.work = dict(saved.work)
 

@@ -16,9 +16,8 @@ from hub.transport.bundle import bundled_connections, unpack_bundle
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.errors import MessageError
-from schemas.keys import Keys
 
 __all__ = ["ObserverInputs", "State"]
 
@@ -49,26 +48,14 @@ class ObserverInputs:
     """Receives the bundles for an observer, until closed.
 
     Args:
-        session: The Zenoh session.
-        keys: The keys of the session.
-        plan: The plan of the session.
+        run: The connection to the run.
         name: The observer.
-        run: The number of the run.
-        refusals: Counts the refused messages.
         arrived: Is called, in any thread, when something has arrived.
     """
 
-    def __init__(
-        self,
-        session: zenoh.Session,
-        keys: Keys,
-        plan: Plan,
-        name: str,
-        run: int,
-        refusals: Refusals,
-        arrived: Callable[[], None],
-    ) -> None:
-        self._name, self._run, self._refusals, self._arrived = name, run, refusals, arrived
+    def __init__(self, run: RunConnection, name: str, arrived: Callable[[], None]) -> None:
+        plan = run.plan
+        self._name, self._run, self._arrived = name, run, arrived
         self._period_ns = plan.participants[name].period * plan.step_ns
         self._lock = threading.Lock()
         self._seen_ns: int | None = None
@@ -80,22 +67,22 @@ class ObserverInputs:
             inputs = [_Input(plan, outlet) for outlet in bundled_connections(plan, source, name)]
             self._inputs += inputs
             receive = Callback(partial(self._receive, inputs), indirect=False)
-            self._subscribers.append(session.declare_subscriber(keys.signals(source, name), receive))
+            self._subscribers.append(run.session.declare_subscriber(run.keys.signals(source, name), receive))
         self._spacing_ns = max(self._period_ns, min(one.stride_ns for one in self._inputs))
         """Simulated time between two states."""
 
     def _receive(self, inputs: list[_Input], sample: zenoh.Sample) -> None:
         try:
             tag = Tag.of(sample)
-            if tag.run != self._run:
-                raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run:x}")
+            if tag.run != self._run.number:
+                raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run.number:x}")
             with self._lock:
                 for index, payload in unpack_bundle(sample.payload.to_bytes()):
                     if index >= len(inputs):
                         raise MessageError(f"a bundle has value {index} of {len(inputs)}")
                     inputs[index].keep(tag, payload)
         except MessageError as error:
-            self._refusals.refuse_sample(sample, error)
+            self._run.refusals.refuse_sample(sample, error)
             return
         self._arrived()
 
@@ -119,7 +106,7 @@ class ObserverInputs:
                 for one, value in zip(self._inputs, chosen, strict=True)
             }
         except MessageError as error:
-            self._refusals.refuse(f"inputs of '{self._name}'", error)
+            self._run.refusals.refuse(f"inputs of '{self._name}'", error)
             return None
         return State(time_ns, values, max(value.sent_ns for value in chosen), missed)
 

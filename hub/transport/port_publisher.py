@@ -13,7 +13,7 @@ from hub.transport.envelope import Tag
 from hub.transport.page_feed import PageFeed
 from hub.transport.port_codec import PortCodec
 from hub.transport.publisher import Publisher
-from schemas.keys import Keys
+from hub.transport.run_connection import RunConnection
 
 __all__ = ["PortPublisher"]
 
@@ -25,11 +25,9 @@ class PortPublisher:
     is published only for readers in need of every value (`always`): dozens of quiet ports cost nothing.
 
     Args:
-        session: The Zenoh session.
-        keys: The keys of the session.
+        run: The connection to the run.
         planned: The participant.
         codec: Codec of the output.
-        run: The number of the run.
         changed: Is called whenever `needed` may have changed.
         always: A reader needs every value from the first on.
         feeds: Wall-time devices receive the events of the port.
@@ -39,11 +37,9 @@ class PortPublisher:
 
     def __init__(
         self,
-        session: zenoh.Session,
-        keys: Keys,
+        run: RunConnection,
         planned: PlannedParticipant,
         codec: PortCodec,
-        run: int,
         changed: Callable[[], None],
         *,
         always: bool,
@@ -52,7 +48,7 @@ class PortPublisher:
         stride_ns: int = 0,
     ) -> None:
         self.codec, port = codec, codec.port
-        self._run = run
+        session, keys, self._run = run.session, run.keys, run.number
         self._changed = changed
         self.always = always
         """Whether a reader needs every value, and to know of steps without events."""
@@ -65,7 +61,7 @@ class PortPublisher:
         if feeds:
             key = keys.feed(planned.name, port.name)
             self._publishers.append(Publisher(session, key, block, self._update, always=False))
-        self._pages = PageFeed(session, keys.view(planned.name, port.name), self.codec, run, changed)
+        self._pages = PageFeed(session, keys.view(planned.name, port.name), self.codec, self._run, changed)
         self._update()
 
     def _update(self) -> None:

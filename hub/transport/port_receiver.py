@@ -7,10 +7,11 @@ from typing import Any
 import zenoh
 from zenoh.handlers import FifoChannel
 
+from hub.planning.plan import PlannedParticipant
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from schemas.errors import MessageError
 from schemas.message import Message
 from schemas.ports import Port
@@ -24,13 +25,13 @@ class PortReceiver:
     Invalid messages and messages of another run are refused and counted.
     """
 
-    def __init__(self, session: zenoh.Session, key: str, port: Port, run: int, refusals: Refusals) -> None:
+    def __init__(self, run: RunConnection, planned: PlannedParticipant, port: Port) -> None:
         self._codec = PortCodec(port)
         self._run = run
-        self._refusals = refusals
         self._newest = self._batch_step = INITIAL - 1
         self._batch: tuple[Message, ...] = ()
-        self._subscriber = session.declare_subscriber(key, FifoChannel(4096))
+        key = run.keys.output(planned.key_role, planned.name, port.name)
+        self._subscriber = run.session.declare_subscriber(key, FifoChannel(4096))
 
     def receive(self) -> tuple[int, Any]:
         """Wait for the next valid value; return the step in the tag, and the value."""
@@ -50,8 +51,8 @@ class PortReceiver:
     def _accept(self, sample: zenoh.Sample) -> tuple[int, Any] | None:
         try:
             tag = Tag.of(sample)
-            if tag.run != self._run:
-                raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run:x}")
+            if tag.run != self._run.number:
+                raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run.number:x}")
             if tag.step <= self._newest:
                 if tag.step == INITIAL:
                     return None  # it is repeated until every host has it
@@ -59,7 +60,7 @@ class PortReceiver:
             payload = sample.payload.to_bytes()
             value = self._add_to_batch(tag, payload) if self._codec.is_event else self._codec.decode(payload)
         except MessageError as error:
-            self._refusals.refuse_sample(sample, error)
+            self._run.refusals.refuse_sample(sample, error)
             return None
         if value is None:
             return None

@@ -4,46 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import zenoh
-
 from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle, DeviceBundle, ObserverBundle
 from hub.transport.cells import RemoteCell
 from hub.transport.port_codec import PortCodec
 from hub.transport.port_publisher import PortPublisher
 from hub.transport.port_receiver import PortReceiver
-from hub.transport.refusals import Refusals
-from schemas.keys import Keys
+from hub.transport.run_connection import RunConnection
 from schemas.ports import Port
 
 __all__ = ["Wire"]
 
 
 class Wire:
-    """A host's publishers and receivers on a Zenoh session.
+    """A host's publishers and receivers in a run.
 
     Args:
-        session: The Zenoh session.
-        keys: The keys of the session.
-        run: The number of the run.
-        refusals: Counts the refused messages.
+        run: The connection to the run.
         watched: The outputs with every value needed by the hub.
     """
 
-    def __init__(
-        self,
-        session: zenoh.Session,
-        keys: Keys,
-        run: int,
-        refusals: Refusals,
-        *,
-        watched: Sequence[tuple[str, str]] = (),
-    ) -> None:
+    def __init__(self, run: RunConnection, *, watched: Sequence[tuple[str, str]] = ()) -> None:
         self._watched = set(watched)
-        self.session = session
-        self.keys = keys
         self.run = run
-        self.refusals = refusals
         self._publishers: list[PortPublisher] = []
         self._bundles: list[Bundle] = []
         self._receivers: list[PortReceiver] = []
@@ -58,19 +41,20 @@ class Wire:
 
     def bundle(self, source: str, target: PlannedParticipant, step_ns: int, count: int) -> Bundle:
         """Return the bundle of `count` signals of a participant for a wall-time device or an observer."""
-        key, changed = self.keys.signals(source, target.name), self._count_change
+        session, keys, changed = self.run.session, self.run.keys, self._count_change
+        key = keys.signals(source, target.name)
         bundle = (
-            ObserverBundle(self.session, key, changed, target.period * step_ns)
+            ObserverBundle(session, key, changed, target.period * step_ns)
             if target.observer
             else DeviceBundle(
-                self.session,
+                session,
                 key,
                 changed,
                 use_ns=target.use_ns,
-                uses_key=self.keys.uses(target.name, source),
+                uses_key=keys.uses(target.name, source),
                 count=count,
-                run=self.run,
-                refusals=self.refusals,
+                run=self.run.number,
+                refusals=self.run.refusals,
             )
         )
         self._bundles.append(bundle)
@@ -92,11 +76,9 @@ class Wire:
         in `bundles`, each with the signal's index. `stride_ns` is the simulated time between two values.
         """
         publisher = PortPublisher(
-            self.session,
-            self.keys,
+            self.run,
             planned,
             codec,
-            self.run,
             self._count_change,
             always=is_read or (planned.name, codec.port.name) in self._watched,
             feeds=feeds,
@@ -108,8 +90,7 @@ class Wire:
 
     def cell(self, planned: PlannedParticipant, port: Port, stride: int, depth: int) -> RemoteCell:
         """Return the cell of an output of a participant in another process."""
-        key = self.keys.output(planned.key_role, planned.name, port.name)
-        receiver = PortReceiver(self.session, key, port, self.run, self.refusals)
+        receiver = PortReceiver(self.run, planned, port)
         self._receivers.append(receiver)
         cell = RemoteCell(planned.period, stride, depth, receiver)
         self._cells.append(cell)

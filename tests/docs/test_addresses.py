@@ -1,6 +1,7 @@
 """`docs/tools/addresses.py` finds made-up addresses, and refuses a release with the placeholder."""
 
 import importlib.util
+import re
 from pathlib import Path
 
 import pytest
@@ -46,4 +47,9 @@ def test_a_release_needs_an_address_and_one_version(tmp_path):
 
 
 def test_this_project_has_the_placeholder_or_an_address_of_its_own():
-    assert addresses.home(ROOT).startswith("https://")
+    home = addresses.home(ROOT)
+    assert home == addresses.PLACEHOLDER or re.match(
+        r"https://[\w.-]+\.(?!invalid|example|test)\w+(/|$)", home
+    )
+    files = ["README.md", "CHANGELOG.md", "CITATION.cff", "mkdocs.yml", "pyproject.toml"]
+    assert addresses.address_faults(ROOT, files) == []

@@ -1,7 +1,6 @@
 """What is left of the sessions that a page has started when the server of that page is ended or killed."""
 
 import asyncio
-import http.client
 import json
 import os
 import re
@@ -17,7 +16,7 @@ from hub.transport.session_secret import private_directory
 from tests.faults.traces import MARK, living
 from tests.hub.sample_session import write_session
 from tests.waiting import until
-from tests.webconsole.conftest import finish
+from tests.webconsole.conftest import cookie_of, finish
 from tests.webconsole.test_page import answer
 
 pytestmark = [
@@ -50,10 +49,7 @@ def server(tmp_path):
 def start_session(link):
     """Start a session by the link of an operator, and wait until its own page is there."""
     host, path = re.fullmatch(r"http://([^/]+)(/.*)", link).groups()
-    connection = http.client.HTTPConnection(host)
-    connection.request("GET", path)
-    cookie = connection.getresponse().headers["Set-Cookie"].partition(";")[0]
-    connection.close()
+    cookie = cookie_of(host, path)
 
     async def body():
         headers = {"Cookie": cookie, "Origin": f"http://{host}"}

@@ -1,7 +1,8 @@
 """Mutated recordings through all that reads them: each is read, or raises a TrocarError.
 
-Half of them are files with spoilt bytes; the other half are sound files of messages, topics and attachments
-that are not. `python -m tests.fuzz.recordings --number 500 --seed 7 --hours 1`; `--case 7:123` repeats one.
+They are files with spoilt bytes, sound files of messages, topics and attachments that are not, and files in
+which a chunk unpacks to other bytes than stated, up to a gigabyte. `python -m tests.fuzz.recordings --number
+500 --seed 7 --hours 1`; `--case 7:123` repeats one.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from hub.verify import verify
 from schemas.errors import TrocarError
 from schemas.vectors import has_vector
 from tests.fuzz.byte_mutations import NUMBERS, WORDS, mutated, mutated_text
+from tests.fuzz.chunk_mutations import Bombs, make_bombs, with_other_chunk
 from tests.fuzz.harness import Note, Target, search
 from tests.participants import make_participant
 from webconsole.commands import Show
@@ -88,6 +90,12 @@ def _seed(name: str, directory: Path) -> Path:
         Contents(whole).write(cut)
         whole.unlink()
     return cut
+
+
+@cache
+def _bombs() -> Bombs:
+    """Compress zeros once, for all forked processes."""
+    return make_bombs()
 
 
 def _changed(contents: Contents, source: random.Random) -> str:
@@ -286,8 +294,12 @@ def attempt(case: str, directory: Path, note: Note) -> None:
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir()
     file = place / "spoilt.mcap"
-    if source.random() < 0.5:
+    way = source.random()
+    if way < 0.4:
         label, data = mutated(_seed(name, directory).read_bytes(), source)
+        file.write_bytes(data)
+    elif way < 0.6:
+        label, data = with_other_chunk(_seed(name, directory).read_bytes(), source, _bombs())
         file.write_bytes(data)
     else:
         contents = Contents(_seed(name, directory))
@@ -301,6 +313,7 @@ def prepare(directory: Path) -> None:
     """Cut the recordings, and import what reads them; nothing here opens a Zenoh session."""
     for name in NAMES:
         _read_all(_seed(name, directory), directory)
+    _bombs()
 
 
 def pristine(directory: Path) -> None:

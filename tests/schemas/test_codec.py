@@ -23,12 +23,11 @@ from schemas.message import Message, msg_text
 from schemas.ros import BoolMessage, Float64Message, JointState, PoseStamped, StringMessage
 from schemas.trocar_msgs import GrantMessage
 from schemas.visualization import ColorRGBA, MarkerArray
-from tests.strategies import any_message
+from tests.strategies import MODELS, messages, of_each_type
 
 # parts of services are not recorded
 TYPES = sorted(name for name in message_types() if "/srv/" not in name)
 STANDARD = sorted(name for name in message_types() if not name.startswith(("crtk_msgs/", "trocar_msgs/")))
-models = st.sampled_from(sorted(message_types())).map(message_type)
 
 
 def same(one: Message, other: Message) -> bool:
@@ -47,40 +46,45 @@ def _same(one: object, other: object) -> bool:
     return one == other
 
 
-@given(any_message)
-def test_every_message_comes_back_from_cdr(message: Message) -> None:
-    assert same(decode(type(message), encode(message)), message)
+@of_each_type
+@given(st.data())
+def test_every_message_comes_back_from_cdr_and_json(data: st.DataObject) -> None:
+    for model in MODELS:
+        message = data.draw(messages(model), model.ros_type)
+        assert same(decode(model, encode(message)), message)
+        assert same(model.model_validate_json(message.model_dump_json()), message)
 
 
-@given(any_message)
-def test_every_message_comes_back_from_json(message: Message) -> None:
-    assert same(type(message).model_validate_json(message.model_dump_json()), message)
+@of_each_type
+@given(st.data())
+def test_bytes_are_a_message_or_a_message_error(data: st.DataObject) -> None:
+    for model in MODELS:
+        payload = data.draw(st.binary(max_size=200), model.ros_type)
+        for start in (b"", b"\0\1\0\0", b"\0\0\0\0"):
+            with contextlib.suppress(MessageError):
+                assert isinstance(decode(model, start + payload), model)
 
 
-@given(models, st.binary(max_size=200))
-def test_bytes_are_a_message_or_a_message_error(model: type[Message], payload: bytes) -> None:
-    for start in (b"", b"\0\1\0\0", b"\0\0\0\0"):
+@of_each_type
+@given(st.data())
+def test_a_changed_or_cut_message_is_a_message_or_a_message_error(data: st.DataObject) -> None:
+    for model in MODELS:
+        payload = bytearray(encode(data.draw(messages(model), model.ros_type)))
+        cut = data.draw(st.integers(0, len(payload) - 1))
+        with pytest.raises(MessageError):
+            decode(model, bytes(payload[:cut]))
+        payload[data.draw(st.integers(0, len(payload) - 1))] ^= data.draw(st.integers(1, 255))
         with contextlib.suppress(MessageError):
-            assert isinstance(decode(model, start + payload), model)
+            decode(model, bytes(payload))
 
 
-@given(any_message, st.data())
-def test_a_changed_or_cut_message_is_a_message_or_a_message_error(
-    message: Message, data: st.DataObject
-) -> None:
-    payload = bytearray(encode(message))
-    cut = data.draw(st.integers(0, len(payload) - 1))
-    with pytest.raises(MessageError):
-        decode(type(message), bytes(payload[:cut]))
-    payload[data.draw(st.integers(0, len(payload) - 1))] ^= data.draw(st.integers(1, 255))
-    with contextlib.suppress(MessageError):
-        decode(type(message), bytes(payload))
-
-
-@given(any_message, st.binary(min_size=8, max_size=64))
-def test_bytes_behind_a_message_are_refused(message: Message, rest: bytes) -> None:
-    with pytest.raises(MessageError):
-        decode(type(message), encode(message) + rest)
+@of_each_type
+@given(st.binary(min_size=8, max_size=64), st.data())
+def test_bytes_behind_a_message_are_refused(rest: bytes, data: st.DataObject) -> None:
+    for model in MODELS:
+        message = data.draw(messages(model), model.ros_type)
+        with pytest.raises(MessageError):
+            decode(model, encode(message) + rest)
 
 
 def test_a_payload_over_the_limit_is_refused_unread() -> None:

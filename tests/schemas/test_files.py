@@ -44,3 +44,22 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(files, "MAX_FILE_BYTES", 4)
     with pytest.raises(ValueError, match="has 9 bytes; at most 4 are read"):
         Files(tmp_path).find(Path("a.txt"))
+
+
+def test_contents_are_hashed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.txt").write_text("a")
+    hashed = list[Path]()
+    file_hash = files.file_hash
+    monkeypatch.setattr(files, "file_hash", lambda file: hashed.append(file) or file_hash(file))
+    known = Files(tmp_path, {hashlib.sha256(b"a").hexdigest()})
+    assert known.allows(Path("a.txt"))
+    assert known.find(Path("a.txt")) == tmp_path / "a.txt"
+    assert hashed == [tmp_path / "a.txt"]
+
+
+def test_names_that_the_system_refuses(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    for name in ("a" * 5000, "loop", "zero\0byte"):
+        assert not Files(tmp_path, ()).allows(Path(name))
+    with pytest.raises(ValueError, match="cannot be read"):
+        Files(tmp_path).find(Path("a" * 5000))

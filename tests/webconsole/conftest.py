@@ -1,6 +1,7 @@
 """A small recorded session, its server in this process, and a browser if there is one."""
 
 import asyncio
+import http.client
 import shutil
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -37,6 +38,15 @@ def finish(coroutine):
     """Run a coroutine to its end; in a thread, as the browser's driver keeps a loop in that of the tests."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(asyncio.run, coroutine).result()
+
+
+def cookie_of(host, path):
+    """Return the cookie of a browser that opens a link."""
+    connection = http.client.HTTPConnection(host)
+    connection.request("GET", path)
+    cookie = connection.getresponse().headers["Set-Cookie"].partition(";")[0]
+    connection.close()
+    return cookie
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """The page in a real browser: what it draws, says and sends."""
 
 import asyncio
-import http.client
 import json
 import os
 import re
@@ -18,7 +17,7 @@ from PIL import Image
 from websockets.asyncio.client import connect
 
 from tests.waiting import until
-from tests.webconsole.conftest import CHROMIUM, finish, served
+from tests.webconsole.conftest import CHROMIUM, cookie_of, finish, served
 from tests.webconsole.recorded_scene import EYES, write_scene
 from webconsole.frame import sections
 from webconsole.listening import on_loopback
@@ -243,15 +242,6 @@ def test_a_hub_that_is_gone_is_said_and_its_successor_is_shown(browser, tmp_path
         one.page.get_by_text("'gone' is over, or its hub is gone").wait_for()
         assert one.errors == []
         one.context.close()
-
-
-def cookie_of(host, path):
-    """Return the cookie of a browser that opens a link."""
-    connection = http.client.HTTPConnection(host)
-    connection.request("GET", path)
-    cookie = connection.getresponse().headers["Set-Cookie"].partition(";")[0]
-    connection.close()
-    return cookie
 
 
 def inviter(link):

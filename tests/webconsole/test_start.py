@@ -58,6 +58,13 @@ def test_wrong_values_are_told_by_field_in_the_words_of_the_models(wrong, tmp_pa
         assert message in told[path]
 
 
+def test_a_wrong_value_with_a_colon_is_told_without_the_value(tmp_path):
+    changes = {"teleop.law": "a: b"}
+    with pytest.raises(ScenarioError) as raised:
+        start_arguments(asked(changes=changes), tmp_path)
+    assert wrong_fields(raised.value, changes) == {"teleop.law": "expected one of pose, velocity"}
+
+
 def test_the_arguments_are_those_of_the_command_line(tmp_path):
     (tmp_path / "table").mkdir()
     changes = {"teleop.scale": 5e-5, "teleop.law": "velocity", "robot.looks": True, "robot.seed": None}

@@ -6,6 +6,7 @@ from hub.devices.diagnostics_log import DiagnosticsLog
 from hub.participant import Device, Params
 from hub.planning.wiring import make_plan
 from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.keys import Keys
@@ -50,7 +51,7 @@ def wire():
         open_session("router", listen=[endpoint]) as hub,
         open_session("client", connect=[endpoint]) as device,
     ):
-        diagnostics = DiagnosticsLog(plan, keys, hub, refusals)
+        diagnostics = DiagnosticsLog(RunConnection(hub, keys, plan, 1, refusals))
         yield (
             (lambda source, port, message: device.put(keys.output("device", source, port), encode(message))),
             refusals,

@@ -1,16 +1,12 @@
 import os
-import subprocess
 import sys
-from contextlib import ExitStack, contextmanager
 from time import sleep
 
 import pytest
 
 from hub.hosting import patience as patience_module
 from hub.hosting.patience import Patience
-
-ENDLESS = "import os; parent = os.getppid()\nwhile os.getppid() == parent: pass"  # not longer than the tests
-BUSY = [sys.executable, "-P", "-c", ENDLESS]
+from tests.hub.busy_processes import busy_processes
 
 
 @pytest.fixture
@@ -20,14 +16,19 @@ def clock(monkeypatch):
     class Clock:
         now_ns = 0
         delay_ns = 0
+        looks = 0
 
         def advance(self, seconds, *, delayed=0.0):
             self.now_ns += round(seconds * 1e9)
             self.delay_ns += round(delayed * 1e9)
 
+        def run_delays(self, _):
+            self.looks += 1
+            return {"thread": self.delay_ns}
+
     clock = Clock()
     monkeypatch.setattr(patience_module, "monotonic_ns", lambda: clock.now_ns)
-    monkeypatch.setattr(patience_module, "_run_delays", lambda _: {"thread": clock.delay_ns})
+    monkeypatch.setattr(patience_module, "_run_delays", clock.run_delays)
     return clock
 
 
@@ -62,14 +63,12 @@ def test_the_next_wait_has_the_whole_limit_and_no_delay_from_before(clock):
     assert patience.is_over([1])
 
 
-@contextmanager
-def busy_processes(count):
-    with ExitStack() as stack:
-        started = list[subprocess.Popen[bytes]]()
-        for _ in range(count):
-            started.append(stack.enter_context(subprocess.Popen(BUSY)))
-            stack.callback(started[-1].kill)  # also if the next one does not start: the loops are endless
-        yield started
+def test_the_processes_are_looked_at_every_tenth_of_a_second(clock):
+    patience = Patience(3 * 10**9)
+    while not patience.is_over([1]):
+        clock.advance(0.001)
+    assert clock.now_ns == pytest.approx(3.1e9, abs=0.002e9)
+    assert clock.looks == 27
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells the run delay")

@@ -5,11 +5,15 @@ Each command runs in a process of its own, whose address space is limited.
 
 from __future__ import annotations
 
+import bz2
 import os
+import random
+import sqlite3
 import struct
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import lz4.frame
@@ -29,23 +33,16 @@ from hub.recording.ros_bag_reader import RosBag
 from hub.recording.unpacking import MAX_CHUNK_BYTES, unpack
 from schemas.codec import typestore
 from schemas.errors import RecordingError
+from tests.hub.recording.packed_zeros import MiB, packed_zeros
 from tests.hub.sample_session import write_session
 
-MiB = 2**20
 _ALLOWED_BYTES = 2**31
 """Address space of a command: numpy and zenoh alone take 1 GiB of it."""
 
+SKIPPED = b"\x50\x2a\x4d\x18\x04\x00\x00\x00skip"
+"""A frame of zstd without contents."""
+
 PACKERS: dict[str, Callable[[bytes], bytes]] = {"lz4": lz4.frame.compress, "zstd": zstandard.compress}
-
-
-def packed_zeros(compression: str, size: int) -> bytes:
-    """Return `size` zeros, compressed piece by piece."""
-    piece = bytes(MiB)
-    if compression == "zstd":
-        packer = zstandard.ZstdCompressor(level=19).compressobj()
-        return b"".join(packer.compress(piece) for _ in range(size // MiB)) + packer.flush()
-    with lz4.frame.LZ4FrameCompressor() as frame:
-        return frame.begin() + b"".join(frame.compress(piece) for _ in range(size // MiB)) + frame.flush()
 
 
 def chunk(compression: str, packed: bytes, stated: int) -> bytes:
@@ -75,6 +72,30 @@ def test_no_more_than_is_allowed_is_unpacked(compression: str) -> None:
         unpack(compression, PACKERS[compression](content), 5999)
     with pytest.raises(ValueError, match=f"more than the {MAX_CHUNK_BYTES} bytes"):
         unpack(compression, packed_zeros(compression, MAX_CHUNK_BYTES + MiB))
+
+
+@pytest.mark.parametrize("compression", [*PACKERS, "bz2"])
+def test_a_frame_that_is_cut_short_is_refused(compression: str) -> None:
+    content = random.Random(5).randbytes(300_000)
+    packed = {**PACKERS, "bz2": bz2.compress}[compression](content)
+    assert unpack(compression, packed) == content
+    for size in (0, 3, 8, len(packed) // 2, len(packed) - 1):
+        with pytest.raises((ValueError, zstandard.ZstdError)):
+            unpack(compression, packed[:size])
+
+
+@pytest.mark.parametrize("checksum", [False, True])
+def test_a_series_of_frames_is_whole_only_to_the_end_of_the_last(checksum: bool) -> None:
+    frame = zstandard.ZstdCompressor(write_content_size=False, write_checksum=checksum)
+    content = random.Random(5).randbytes(200_000) + bytes(200_000)
+    packed = SKIPPED + frame.compress(content)
+    assert unpack("zstd", packed * 2) == content * 2
+    for size in range(len(packed) + 1, 2 * len(packed), 997):
+        with pytest.raises((ValueError, zstandard.ZstdError)):
+            unpack("zstd", (packed * 2)[:size])
+    first_block = len(SKIPPED) + zstandard.frame_header_size(packed[len(SKIPPED) :]) + 3 + 2**17
+    with pytest.raises(ValueError, match="cut short"):
+        unpack("zstd", packed[:first_block])
 
 
 @pytest.mark.parametrize("stated", [1000 * MiB, 1000], ids=["true size", "false size"])
@@ -139,7 +160,7 @@ def test_a_file_that_states_too_much_is_refused_before_it_is_unpacked(tmp_path: 
         Bag(file, unfinished=True)
 
 
-@pytest.mark.parametrize("front", [b"", b"\x50\x2a\x4d\x18\x04\x00\x00\x00skip"], ids=["alone", "behind"])
+@pytest.mark.parametrize("front", [b"", SKIPPED], ids=["alone", "behind"])
 def test_a_compressed_file_of_a_ros_bag(tmp_path: Path, front: bytes) -> None:
     """A frame that is skipped may stand in front of the bomb."""
     (tmp_path / "bag").mkdir()
@@ -178,8 +199,20 @@ def test_a_bomb_in_a_message_of_a_bag_of_ros_2(tmp_path: Path, storage: StorageP
     _require_refusal(tmp_path / "bag")
 
 
-def _require_refusal(bag: Path) -> None:
-    with RosBag(bag) as opened, pytest.raises(RecordingError, match=f"more than the {MAX_CHUNK_BYTES} bytes"):
+def test_a_message_that_is_cut_short_in_a_bag_of_ros_2(tmp_path: Path) -> None:
+    writer = Ros2Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection("/text", "std_msgs/msg/String", typestore=typestore())
+        writer.write(connection, 1, random.Random(5).randbytes(300_000))
+    (file,) = (tmp_path / "bag").glob("*.db3")
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute("UPDATE messages SET data = substr(data, 1, 200000)")
+    _require_refusal(tmp_path / "bag", "cut short")
+
+
+def _require_refusal(bag: Path, why: str = f"more than the {MAX_CHUNK_BYTES} bytes") -> None:
+    with RosBag(bag) as opened, pytest.raises(RecordingError, match=why):
         list(opened.messages(["/text"], 0))
 
 

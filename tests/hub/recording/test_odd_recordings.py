@@ -60,6 +60,13 @@ def test_a_newer_recording_is_said_to_be_newer(tmp_path: Path) -> None:
             read()
 
 
+def test_a_newer_recording_is_said_to_be_newer_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    recording = recorded(tmp_path / "run", versions=json.dumps({"trocar": "99.1"}).encode())
+    for _ in range(2):
+        recording.warn_if_newer()
+    assert caplog.text.count("Trocar 99.1 has made it") == 1
+
+
 def test_a_list_of_forks_passes_over_what_cannot_be_read(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

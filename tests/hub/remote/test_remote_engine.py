@@ -101,7 +101,7 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
     assert [port.name for port in seen.participants["deaf"].ports] == ["hand"]
     assert (seen.connections, len(seen.from_devices)) == ((), 1)
     joined_hosts = JoinedHosts(
-        file.scenario,
+        file.scenario.name,
         plan,
         SessionParameters.of_scenario(file.scenario, Files(file.source.directory)),
         1,

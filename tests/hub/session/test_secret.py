@@ -21,6 +21,7 @@ from hub.transport.envelope import signature
 from hub.transport.host_link import HostLink, HubLink, has_link
 from hub.transport.loopback_port import LoopbackPort
 from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from hub.transport.session_secret import listen_with_secret, private_directory, secret_of
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
@@ -218,7 +219,7 @@ def acks(prepare, request):
         refusals = Refusals()
         links = {"other": HubLink(["there"])} if request.param == "link" else {}
         keys = dict.fromkeys(plan.hosts(), HOSTS)
-        receiver = AckReceiver(session, KEYS, plan, 5, refusals, keys, links)
+        receiver = AckReceiver(RunConnection(session, KEYS, plan, 5, refusals), keys, links)
         host = HostLink(*map(os.dup, links["other"].inherited)) if links else None
 
         def publish(hash_, step=3):

@@ -8,6 +8,7 @@ from hub.transport.envelope import Tag
 from hub.transport.observer_inputs import ObserverInputs
 from hub.transport.port_codec import PortCodec
 from hub.transport.refusals import Refusals
+from hub.transport.run_connection import RunConnection
 from hub.transport.zenoh_session import open_session
 from schemas.keys import Keys
 from tests.hub.authorities import free_endpoint
@@ -36,7 +37,8 @@ class Sources:
             connections=["robot.out -> camera.a", "tissue.out -> camera.b"],
         )
         self.refusals = Refusals()
-        self.inputs = ObserverInputs(session, KEYS, self.plan, "camera", RUN, self.refusals, self._count)
+        run = RunConnection(session, KEYS, self.plan, RUN, self.refusals)
+        self.inputs = ObserverInputs(run, "camera", self._count)
         self.arrived = 0
         self.bundles = {
             name: Bundle(session, KEYS.signals(name, "camera"), lambda: None) for name in ("robot", "tissue")

@@ -2,7 +2,7 @@
 
 `bench/ros.py` compares it with a whole session.
 
-    python bench/ros_bare.py KIND ENDPOINT '{"...": ...}' SECONDS
+    python bench/ros_gateway_alone.py KIND ENDPOINT '{"...": ...}' SECONDS
 
 Says `ready` once the gateway is open, waits for a line, tells for so many seconds, and then prints what it
 has cost and how many messages it has sent.
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from bench.ros_figures import cpu_s
-from bench.ros_parts import EYES, picture
+from bench.ros_participants import EYES, picture
 from devices.ros.gateway import Gateway
 from hub.planning.session_parameters import SessionParameters
 from hub.transport.zenoh_session import open_session

@@ -2,7 +2,7 @@
 
 The faults: its host is killed; the servo process itself is stopped; a call of the driver does not return.
 
-    python bench/servo.py [--seconds 20] [--styluses 2] [--planes 4] [--stops 10] [--idle]
+    python bench/haptic_servo.py [--seconds 20] [--styluses 2] [--planes 4] [--stops 10] [--idle]
 
 Styluses of the stand-in for HDAPI, all in contact, beside a device host that reads them at 1 kHz and sends
 contact models at 250 Hz, and, unless `--idle`, one busy process on every core. Needs a C compiler.

@@ -1,6 +1,6 @@
 """What a soft body in the picture costs: its surface, MuJoCo's scene, and the drawing.
 
-python bench/skins.py --json
+python bench/skin_cost.py --json
 
 For three ways in which MuJoCo can show one. A dented block of 80 x 60 x 20 mm of about 250, 1000 and 5000
 nodes fills a picture of 320 x 288 pixels, shadows off. `surface_ms`: the displayed vertices from the nodes.

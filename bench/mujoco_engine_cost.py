@@ -1,6 +1,6 @@
 """What the MuJoCo engine costs beside bare `mj_step` on the same model, and where it goes.
 
-    python bench/engine_steps.py --json
+    python bench/mujoco_engine_cost.py --json
 
 Both run in the same process in turns; the median of the rounds' ratios is reported, as single times move with
 the machine's load. `ratio` is at one sub-step of 1 ms a step, the worst case; `ratio_10_ms` at ten
