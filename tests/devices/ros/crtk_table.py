@@ -13,6 +13,7 @@ A client is a `Peer`; its messages are our models, so a client in another proces
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from time import monotonic, sleep, time_ns
 from typing import Any, Protocol
 
@@ -185,11 +186,13 @@ def _heard(gateway: Gateway, row: Row, peer: Peer, timeout_s: float) -> Message:
     """
     if row.periodic or row.latched:
         return peer.heard(row, timeout_s)
-    try:
-        return peer.heard(row, timeout_s / 4.0)
-    except TimeoutError:
+    wait_s = 1.0
+    while wait_s < timeout_s:
+        with suppress(TimeoutError):
+            return peer.heard(row, wait_s)
         _tell(gateway, row)
-        return peer.heard(row, timeout_s)
+        wait_s *= 2.0
+    return peer.heard(row, timeout_s)
 
 
 def _refreshed(gateway: Gateway, row: Row, peer: Peer, timeout_s: float) -> Message:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import pytest
 
 from hub.command_line.ls import ls
+from hub.observation.late_steps import NO_CORE
 from hub.recording.recording import Recording
 from hub.recording.report import report
 from hub.session.step_loop import StepLoop
@@ -76,7 +77,8 @@ def test_the_hub_waits_for_the_host_that_computes(prepare):
 def test_late_steps_have_their_cause(prepare, overrides: Iterable[str], cause):
     summary = prepare(LATE, *overrides, profile=True).run()
     profile = summary.profile
-    assert next(iter(profile["late_causes"])) == cause
+    # other work on the machine may take the cores from any step
+    assert next(found for found in profile["late_causes"] if found != NO_CORE) == cause
     assert sum(profile["late_causes"].values()) == summary.late_steps
     assert cause in [row["cause"] for row in profile["worst_steps"]]
     assert all(row["took_s"] >= 0.005 for row in profile["worst_steps"])
