@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.mujoco import model
 from engines.mujoco.markers.store import ShownMarker, shown_markers
 from engines.mujoco.params import MujocoParams, SceneParams
 from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures.clearest_view import Sight, clearest_position
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 from engines.mujoco.pictures.skins import SoftBody
 from hub.recording.bag import BagMessage, output_port
+from hub.recording.moments import Moments
 from hub.recording.recording import Recording
 from hub.recording.trust import trusted_parameters
 from schemas.codec import decode
@@ -32,15 +35,17 @@ Point = tuple[float, float, float]
 
 M = TypeVar("M", bound=Message)
 
-_ASIDE = np.array([0.5, -0.72, 0.48])
-"""Direction from which the overview looks: between the axes and from above, so that three sides of a box are
-seen.
-"""
-_DISTANCE, _LEAST = 1.4, 0.1
-"""Distance of the overview, in diagonals of the box around the subject; the least diagonal, m."""
+_DISTANCE, _LEAST = 1.4, 0.06
+"""Distance of the overview, in diagonals of the box around the subject; the least side of the box, m."""
+_REACH = 0.1
+"""Distance from the subject within which a tip belongs to the subject, m."""
+_STATES = 5
+"""Most states of the robot that count for the place of the overview."""
 _LENS = ("field_of_view", "baseline", "near", "far")
 _OVERSAMPLING = 2
 """Pixels drawn for each one of the picture, along either side: smooths edges."""
+_FINE_PIXELS = 1024
+"""Largest picture, along either side, drawn finer: both eyes are drawn side by side."""
 
 
 class RecordedScene:
@@ -72,6 +77,7 @@ class RecordedScene:
         self._params, self._files = params, parameters.files
         self._qpos = f"/engine/{name}/out/qpos"
         self._looks, self._recorded_lens = _looks(participants), _recorded_lens(participants)
+        self._room_view = _room_view(participants)
         self._nodes = _by_body(
             [topic for topic, kind in recording.topics.items() if kind == SoftBodyState.ros_type]
         )
@@ -85,23 +91,39 @@ class RecordedScene:
         position: Point | None = None,
         target: Point | None = None,
     ) -> NDArray[np.uint8]:
-        """Return the picture at `time_ns`, shape (height, width, 3), RGB.
+        """Return the picture at `time_ns`; arguments, errors and shape are those of `pictures`."""
+        return next(self.pictures([time_ns], camera, size, position, target))
+
+    def pictures(
+        self,
+        times_ns: Sequence[int],
+        camera: Camera,
+        size: tuple[int, int],
+        position: Point | None = None,
+        target: Point | None = None,
+    ) -> Iterator[NDArray[np.uint8]]:
+        """Yield the picture at each of `times_ns`, shape (height, width, 3), RGB.
 
         Args:
-            time_ns: simulated time; the picture shows the newest state published by then.
+            times_ns: simulated times, ascending; a picture shows the newest state published by then, and the
+                soft bodies known at the first of them.
             camera: `left` or `right` of the endoscope, or `overview`.
             size: width and height, pixels.
-            position: where the overview looks from, m in the world; by default from above and aside.
-            target: where it looks at, m in the world; by default where soft bodies and objects were at first.
+            position: where the overview looks from, m in the world; default: the scenario's own camera in the
+                room, else a place from which the arms hide least.
+            target: where it looks at, m in the world; default: of the scenario's own camera, else the middle
+                of soft bodies, objects and instruments beside them, over the whole recording.
 
         Raises RecordingError if the recording does not contain what is asked for, TrocarError if nothing can
         be drawn on this machine.
         """
-        bodies = self._bodies_at(time_ns)
-        width, height = size
-        shown: dict[str, Any] = {"width": _OVERSAMPLING * width, "height": _OVERSAMPLING * height}
+        bodies = self._bodies_at(times_ns[0])
+        finer = _OVERSAMPLING if max(size) <= _FINE_PIXELS else 1
+        shown: dict[str, Any] = {"width": finer * size[0], "height": finer * size[1]}
         if camera == "overview":
-            shown |= {"view": self._overview_camera(bodies, position, target), "baseline": 0.0}
+            view = self._room_view if position is None and target is None else None
+            view = view or self._overview_camera(bodies, position, target)
+            shown |= {"view": view, "baseline": 0.0}
         elif not self._has_endoscope:
             raise RecordingError(
                 f"'{self._recording.file}': no ECM in the scene, so there is no '{camera}' picture of an"
@@ -109,8 +131,8 @@ class RecordedScene:
             )
         else:
             shown |= self._recorded_lens
-        ((left, right),) = self._draw([time_ns], shown, bodies)
-        return _reduce_picture(right if camera == "right" else left)
+        for left, right in self._draw(times_ns, shown, bodies):
+            yield _reduce_picture(right if camera == "right" else left, finer)
 
     def stereo(
         self, times_ns: Iterable[int], size: tuple[int, int]
@@ -167,6 +189,13 @@ class RecordedScene:
         finally:
             scene.close()
 
+    def _states(self) -> list[Vector]:
+        """Return positions of the robot's joints, shape (nq,) each, at instants all over the recording."""
+        bag, moments = self._recording, Moments(self._recording)
+        times = np.linspace(0, bag.duration_ns, _STATES, dtype=np.int64).tolist()
+        found = [moments.newest(self._qpos, time) for time in times] if self._qpos in bag.topics else []
+        return [self._positions(newest, newest.time_ns) for newest in found if newest is not None]
+
     def _shown(self, markers: Iterable[_Newest], time_ns: int) -> list[ShownMarker]:
         """Return the markers that are shown at `time_ns`, of all participants that keep some."""
         messages = (message for newest in markers if (message := newest.at(time_ns)) is not None)
@@ -196,22 +225,32 @@ class RecordedScene:
             raise RecordingError(f"'{self._recording.file}': topic '{message.topic}': {error}") from error
 
     def _overview_camera(
-        self, bodies: Mapping[str, SoftBody], position: Point | None, target: Point | None
-    ) -> ViewParams | None:
+        self,
+        bodies: Mapping[str, SoftBody],
+        position: Point | None,
+        target: Point | None,
+    ) -> ViewParams:
         if position is not None and target is not None:
             return ViewParams(position=position, target=target)
+        sight = Sight(model.build(self._params), self._states())
+        things, tips = sight.seen(self._params.objects)
         points = [body.rest.astype(np.float64) for body in bodies.values()]
-        points += [np.array([thing.position]) for thing in self._params.objects.values()]
+        points += [things] if len(things) else []
         if not points:
             raise RecordingError(
                 f"'{self._recording.file}': neither soft bodies nor objects to look at; give the overview a"
                 " position and a target"
             )
-        cloud = np.concatenate(points)
+        subject = np.concatenate(points)
+        near = np.linalg.norm(tips - subject.mean(axis=0), axis=1) < _REACH
+        cloud = np.concatenate([subject, tips[near]])
         low, high = cloud.min(axis=0), cloud.max(axis=0)
         centre = 0.5 * (low + high) if target is None else np.array(target)
-        away = _DISTANCE * max(float(np.linalg.norm(high - low)), _LEAST) * _ASIDE
-        return ViewParams(position=position or tuple(centre + away), target=tuple(centre))
+        if position is None:
+            size = np.maximum(high - low, _LEAST)
+            away = _DISTANCE * float(np.linalg.norm(size))
+            position = tuple(clearest_position(sight, centre, size, away))
+        return ViewParams(position=position, target=tuple(centre))
 
 
 class _Newest:
@@ -257,7 +296,15 @@ def _recorded_lens(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any
     return {}
 
 
-def _reduce_picture(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _room_view(participants: Mapping[str, ParticipantSpec]) -> ViewParams | None:
+    """Return where the scenario's own camera in the room stands, if it has one."""
+    for spec in participants.values():
+        if spec.kind == "endoscope" and spec.params.get("view") is not None:
+            return ViewParams.model_validate(spec.params["view"])
+    return None
+
+
+def _reduce_picture(picture: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     height, width, _ = picture.shape
-    blocks = picture.reshape(height // _OVERSAMPLING, _OVERSAMPLING, width // _OVERSAMPLING, _OVERSAMPLING, 3)
+    blocks = picture.reshape(height // factor, factor, width // factor, factor, 3)
     return blocks.mean(axis=(1, 3)).astype(np.uint8)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -11,8 +12,8 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from engines.mujoco.pictures import opengl
-from engines.mujoco.pictures.command_line import app
-from engines.mujoco.pictures.recorded_scene import RecordedScene
+from engines.mujoco.pictures.command_line import film_app, render_app
+from engines.mujoco.pictures.recorded_scene import Camera, RecordedScene
 from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
 from hub.session.launch import launch
@@ -130,7 +131,7 @@ def test_all_soft_bodies_of_all_engines_are_shown(recordings: dict[str, Recordin
 def test_the_command_writes_a_picture(recordings: dict[str, Recording], tmp_path: Path) -> None:
     file = tmp_path / "moment.png"
     done = CliRunner().invoke(
-        app,
+        render_app,
         [
             str(recordings["tissue"].file),
             "-o",
@@ -150,16 +151,62 @@ def test_the_command_writes_a_picture(recordings: dict[str, Recording], tmp_path
         assert 0.05 < liver(np.asarray(picture)).mean() < 0.7
 
 
+def test_a_film_has_the_scene_with_title_and_time(recordings: dict[str, Recording], tmp_path: Path) -> None:
+    file = tmp_path / "moments.mp4"
+    size = ["--width", "160", "--height", "120"]
+    done = CliRunner().invoke(
+        film_app, [str(recordings["tissue"].file), "-o", str(file), *size, "--fps", "50", "--end", "0.1"]
+    )
+    assert done.exit_code == 0, done.output
+    assert done.stdout.strip() == str(file)
+    with av.open(str(file)) as film:
+        stream = film.streams.video[0]
+        assert (stream.codec_context.name, stream.width, stream.height) == ("h264", 160, 120)
+        assert stream.average_rate == 50
+        shown = [frame.to_ndarray(format="rgb24") for frame in film.decode(stream)]
+    assert len(shown) == 6
+    for picture in shown:
+        assert liver(picture).mean() > 0.03
+        for corner in (picture[-14:, :40], picture[-14:, -40:]):
+            assert corner.max() > 200, "white letters"
+
+
+@pytest.mark.parametrize("camera", ["overview", "left"])
+def test_pictures_of_a_film_are_those_of_single_moments(
+    recordings: dict[str, Recording], camera: Camera
+) -> None:
+    scene = RecordedScene(recordings["tissue"])
+    times = [0, 40_000_000, 160_000_000]
+    for time, picture in zip(times, scene.pictures(times, camera, (80, 60)), strict=True):
+        assert np.array_equal(picture, scene.picture(time, camera, (80, 60)))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (["-o", "film.avi"], ".mp4"),
+        (["-o", "film.mp4", "--width", "161"], "even width"),
+        (["-o", "film.mp4", "--start", "100"], "the recording has 0.2 s"),
+    ],
+)
+def test_bad_usage_of_film_is_refused(
+    recordings: dict[str, Recording], arguments: list[str], problem: str
+) -> None:
+    done = CliRunner().invoke(film_app, [str(recordings["tissue"].file), *arguments])
+    assert done.exit_code == 2
+    assert problem in " ".join(done.output.replace("│", " ").split())
+
+
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
         (["-o", "moment.bmp"], ".png or .jpg"),
         (["-o", "moment.png", "--from", "1,2"], "write x,y,z"),
-        (["-o", "moment.png", "--width", "5000"], "1024"),
+        (["-o", "moment.png", "--width", "5000"], "2048"),
     ],
 )
 def test_bad_usage_is_refused(recordings: dict[str, Recording], arguments: list[str], problem: str) -> None:
-    done = CliRunner().invoke(app, [str(recordings["tissue"].file), *arguments])
+    done = CliRunner().invoke(render_app, [str(recordings["tissue"].file), *arguments])
     assert done.exit_code == 2
     assert problem in done.output
 
