@@ -12,13 +12,15 @@ from importlib.util import find_spec
 
 from hub.import_names import NAMES, import_collisions
 from hub.planning import registry
+from hub.planning.scenario_file import installed_scenarios
+from hub.planning.scenario_source import read
 from hub.security import credentials
 from hub.transport.loopback_port import LoopbackPort
 from hub.transport.session_secret import listen_with_secret, secret_of
 from hub.transport.zenoh_session import open_session
 from schemas.errors import TrocarError
 
-__all__ = ["Finding", "as_json", "examine"]
+__all__ = ["Finding", "as_json", "blocked_scenarios", "examine"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,19 @@ def examine() -> list[Finding]:
         _check_ros,
     )
     return [finding for section in sections for finding in section()]
+
+
+def blocked_scenarios() -> dict[str, str]:
+    """Return the installed scenarios that cannot run here, each with the first reason."""
+    blocked: dict[str, str] = {}
+    for name, file in installed_scenarios().items():
+        for spec in read(file).tree["participants"].values():
+            try:
+                registry.require_extra(spec["kind"])
+            except TrocarError as error:
+                blocked[name] = str(error)
+                break
+    return blocked
 
 
 def _check_python() -> Iterator[Finding]:

@@ -59,7 +59,7 @@ def verify(
     Raises RecordingError if the recording is not of a session, and the errors of `trusted_parameters` and
     `Session.run`.
     """
-    scenario = recording.scenario().model_copy(update={"pace": "fast", "measure": {}})
+    scenario = recording.scenario().model_copy(update={"pace": "fast", "measure": {}, "outcome": None})
     plan, directory = _plan(recording), directory or recording.directory()
     stepped = {name: planned for name, planned in plan.participants.items() if planned.in_step}
     parameters = trusted_parameters(recording, stepped, directory, trust=trust)

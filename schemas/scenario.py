@@ -5,6 +5,7 @@ All quantities are SI after validation, times integer nanoseconds.
 
 from __future__ import annotations
 
+from string import Formatter
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -13,7 +14,17 @@ from schemas.keys import valid_name
 from schemas.network_link import NetworkLinkSpec
 from schemas.quantity import Duration
 
-__all__ = ["MAX_NAME", "Bond", "Connection", "Measure", "ParticipantSpec", "PortReference", "Scenario"]
+__all__ = [
+    "MAX_NAME",
+    "Bond",
+    "Connection",
+    "Limits",
+    "Measure",
+    "Outcome",
+    "ParticipantSpec",
+    "PortReference",
+    "Scenario",
+]
 
 Algorithm = Literal["impulse", "impulse-linearised", "gauss-seidel", "jacobi"]
 
@@ -164,8 +175,13 @@ class Measure(_Part):
     of: PortReference
     after: Duration = Field(default=0, ge=0, description="simulated time before which values are ignored")
     level: float | None = Field(default=None, description="for time-above, in the unit of the port")
-    unit: str = ""
+    unit: str = Field(default="", description="default for time-above: s")
     live: bool = Field(default=False, description="show the current value in the progress line")
+
+    @property
+    def si_unit(self) -> str:
+        """Unit of the result; empty for a number without a unit."""
+        return self.unit or ("s" if self.kind == "time-above" else "")
 
     @model_validator(mode="after")
     def _check_level(self) -> Self:
@@ -174,6 +190,41 @@ class Measure(_Part):
                 f"measure of kind {self.kind}: a level is required for time-above, and not allowed otherwise"
             )
         return self
+
+
+class Limits(_Part):
+    """Limits of a measure, in its unit."""
+
+    least: float | None = None
+    most: float | None = None
+
+    def allow(self, value: float) -> bool:
+        """Return whether `value` is within the limits."""
+        return (self.least is None or value >= self.least) and (self.most is None or value <= self.most)
+
+
+class Outcome(_Part):
+    """The sentence of the summary about the result, and the conditions of success."""
+
+    text: str = Field(
+        min_length=1, description="what was done; `{name}` stands for the measure of that name, with its unit"
+    )
+    success: dict[Name, Limits] = Field(
+        default={}, description="the limits of measures that make a run a success; default: no verdict"
+    )
+
+    @property
+    def parts(self) -> list[tuple[str, str | None]]:
+        """Literal texts, each with the name of the measure after it; None after the last.
+
+        Raises ValueError for a text with a single brace.
+        """
+        return [(literal, name) for literal, name, _, _ in Formatter().parse(self.text)]
+
+    @property
+    def measures(self) -> set[str]:
+        """Names of all measures in text and success."""
+        return {name for _, name in self.parts if name is not None} | self.success.keys()
 
 
 def _without_none(value: Any) -> Any:
@@ -230,3 +281,13 @@ class Scenario(_Part):
     connections: Annotated[list[Connection], BeforeValidator(lambda v: [] if v is None else v)] = []
     bonds: Annotated[list[Bond], BeforeValidator(lambda v: [] if v is None else v)] = []
     measure: Annotated[dict[Name, Measure], BeforeValidator(_without_none)] = {}
+    outcome: Outcome | None = Field(
+        default=None, description="what the summary says first; default: the goals of the task, if it has one"
+    )
+
+    @model_validator(mode="after")
+    def _check_outcome(self) -> Self:
+        if unknown := sorted(self.outcome.measures - self.measure.keys()) if self.outcome else []:
+            known = ", ".join(self.measure) or "none"
+            raise ValueError(f"outcome: there is no measure '{unknown[0]}'; known: {known}")
+        return self

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hub.command_line.display import console, show, table
+from hub.command_line.display import show_tables
 from hub.command_line.options import Json, RecordingPath, Trust
 
 if TYPE_CHECKING:
@@ -29,10 +29,13 @@ def score(
         typer.Option(metavar="NAME", help="Score by these rules; default: all. May be repeated."),
     ] = None,
     trust: Trust = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Also show scores without a value, with the reasons.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Score a recorded session, or a ROS bag of a real arm: metrics, events, and the rules of others."""
-    from hub.recording.scores import score_numbers
+    from hub.recording.scores import score_numbers, score_tables
 
     found = _score_file(recording, rules or [], trust=trust)
     scores = {name: score_numbers(one.card) for name, one in found.items()}
@@ -40,12 +43,11 @@ def score(
         events = {name: [_numbers(event) for event in one.events] for name, one in found.items()}
         typer.echo(json.dumps({"scores": scores, "events": events}, indent=2))
         return
-    show({"scores": scores}, as_json=False)
     for name, one in found.items():
+        show_tables(score_tables(name, scores[name], everything=everything))
         if one.events:
-            console.print()
             rows = [[_text(cell) for cell in _numbers(event).values()] for event in one.events]
-            console.print(table(rows, f"{name}, at (s)", "event", "object", "arm", "place", "value", "unit"))
+            show_tables([((f"{name}, at (s)", "event", "object", "arm", "place", "value", "unit"), rows)])
 
 
 def _score_file(path: Path, rules: list[str], *, trust: bool) -> dict[str, Scored]:

@@ -19,7 +19,9 @@ from hub.command_line.forks import fork, forks
 from hub.command_line.hosts import device, engine
 from hub.command_line.link import link
 from hub.command_line.ls import ls
+from hub.command_line.record_option import RecordingCommand
 from hub.command_line.run import run
+from hub.command_line.scenarios import list_scenarios, new
 from hub.planning.limits import safe_text
 from schemas.errors import ScenarioError, TrocarError
 
@@ -37,18 +39,20 @@ app = typer.Typer(
         "Exit codes: 0 done; 1 the session failed; 2 bad usage or a bad scenario. Results go to stdout,"
         " progress and logs to stderr."
     ),
-    no_args_is_help=True,
+    invoke_without_command=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+app.command(cls=RecordingCommand)(run)
+app.command("list")(list_scenarios)
+app.command()(new)
+app.command(cls=RecordingCommand)(fork)
 for command in (
-    run,
     check,
     recordings.verify,
     recordings.replay,
     recordings.recover,
-    fork,
     forks,
     recordings.report,
     ls,
@@ -69,8 +73,19 @@ def _print_version(given: bool) -> None:
         raise typer.Exit
 
 
+_WELCOME = """\
+Trocar: co-simulation for robotic surgery. Three things to try:
+
+  trocar list                   all scenarios, by family
+  trocar run palpation --open   a robot presses soft tissue; watch it in the browser
+  trocar doctor                 what this machine can do
+
+trocar --help shows all commands."""
+
+
 @app.callback()
 def options(
+    context: typer.Context,
     *,
     debug: Annotated[
         bool, typer.Option("--debug", help="Show debug logs and the traceback of an error.")
@@ -87,6 +102,8 @@ def options(
         handler, layout = logging.StreamHandler(), "%(asctime)s %(levelname)s %(message)s"
     handler.setFormatter(_Printable(layout))
     logging.basicConfig(level=level, handlers=[handler])
+    if context.invoked_subcommand is None:
+        typer.echo(_WELCOME)
 
 
 class _Printable(logging.Formatter):

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from hub.command_line.display import console
+from hub.command_line.display import results
 from hub.command_line.options import Json, Overrides, ScenarioName, with_places
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.planning.scenario_file import load
@@ -39,7 +39,7 @@ def check(
         typer.echo(plan.model_dump_json(indent=2))
         return
     _print_plan(plan, with_ports=with_ports)
-    console.print(f"[green]{escape(str(file.source.file))} is a valid scenario.", soft_wrap=True)
+    results.print(f"[green]{escape(str(file.source.file))} is a valid scenario.", soft_wrap=True)
 
 
 def _print_plan(plan: Plan, *, with_ports: bool) -> None:
@@ -49,24 +49,24 @@ def _print_plan(plan: Plan, *, with_ports: bool) -> None:
         source = f"{connection.source}.{connection.source_port}"
         sources[connection.target, connection.target_port].append(source)
     for planned in plan.participants.values():
-        console.print(
+        results.print(
             f"[bold]{planned.name}[/] ({planned.role} of kind {planned.kind}) on host"
             f" {planned.host}{escape(_time(planned))}",
             soft_wrap=True,
         )
         if not with_ports:
-            console.print(f"    {_counts(planned, sources)}", soft_wrap=True)
+            results.print(f"    {_counts(planned, sources)}", soft_wrap=True)
         for port in planned.ports if with_ports else ():
             arrow = "->" if port.causality == "output" else "<-"
             details = (port.type, port.unit, port.frame and f"in {port.frame}")
             detail = " ".join(part for part in details if part)
             origin = ", ".join(sources.get((planned.name, port.name), ()))
-            console.print(
+            results.print(
                 f"    {arrow} {port.name}  [dim]{escape(detail)}[/]{f'  from {origin}' if origin else ''}",
                 soft_wrap=True,
             )
     if plan.order:
-        console.print(f"order of stepping: {', '.join(plan.order)}", soft_wrap=True)
+        results.print(f"order of stepping: {', '.join(plan.order)}", soft_wrap=True)
 
 
 def _counts(planned: PlannedParticipant, sources: Mapping[tuple[str, str], list[str]]) -> str:

@@ -1,4 +1,4 @@
-"""Output: tables and progress on stderr for people, JSON on stdout for programs."""
+"""Output: results on stdout, as tables for people or as JSON for programs; progress on stderr."""
 
 from __future__ import annotations
 
@@ -14,13 +14,21 @@ from rich.progress import Progress as Bar
 from rich.table import Table
 from rich.text import Text
 
+from hub.observation.readable import label, readable
 from hub.observation.summary import Progress
 from hub.planning.limits import safe_text
-from hub.recording.profiles import profile_tables
-from hub.recording.scores import score_tables
 from schemas.scenario import Scenario
 
-__all__ = ["LATENCY_COLUMNS", "RunProgress", "console", "latency_rows", "show", "table"]
+__all__ = [
+    "LATENCY_COLUMNS",
+    "RunProgress",
+    "console",
+    "latency_rows",
+    "results",
+    "show",
+    "show_tables",
+    "table",
+]
 
 _LONGEST = 10_000
 """Most characters of a cell."""
@@ -28,6 +36,9 @@ _LONGEST = 10_000
 _UNITS = {"s": "s", "n": "N", "j": "J", "m": "m"}
 
 console = Console(stderr=True, highlight=False)
+"""Progress, warnings and errors."""
+results = Console(highlight=False)
+"""Results: what a redirection to a file keeps."""
 
 
 def table(rows: Iterable[Iterable[object]], *columns: str) -> Table:
@@ -42,42 +53,26 @@ def table(rows: Iterable[Iterable[object]], *columns: str) -> Table:
 
 
 def show(result: Mapping[str, Any], *, as_json: bool) -> None:
-    """Print a result, as JSON on stdout or as a table on stderr."""
+    """Print a flat result on stdout, as JSON or as a table."""
     if as_json:
         typer.echo(json.dumps(result, indent=2, default=str))
         return
-    console.print(
-        table(
-            _readable_value(name, value)
-            for name, value in result.items()
-            if value is not None and not isinstance(value, dict)
-        )
-    )
-    if observers := result.get("observers"):
-        console.print()
-        console.print(table(_observer_rows(observers), *_OBSERVER_COLUMNS))
-    if rows := list(latency_rows(result.get("latency", {}))):
-        console.print()
-        console.print(table(rows, *LATENCY_COLUMNS))
-    for name, scores in result.get("scores", {}).items():
-        for columns, cells in score_tables(name, scores):
-            console.print()
-            console.print(table(cells, *columns))
-    profile = result.get("profile")
-    for columns, cells in profile_tables(profile) if profile else ():
-        console.print()
-        console.print(table(cells, *columns))
+    results.print(table(_readable_value(name, value) for name, value in result.items() if value is not None))
 
 
-_OBSERVER_COLUMNS = ("observer", "states", "dropped", "per second", "attainable", "lost")
+def show_tables(tables: Iterable[tuple[Iterable[str], Iterable[Iterable[object]]]]) -> None:
+    """Print tables, each given as heads of columns and rows, on stdout; an empty line before each."""
+    for columns, rows in tables:
+        results.print()
+        results.print(table(rows, *columns))
 
 
-def _observer_rows(observers: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[object, ...]]:
-    """Yield a row for each observer with a time of its own."""
-    for name, row in observers.items():
-        seen, dropped = row["states"], row["dropped"]
-        share = f"{dropped} ({dropped / max(seen + dropped, 1):.1%})"
-        yield name, seen, share, f"{row['rate']:.1f}", f"{row['attainable_rate']:.1f}", row["lost"] or ""
+def show_commands(commands: Iterable[tuple[str, str]]) -> None:
+    """Print commands to go on with, each with its purpose, on stdout; a long line is not folded."""
+    rows = list(commands)
+    widest = max(len(command) for command, _ in rows)
+    for command, purpose in rows:
+        results.print(Text(f"{safe_text(command, _LONGEST):{widest}}  # {purpose}"), soft_wrap=True)
 
 
 LATENCY_COLUMNS = ("latency", "stream", "count", "p50", "p99", "largest")
@@ -132,7 +127,9 @@ class RunProgress:
 
     def __call__(self, progress: Progress) -> None:
         """Show the progress of the run."""
-        live = (f"{name} {value:.3f} {unit}".rstrip() for name, (value, unit) in progress.live.items())
+        live = (
+            f"{label(name, unit)} {readable(value, unit)}" for name, (value, unit) in progress.live.items()
+        )
         late = (f"{progress.late_steps} late steps",) if progress.late_steps else ()
         now = "  ".join(
             (f"{progress.sim_time_s:.2f} s", f"{progress.real_time_factor:.2f} x real time", *late, *live)

@@ -8,11 +8,12 @@ from typing import Annotated, Any, Literal
 
 import typer
 from pydantic import TypeAdapter, ValidationError
-from rich.console import Console
 
-from hub.command_line.display import RunProgress, show, table
+from hub.command_line.display import RunProgress, results, table
 from hub.command_line.options import Certificates, Directory, Json, Overrides, RecordingPath, Trust
-from hub.command_line.run import Listening, OneHost, RecordTo, require_complete
+from hub.command_line.record_option import Overwrite, RecordTo, recording_directory
+from hub.command_line.run import Everything, Listening, OneHost, require_complete
+from hub.command_line.run_summary import show_summary
 from hub.recording.family import recording_family
 from hub.recording.recording import Recording
 from hub.transport.loopback_port import listening_ports
@@ -29,12 +30,19 @@ def _parse_instant(text: str) -> int:
     return at_ns
 
 
+def _name_of(recording: Path) -> str:
+    """Return the name of a recording: of its directory."""
+    path = recording.resolve()
+    return path.name if path.is_dir() else path.parent.name
+
+
 def fork(
     recording: RecordingPath,
     *,
     at: Annotated[str, typer.Option(metavar="TIME", help="Simulated time from which on to go on: '12.4 s'.")],
     overrides: Overrides = None,
     record: RecordTo = None,
+    overwrite: Overwrite = False,
     pace: Annotated[
         Literal["fast", "realtime"] | None,
         typer.Option(help="Replace the pace of the scenario, from that time on."),
@@ -44,6 +52,7 @@ def fork(
     listen: Listening = None,
     certs: Certificates = None,
     one_host: OneHost = False,
+    everything: Everything = False,
     as_json: Json = False,
 ) -> None:
     """Go on from an instant of a recording, live: with other devices, parameters, or a person.
@@ -58,7 +67,7 @@ def fork(
         Recording(recording, unfinished=True),
         _parse_instant(at),
         [*(overrides or ()), *([f"pace={pace}"] if pace else ())],
-        record=record,
+        record=recording_directory(record, f"{_name_of(recording)}-fork", overwrite=overwrite),
         trust=trust,
         directory=directory,
         one_host=one_host,
@@ -68,7 +77,7 @@ def fork(
     )
     with RunProgress(made.session.scenario) as progress:
         summary = made.run(progress)
-    show(summary.as_dict(), as_json=as_json)
+    show_summary(f"fork of {_name_of(recording)}", summary, everything=everything, as_json=as_json)
     require_complete(summary)
 
 
@@ -94,11 +103,10 @@ def forks(
         ]
         typer.echo(json.dumps(rows, indent=2))
         return
-    out = Console(highlight=False)
     if not members:
-        out.print("no recording of a session is here")
+        results.print("no recording of a session is here")
         return
-    out.print(
+    results.print(
         table(
             (
                 (

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import typer
-from rich.console import Console
 
-from hub.command_line.display import LATENCY_COLUMNS, console, latency_rows, table
+from hub.command_line.display import LATENCY_COLUMNS, console, latency_rows, results, show_tables, table
 from hub.command_line.options import Certificates, HubEndpoints, Json
 from hub.observation.latency import by_way
 from hub.recording.profiles import profile_numbers
@@ -30,34 +29,27 @@ def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Jso
     if as_json:
         typer.echo(json.dumps([_session_row(session) for session in found], indent=2))
         return
-    out = Console(highlight=False)
     if not found:
-        out.print("no session is running")
+        results.print("no session is running")
         return
-    out.print(
+    sessions = [session.status for session in found]
+    results.print(
         table(
             ((s.session, s.state, ", ".join(endpoints), pid or "-", s.run) for s, endpoints, pid, _ in found),
             *_SESSION_COLUMNS,
         )
     )
-    out.print()
-    sessions = [session.status for session in found]
-    rows = [
+    participants = [
         (s.session, s.state, p.name, p.role, p.host, p.pid, p.step) for s in sessions for p in s.participants
     ]
-    out.print(table(rows, *_PARTICIPANT_COLUMNS))
-    if devices := [row for status in sessions for row in _device_rows(status)]:
-        out.print()
-        out.print(table(devices, *_DEVICE_COLUMNS))
-    if profiles := [row for session in found for row in _profile_rows(session)]:
-        out.print()
-        out.print(table(profiles, *_PROFILE_COLUMNS))
-    latencies = [
-        (status.session, *row) for status in sessions for row in latency_rows(by_way(status.latencies))
-    ]
-    if latencies:
-        out.print()
-        out.print(table(latencies, "session", *LATENCY_COLUMNS))
+    latencies = [(s.session, *row) for s in sessions for row in latency_rows(by_way(s.latencies))]
+    tables = (
+        (_PARTICIPANT_COLUMNS, participants),
+        (_DEVICE_COLUMNS, [row for status in sessions for row in _device_rows(status)]),
+        (_PROFILE_COLUMNS, [row for session in found for row in _profile_rows(session)]),
+        (("session", *LATENCY_COLUMNS), latencies),
+    )
+    show_tables((columns, rows) for columns, rows in tables if rows)
 
 
 class _Found(NamedTuple):

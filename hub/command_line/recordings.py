@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from hub.command_line.display import RunProgress, console, show
+from hub.command_line.display import RunProgress, console, results, show
 from hub.command_line.options import Directory, Json, Listen, RecordingPath, Trust
 from hub.planning.limits import safe_text
 from hub.recording.bag import default_output
@@ -76,4 +76,4 @@ def report(recording: RecordingPath, *, output: Output = None) -> None:
     name = recording.stem if recording.is_file() else recording.name
     page = output or default_output(recording.with_name(f"{name}.html"))
     write(Recording(recording), page)
-    console.print(f"wrote {safe_text(str(page))}", markup=False, soft_wrap=True)
+    results.print(f"wrote {safe_text(str(page))}", markup=False, soft_wrap=True)

@@ -8,29 +8,20 @@ from typing import Annotated, Literal
 
 import typer
 
-from hub.command_line.display import RunProgress, console, show
+from hub.command_line.display import RunProgress, console
 from hub.command_line.open_page import page_of_this_process
 from hub.command_line.options import Certificates, Json, Overrides, ScenarioName, with_places
+from hub.command_line.record_option import Overwrite, RecordTo, recording_directory
+from hub.command_line.run_summary import show_summary
+from hub.command_line.scenarios import print_scenarios
 from hub.observation.summary import Summary
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
 from hub.transport.loopback_port import listening_ports
 
-__all__ = ["Listening", "OneHost", "RecordTo", "require_complete", "run"]
+__all__ = ["Everything", "Listening", "OneHost", "require_complete", "run"]
 
 
-def _check_new(directory: Path | None) -> Path | None:
-    if directory is None or not directory.exists() or (directory.is_dir() and not any(directory.iterdir())):
-        return directory
-    raise typer.BadParameter(f"'{directory}' exists already; name a new directory.")
-
-
-RecordTo = Annotated[
-    Path | None,
-    typer.Option(
-        "--record", metavar="DIR", callback=_check_new, help="Record to a new directory, a rosbag2 bag."
-    ),
-]
 Listening = Annotated[
     list[str] | None,
     typer.Option(
@@ -41,6 +32,9 @@ Listening = Annotated[
             " May be repeated."
         ),
     ),
+]
+Everything = Annotated[
+    bool, typer.Option("--all", help="Also show latencies, steps, energy, and scores without a value.")
 ]
 OneHost = Annotated[bool, typer.Option("--one-host", help="Run every participant in the hub's process.")]
 
@@ -53,9 +47,10 @@ def require_complete(summary: Summary) -> None:
 
 
 def run(
-    scenario: ScenarioName,
+    scenario: ScenarioName = "",
     *,
     record: RecordTo = None,
+    overwrite: Overwrite = False,
     overrides: Overrides = None,
     pace: Annotated[
         Literal["fast", "realtime"] | None, typer.Option(help="Replace the pace of the scenario.")
@@ -69,9 +64,15 @@ def run(
     open_page: Annotated[
         bool, typer.Option("--open", help="Show the session on a page in the browser, as `trocar view` does.")
     ] = False,
+    everything: Everything = False,
     as_json: Json = False,
 ) -> None:
-    """Run a scenario, and show a summary."""
+    """Run a scenario, and show a summary; without a name, list the scenarios."""
+    if not scenario:
+        print_scenarios()
+        return
+    name = Path(scenario).stem
+    directory = recording_directory(record, name, overwrite=overwrite)
     file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())])
     inside, outside = listening_ports(listen or ())
     with with_places(file.source):
@@ -80,7 +81,7 @@ def run(
             endpoint=inside,
             outside=outside,
             certificates=certs,
-            record=record,
+            record=directory,
             one_host=one_host,
             profile=profile,
         )
@@ -89,5 +90,5 @@ def run(
             RunProgress(session.scenario) as progress,
         ):
             summary = session.run(progress)
-    show(summary.as_dict(), as_json=as_json)
+    show_summary(name, summary, again=f"trocar run {scenario}", everything=everything, as_json=as_json)
     require_complete(summary)

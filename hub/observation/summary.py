@@ -69,7 +69,13 @@ class Summary:
     """
     observers: dict[str, Observed] = field(default_factory=dict[str, Observed])
     """The participants that looked on in their own time, by name."""
+    outcome: str = ""
+    """What was done, as scenario or task state the result; empty if neither does."""
+    succeeded: bool | None = None
+    """Whether scenario or task count the run as a success; None if neither has conditions."""
     measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
+    units: dict[str, str] = field(default_factory=dict[str, str])
+    """Unit of each measure with a unit."""
     scores: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]])
     """The last published score card by participant (`hub/recording/scores.py`)."""
     ending: str | None = None

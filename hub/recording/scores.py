@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from hub.observation.readable import readable
 from schemas.trocar_msgs import ScoreCard, ScoreValue
 
 __all__ = ["score_numbers", "score_tables"]
@@ -38,8 +39,11 @@ def _by_name(values: Iterable[ScoreValue]) -> dict[str, dict[str, Any]]:
     }
 
 
-def score_tables(name: str, numbers: Mapping[str, Any]) -> Iterator[_Table]:
-    """Yield the result of `score_numbers` as tables: metrics of the task `name`, scores, missing values."""
+def score_tables(name: str, numbers: Mapping[str, Any], *, everything: bool = True) -> Iterator[_Table]:
+    """Yield the result of `score_numbers` as tables: metrics of the task `name`, scores by rules.
+
+    `everything`: also yield the missing values with their reasons.
+    """
     groups = {"": numbers["metrics"], **numbers["rules"]}
     without: dict[str, list[str]] = {}
     for group, values in groups.items():
@@ -49,10 +53,10 @@ def score_tables(name: str, numbers: Mapping[str, Any]) -> Iterator[_Table]:
             if one["value"] is None:
                 without.setdefault(one["reason"], []).append(f"{group} {label}".lstrip())
             else:
-                rows.append((label, f"{one['value']:.6g} {one['unit']}".rstrip()))
+                rows.append((label, readable(one["value"], one["unit"])))
         if rows:
             yield (f"{name}, by {group}" if group else f"{name} ({numbers['task']})", "value"), rows
-    if without:
+    if without and everything:
         yield (
             ("no value, because", "of"),
             [(reason, ", ".join(names)) for reason, names in without.items()],

@@ -8,6 +8,7 @@ from time import monotonic_ns
 from hub.devices.session_devices import SessionDevices
 from hub.observation.latency import Histogram, by_way
 from hub.observation.monitor import Monitor
+from hub.observation.outcome import verdict
 from hub.observation.summary import Progress, Summary
 from hub.planning.plan import PlannedParticipant
 from hub.recording.profiles import profile_numbers
@@ -122,7 +123,10 @@ class Bookkeeping:
 
     def summary(self, recorded: RecorderSummary | None, profile: Profile | None) -> Summary:
         """Return the summary of the run."""
-        progress = self.progress()
+        progress, measures = self.progress(), self._monitor.measures.results()
+        cards = sorted(self._monitor.measures.score_cards.items())
+        scores = {name: score_numbers(card) for name, card in cards}
+        result = verdict(self._scenario, measures, scores)
         return Summary(
             session=self._scenario.name,
             state=self.phase,
@@ -138,10 +142,11 @@ class Bookkeeping:
             energy_residual_j=self._monitor.energy.residual_j,
             latency=by_way(self._latencies),
             observers=self._observer_reports.observed_states(),
-            measures=self._monitor.measures.results(),
-            scores={
-                name: score_numbers(card) for name, card in sorted(self._monitor.measures.score_cards.items())
-            },
+            outcome=result.text,
+            succeeded=result.succeeded,
+            measures=measures,
+            units={name: one.si_unit for name, one in self._scenario.measure.items() if one.si_unit},
+            scores=scores,
             ending=self.detail or None,
             profile=None if profile is None else profile_numbers(profile),
         )

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from hub.command_line import main
 from hub.command_line.display import latency_rows
 from hub.planning.scenario_file import installed_scenarios
 from tests.hub.authorities import free_endpoint
@@ -41,25 +40,12 @@ def wait_for(look: Callable[[], Any]) -> Any:
     raise TimeoutError("nothing came")
 
 
-@pytest.fixture
-def trocar(monkeypatch, capsys):
-    """Run `trocar ...` and return exit code, stdout and stderr."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["trocar", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-        out, err = capsys.readouterr()
-        return left.value.code or 0, out, err
-
-    return run
-
-
 def test_version_and_help(trocar):
     assert trocar("--version") == (0, version("trocar") + "\n", "")
     code, out, _ = trocar("--help")
     assert code == 0
     assert "0 done" in out
+    assert "trocar list" in trocar()[1]
 
 
 def test_bad_usage_is_exit_code_2(trocar):
@@ -91,11 +77,11 @@ def test_check_shows_the_wiring_of_a_good_scenario(trocar, pendulum, tmp_path):
     assert code == 0
     assert {(link["source"], link["target"]) for link in json.loads(out)["connections"]} == {("one", "two")}
     code, out, err = trocar("check", file, "--set", "step=2 ms")
-    assert (code, out) == (0, "")
-    assert "valid" in err
-    assert " 1 input, 1 of them from one" in err
-    assert "<- goal" not in err
-    assert "<- goal" in trocar("check", file, "--ports")[2]
+    assert (code, err) == (0, "")
+    assert "valid" in out
+    assert " 1 input, 1 of them from one" in out
+    assert "<- goal" not in out
+    assert "<- goal" in trocar("check", file, "--ports")[1]
 
 
 def test_every_installed_scenario_is_valid(trocar):
@@ -138,7 +124,10 @@ def test_doctor_as_json(trocar):
         "ROS 2",
     } <= set(found)
     assert all(finding["works"] or finding["remedy"] for finding in found.values())
-    assert "works" in trocar("doctor")[1]
+    shown, everything = trocar("doctor")[1], trocar("doctor", "--all")[1]
+    assert f"runs all {len(installed_scenarios())} scenarios" in shown
+    assert "works" not in shown
+    assert len(everything.splitlines()) > len(found) > len(shown.splitlines())
 
 
 def test_ls_where_no_hub_is(trocar):
@@ -175,12 +164,16 @@ def test_run_prints_its_summary_as_json_on_stdout_alone(trocar, swinging, tmp_pa
     assert {"same": True, "steps": 20, "hashes": 40}.items() <= json.loads(out).items()
 
 
-def test_run_shows_people_a_summary_on_stderr(trocar, swinging):
-    code, out, err = trocar("run", swinging, "--pace", "realtime")
-    assert (code, out) == (0, "")
-    assert {"sim time 0.02 s", "steps 20", "state done"} <= {
-        " ".join(line.split()) for line in err.splitlines()
-    }
+def test_run_shows_people_a_summary_on_stdout(trocar, swinging):
+    code, out, _ = trocar("run", swinging, "--pace", "realtime")
+    assert code == 0
+    first, second = out.splitlines()[:2]
+    assert first == "session done"
+    assert second.startswith("0.02 s simulated in ")
+    assert "grant to state" not in out
+    everything = trocar("run", swinging, "--all")[1]
+    assert {"steps 20", "late steps 0"} <= {" ".join(line.split()) for line in everything.splitlines()}
+    assert "grant to state" not in everything, "no device takes part"
 
 
 def test_a_failing_participant_is_exit_code_1_and_a_clean_message(trocar, swinging):
@@ -197,7 +190,7 @@ def test_run_with_a_profile_shows_where_the_time_goes(trocar, swinging):
     assert profile["step"]["hub"]["participant two"]["wall_s"] > 0.0
     assert (profile["late_causes"], profile["worst_steps"]) == ({}, [])
     assert json.loads(trocar("run", swinging, "--json")[1])["profile"] is None
-    _, _, text = trocar("run", swinging, "--profile")
+    text = trocar("run", swinging, "--profile")[1]
     assert "core-seconds per simulated second" in text
     assert "participant two" in text
     assert "late because of" not in text

@@ -64,8 +64,8 @@ def test_every_problem_is_one_line_with_its_place(problems):
         "12:5: connections.0: 'one.angle => two.goal' is no 'participant.port -> participant.port'",
         (
             "3:1: stepp: there is no 'stepp' here. Did you mean 'step'? Known: algorithm, answer_limit,"
-            " bonds, connections, description, duration, join_limit, measure, name, order, pace,"
-            " participants, scene, step, window."
+            " bonds, connections, description, duration, join_limit, measure, name, order, outcome,"
+            " pace, participants, scene, step, window."
         ),
         (
             "9:13: participants.two.length: '5 kg' is not a quantity in m (Cannot convert from 'kilogram'"

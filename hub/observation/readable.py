@@ -1,0 +1,29 @@
+"""Numbers as people read them: four digits, a unit with a fitting prefix."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+__all__ = ["label", "readable"]
+
+_SMALLER = {"m": (1e3, "mm"), "m^2": (1e6, "mm²"), "m/s": (1e3, "mm/s"), "N": (1e3, "mN"), "J": (1e3, "mJ")}
+"""Factor and name of the unit for values below a limit, by SI unit."""
+_LIMIT = {"m": 1.0, "m^2": 1e-2, "m/s": 1.0, "N": 0.1, "J": 0.1}
+"""Smallest values shown in the SI unit itself."""
+
+
+def readable(value: float, unit: str = "") -> str:
+    """Return a value in an SI unit as text: 0.02528 and `m` give `25.28 mm`."""
+    if not isfinite(value):
+        return f"{value} {unit}".rstrip()
+    if unit in _SMALLER and 0.0 < abs(value) < _LIMIT[unit]:
+        factor, unit = _SMALLER[unit]
+        value *= factor
+    digits = f"{value:.0f}" if value == round(value) or 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
+    return f"{digits} {unit}".rstrip()
+
+
+def label(name: str, unit: str) -> str:
+    """Return the name of a measure as text, without its unit: `lift_m` and `m` give `lift`."""
+    short = name.removesuffix(f"_{unit.lower()}") if unit else name
+    return short.replace("_", " ")

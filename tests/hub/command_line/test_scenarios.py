@@ -1,0 +1,72 @@
+"""The way to a first run: scenarios listed, copied, recorded under a name of their own or over an old one."""
+
+from itertools import chain
+
+import pytest
+
+from configs import FAMILIES
+from hub.planning.scenario_file import installed_scenarios, load
+from hub.recording.recording import Recording
+
+SCENARIO = "step: 1 ms\nduration: 3 ms\nparticipants:\n  robot: {kind: mujoco, arms: {PSM1: {}}}\n"
+
+
+@pytest.fixture
+def here(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.yaml").write_text(f"name: short\n{SCENARIO}")
+    return tmp_path
+
+
+def test_every_installed_scenario_is_in_one_family():
+    assert sorted(chain.from_iterable(FAMILIES.values())) == sorted(installed_scenarios())
+
+
+def test_they_are_listed_a_line_each(trocar):
+    code, out, err = trocar("list")
+    assert (code, err) == (0, "")
+    lines = {line.split()[0]: line for line in out.splitlines() if line.startswith("  ")}
+    assert lines.keys() == installed_scenarios().keys()
+    assert "8 s" in lines["colon-grasp"]
+    assert "routine" in lines["colon-grasp"]
+    assert "until Ctrl-C" in lines["ros"]
+    assert trocar("run")[1] == out, "also where a name is missing"
+
+
+@pytest.mark.parametrize("name", ["palpation", "palpation-by-hand", "ros-mirror", "retraction"])
+def test_a_copy_of_a_scenario_is_complete(trocar, here, name):
+    code, out, _ = trocar("new", "my-own", "--from", name)
+    assert code == 0
+    assert "trocar run my-own/my-own.yaml" in out
+    copy, original = load("my-own/my-own.yaml"), load(name)
+    assert copy.scenario.model_copy(update={"name": original.scenario.name}) == original.scenario
+    assert copy.scenario.name == "my_own"
+    assert (here / "my-own" / "scenario.schema.json").is_file()
+
+
+@pytest.mark.parametrize("name", ["1st", "short.yaml", "a b"])
+def test_a_copy_over_something_or_without_a_name_is_refused(trocar, here, name):
+    code, out, err = trocar("new", name)
+    assert (code, out) == (2, "")
+    assert "exists already" in err or "is no name" in " ".join(err.replace("│", " ").split())
+    assert [entry.name for entry in here.iterdir()] == ["short.yaml"]
+
+
+def test_recordings_without_a_name_have_the_date(trocar, here):
+    for options in (["--record"], ["--record", "--one-host"]):
+        code, out, err = trocar("run", "short.yaml", *options)
+        assert code == 0, err
+        assert "trocar view recordings/short-" in out
+    for found in (here / "recordings").iterdir():
+        assert Recording(found).scenario().name == "short"
+
+
+def test_a_recording_is_overwritten_on_demand_alone(trocar, here):
+    assert trocar("run", "short.yaml", "--record", "one")[0] == 0
+    code, _, err = trocar("run", "short.yaml", "--record", "one")
+    assert (code, "add --overwrite" in " ".join(err.replace("│", " ").split())) == (2, True)
+    assert trocar("run", "short.yaml", "--record", "one", "--overwrite")[0] == 0
+    (here / "one" / "notes.txt").write_text("mine")
+    code, _, err = trocar("run", "short.yaml", "--record", "one", "--overwrite")
+    assert (code, "something else than a recording" in " ".join(err.replace("│", " ").split())) == (2, True)
+    assert (here / "one" / "notes.txt").read_text() == "mine"
