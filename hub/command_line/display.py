@@ -14,9 +14,9 @@ from rich.progress import Progress as Bar
 from rich.table import Table
 from rich.text import Text
 
-from hub.observation.readable import label, readable
 from hub.observation.summary import Progress
 from hub.planning.limits import safe_text
+from schemas.readable import label, readable
 from schemas.scenario import Scenario
 
 __all__ = [

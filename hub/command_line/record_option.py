@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from datetime import datetime
+from itertools import chain, count
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -53,8 +54,7 @@ def recording_directory(given: Path | None, name: str, *, overwrite: bool) -> Pa
     if given is None:
         return None
     if str(given) == _UNNAMED:
-        at = datetime.now().astimezone()
-        return Path("recordings") / f"{name}-{at:%Y%m%d-%H%M%S}"
+        return _dated_directory(name)
     if not given.exists() or (given.is_dir() and not any(given.iterdir())):
         return given
     if not overwrite:
@@ -65,6 +65,13 @@ def recording_directory(given: Path | None, name: str, *, overwrite: bool) -> Pa
         raise typer.BadParameter(f"'{given}' holds something else than a recording; delete it yourself")
     shutil.rmtree(given)
     return given
+
+
+def _dated_directory(name: str) -> Path:
+    """Return a new directory named after scenario, date and time, and a number from the second on."""
+    first = Path("recordings") / f"{name}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
+    later = (first.with_name(f"{first.name}-{number}") for number in count(2))
+    return next(path for path in chain([first], later) if not path.exists())
 
 
 def _holds_a_recording_only(directory: Path) -> bool:

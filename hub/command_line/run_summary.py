@@ -10,11 +10,11 @@ import typer
 from rich.markup import escape
 
 from hub.command_line.display import LATENCY_COLUMNS, latency_rows, results, show_commands, show_tables, table
-from hub.observation.readable import label, readable
 from hub.observation.summary import Summary
 from hub.planning.limits import safe_text
 from hub.recording.profiles import profile_tables
 from hub.recording.scores import score_tables
+from schemas.readable import label, readable
 
 __all__ = ["show_summary"]
 
@@ -54,11 +54,11 @@ def show_summary(name: str, summary: Summary, *, again: str = "", everything: bo
 def _sentence(name: str, summary: Summary) -> str:
     """Return what was done and whether it succeeded, with markup."""
     title = f"[bold]{escape(safe_text(name))}[/]"
-    if summary.state != "done" or summary.ending:
-        reason = escape(safe_text(summary.ending or "", 1000))
-        return f"{title}: [yellow]{escape(summary.state)}[/]{f', {reason}' if reason else ''}"
+    ending = escape(safe_text(summary.ending or "", 1000))
+    if summary.state != "done":
+        return f"{title} [yellow]{escape(summary.state)}[/]{f': {ending}' if ending else ''}"
     verdict = {True: "[green]succeeded[/]", False: "[yellow]did not succeed[/]", None: "[green]done[/]"}
-    text = escape(safe_text(summary.outcome, 1000))
+    text = "; ".join(filter(None, (escape(safe_text(summary.outcome, 1000)), ending)))
     return f"{title} {verdict[summary.succeeded]}{f': {text}' if text else ''}"
 
 

@@ -12,10 +12,9 @@ import typer
 from rich.markup import escape
 from rich.text import Text
 
-from configs import FAMILIES
 from hub.command_line.display import results, show_commands
 from hub.planning import registry
-from hub.planning.scenario_file import ScenarioFile, installed_scenarios, load
+from hub.planning.scenario_file import ScenarioFile, installed_scenarios, load, scenario_families
 from hub.planning.scenario_source import Source, read
 from hub.recording.file_hashes import file_hashes
 from schemas.errors import ScenarioError
@@ -34,7 +33,7 @@ def list_scenarios() -> None:
 def print_scenarios() -> None:
     """Print the installed scenarios by family, and what to do with one."""
     installed = installed_scenarios()
-    for family, names in FAMILIES.items():
+    for family, names in scenario_families().items():
         results.print(f"[bold]{escape(family)}[/]")
         for name in names:
             what, leads, long = _columns(read(installed[name]))

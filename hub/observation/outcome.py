@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from hub.observation.readable import readable
+from schemas.readable import readable
 from schemas.scenario import Outcome, Scenario
 
 __all__ = ["Verdict", "verdict"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -25,7 +26,14 @@ from schemas.errors import ScenarioError, did_you_mean
 from schemas.files import Files
 from schemas.scenario import ParticipantSpec, Scenario
 
-__all__ = ["ScenarioFile", "installed_scenarios", "load", "locate_error", "validate_source"]
+__all__ = [
+    "ScenarioFile",
+    "installed_scenarios",
+    "load",
+    "locate_error",
+    "scenario_families",
+    "validate_source",
+]
 
 log = logging.getLogger(__name__)
 
@@ -42,6 +50,11 @@ class ScenarioFile:
 def installed_scenarios() -> dict[str, Path]:
     """Return the scenarios of the Trocar package, by name."""
     return {file.stem: file for file in sorted(Path(str(files("configs"))).glob("*.yaml"))}
+
+
+def scenario_families() -> dict[str, list[str]]:
+    """Return the names of the installed scenarios by subject, in the order of a first look."""
+    return tomllib.loads((files("configs") / "families.toml").read_text("utf-8"))
 
 
 def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:

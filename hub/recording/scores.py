@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from hub.observation.readable import readable
+from schemas.readable import readable
 from schemas.trocar_msgs import ScoreCard, ScoreValue
 
 __all__ = ["score_numbers", "score_tables"]

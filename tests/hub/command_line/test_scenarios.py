@@ -4,8 +4,7 @@ from itertools import chain
 
 import pytest
 
-from configs import FAMILIES
-from hub.planning.scenario_file import installed_scenarios, load
+from hub.planning.scenario_file import installed_scenarios, load, scenario_families
 from hub.recording.recording import Recording
 
 SCENARIO = "step: 1 ms\nduration: 3 ms\nparticipants:\n  robot: {kind: mujoco, arms: {PSM1: {}}}\n"
@@ -19,7 +18,7 @@ def here(monkeypatch, tmp_path):
 
 
 def test_every_installed_scenario_is_in_one_family():
-    assert sorted(chain.from_iterable(FAMILIES.values())) == sorted(installed_scenarios())
+    assert sorted(chain.from_iterable(scenario_families().values())) == sorted(installed_scenarios())
 
 
 def test_they_are_listed_a_line_each(trocar):

@@ -4,7 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from hub.observation.outcome import verdict
-from hub.observation.readable import label, readable
+from schemas.readable import label, readable
 from schemas.scenario import Scenario
 
 SCENARIO = {

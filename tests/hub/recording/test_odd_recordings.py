@@ -6,6 +6,7 @@ import json
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -105,7 +106,7 @@ def test_a_line_of_the_log_is_no_command_to_the_terminal(capfd: pytest.CaptureFi
     root, before = logging.getLogger(), logging.getLogger().handlers[:]
     root.handlers.clear()
     try:
-        command_line(debug=False)
+        command_line(SimpleNamespace(invoked_subcommand="run"), debug=False)
         logging.getLogger("hub.recording").warning("file '%s'", "\x1b]0;title\x07")
     finally:
         root.handlers[:] = before

@@ -348,7 +348,7 @@ def test_nothing_in_a_recording_is_a_command_to_the_terminal(
     assert "\x1b" not in err
     assert "title" in err
     show({"name": "[/]\x1b[2J"}, as_json=False)
-    assert "[/]\\x1b[2J" in capfd.readouterr().err
+    assert "[/]\\x1b[2J" in capfd.readouterr().out
 
 
 @pytest.mark.parametrize(("command", "suffix"), [("report", ".html"), ("recover", "-recovered")])

@@ -14,6 +14,7 @@ from schemas.codec import message_type
 from tests.devices.ros.crtk_table import WHOLE, exercise
 from tests.devices.ros.zenoh.test_gateway import EVENT, STATE, router, showing
 from tests.devices.ros.zenoh.zenoh_peer import CRTK, TYPES, built, flat
+from tests.waiting import until
 
 sdk = pytest.importorskip("zenoh_ros2_sdk", reason="needs zenoh-ros2-sdk: pip install 'trocar[test]'")
 
@@ -96,12 +97,18 @@ def vars_of(message):
     return {name: value for name, value in vars(message).items() if not name.startswith("__")}
 
 
+def published(gateway):
+    """Return the Zenoh publishers of the gateway."""
+    return [one for one in gateway._transport._entities if hasattr(one, "matching_status")]
+
+
 def test_the_table_through_a_client_of_others(tmp_path, caplog):
     caplog.set_level(logging.ERROR, "zenoh_ros2_sdk")
     with router() as hub, showing(hub, tmp_path, **WHOLE) as gateway, ExitStack() as stack:
         where = stack.enter_context(connected(hub, tmp_path / "messages"))
         peer = SdkPeer(where, stack)
         peer.join(gateway.rows)
+        until(lambda: all(one.matching_status.matching for one in published(gateway)))
         exercise(gateway, peer)
         (client,) = gateway._transport.clients()
         assert client.address == str(sdk.ZenohSession.get_instance().session.zid())
