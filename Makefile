@@ -2,9 +2,9 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 RECORDING := recordings/palpation-$(shell date +%Y%m%d-%H%M%S)
-# Tests by what they need: markers in pyproject.toml. Three processes on two cores, as a third of the time they wait.
+# Tests by what they need: markers in pyproject.toml. Four processes on two cores, as they wait a third of the time.
 NEEDS := ros or browser or release or search
-PYTEST := pytest -n 3 --dist loadgroup
+PYTEST := pytest -n 4 --dist loadgroup
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
 .PHONY: demo test test-all check docs format clean
