@@ -171,13 +171,14 @@ def connected(ends, seconds=60.0):
     no answer. The limit counts naps: a machine that stood still has not waited.
     """
     for _ in range(round(seconds / 0.01)):
-        missing = [
-            end.name for end in ends if not any(each.remote_endpoint[1] for each in end.impl.connections)
-        ]
-        if not missing:
+        if not alone(ends):
             break
         time.sleep(0.01)
-    return missing
+    return alone(ends)
+
+
+def alone(ends):
+    return [end.name for end in ends if not any(each.remote_endpoint[1] for each in end.impl.connections)]
 
 
 class Arm:
