@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,23 @@ CODEC, PIXEL_FORMAT = "av1", "yuv420p"
 _ENCODER = "libsvtav1"
 _OPTIONS = {"crf": "30", "g": "2", "preset": "12"}
 """Options of LeRobot's own encoding: a sought frame is at most a frame after a key frame."""
+
+
+@contextmanager
+def _kept_scheduling() -> Generator[None]:
+    """Keep the scheduling policy of this thread.
+
+    As root, SVT-AV1 (seen with PyAV 18) raises the caller to SCHED_FIFO with priority 99, above
+    everything on the machine, and so every process started afterwards.
+    """
+    if not hasattr(os, "sched_getscheduler"):
+        yield
+        return
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, *before)
 
 
 class Video:
@@ -37,6 +55,8 @@ class Video:
         self._stream: Any = self._container.add_stream(_ENCODER, rate=fps, options=_OPTIONS)
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = PIXEL_FORMAT
+        with _kept_scheduling():
+            self._stream.codec_context.open()
 
     def add(self, picture: NDArray[np.uint8]) -> None:
         """Append a picture, shape (height, width, 3), RGB."""

@@ -21,6 +21,7 @@ import trocar
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.recorded_scene import RecordedScene
 from learning.datasets.command_line import app
+from learning.datasets.video import Video
 from learning.datasets.writer import Writer
 from learning.own_directory import claim_directory
 from robots.dvrk import arm_bodies, ecm
@@ -231,6 +232,18 @@ def test_bad_words(recordings: Path, tmp_path: Path, words: tuple[str, ...], say
     assert done.exit_code != 0
     assert says in " ".join(done.output.replace("│", " ").split())
     assert not (tmp_path / "set").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getscheduler"), reason="no scheduling policies here")
+def test_the_encoder_does_not_raise_the_priority_of_its_caller(tmp_path: Path) -> None:
+    """SVT-AV1 does, as root: to real time, above everything on the machine."""
+    before = os.sched_getscheduler(0)
+    video = Video(tmp_path / "black.mp4", (64, 64), 30)
+    for _ in range(3):
+        video.add(np.zeros((64, 64, 3), np.uint8))
+        assert os.sched_getscheduler(0) == before
+    video.close()
+    assert os.sched_getscheduler(0) == before
 
 
 def test_a_directory_that_is_in_use_is_left_alone(recordings: Path, tmp_path: Path) -> None:
