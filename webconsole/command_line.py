@@ -53,6 +53,7 @@ def view(
     foxglove: Annotated[
         bool, typer.Option("--foxglove", help="Let Foxglove look at the running session too, read-only.")
     ] = False,
+    one_session: Annotated[bool, typer.Option("--one-session", hidden=True)] = False,
     with_parent: Annotated[int | None, typer.Option(hidden=True)] = None,
 ) -> None:
     """Show a running session or a recording on a page in the browser.
@@ -84,5 +85,6 @@ def view(
         browse=open_,
         foxglove=foxglove,
         role="viewer" if read_only else "operator",
+        one_session=one_session,
         parent=with_parent,
     )

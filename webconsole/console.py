@@ -65,6 +65,11 @@ class Console:
                 await asyncio.to_thread(self.drawable)
             return self._stage
 
+    def show(self, source: Recorded) -> None:
+        """Show a recording from now on; the pages of the session before load again."""
+        self.source, self._stage, self._generation = source, None, -1
+        self.pilots.keep([])
+
     def want(self, page: object, names: frozenset[str] | None) -> None:
         """Receive the outlets shown by a page; None: the page has gone."""
         if names is None:

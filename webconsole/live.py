@@ -104,6 +104,8 @@ class Live:
         self._subscribers: dict[str, zenoh.Subscriber[None]] = {}
         self._lock = threading.RLock()
         self._gone, self._ending = threading.Event(), threading.Event()
+        self.is_over = False
+        """Whether the hub of a session shown has ended."""
         self._thread = threading.Thread(target=self._serve, name="live", daemon=True)
 
     def start(self) -> None:
@@ -386,6 +388,7 @@ class Live:
 
     def _take_life(self, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.DELETE:
+            self.is_over = True
             self._gone.set()
 
     def _note_entry(self, entry: Entry) -> None:

@@ -46,6 +46,8 @@ log = logging.getLogger(__name__)
 
 _FRAME_S = 1.0 / 60.0
 _STATE_S = 0.25
+_RESTART = 1012
+"""Close code "service restart" (RFC 6455 and its registry): the page is to load again."""
 _MOST_WAITING = 2
 """Unacknowledged frames of a page; with so many, newer values replace the values not yet sent."""
 _MOST_PROBLEMS = 50
@@ -211,6 +213,9 @@ class Page:
         """Send the state of the page's head and the log, a few times a second."""
         source = self._console.source
         while True:
+            if self._console.source is not source:
+                await self._socket.close(_RESTART, "the session has ended; its recording is shown")
+                return
             if source.generation != self._generation:
                 await self._begin()
             card, problem = self._score_card()

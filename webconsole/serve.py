@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-import logging
 import signal
 import webbrowser
 from contextlib import ExitStack
 from importlib.resources import files
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import TYPE_CHECKING
 
 from hub.command_line.display import console as terminal
 from hub.hosting.end_with_parent import end_with_parent
 from hub.hosting.interrupt import Interrupt
-from hub.recording.recover import recover
-from schemas.errors import CutShortError
+from webconsole.afterlife import Afterlife
 from webconsole.console import Console
 from webconsole.gate import Role
 from webconsole.hosted import HostedDevices
 from webconsole.listening import Listening, fingerprint, on_loopback, with_tls
 from webconsole.live import Live
+from webconsole.open_recording import open_recording
 from webconsole.pilot import Pilots
-from webconsole.recorded import Recorded
 from webconsole.server import Server
 
-__all__ = ["open_recording", "serve"]
+__all__ = ["serve"]
 
 if TYPE_CHECKING:
     from webconsole.foxglove.face import Face
-
-log = logging.getLogger(__name__)
 
 _FOXGLOVE = "/foxglove"
 """Path of Foxglove's WebSocket."""
@@ -49,6 +44,7 @@ def serve(
     browse: bool = True,
     foxglove: bool = False,
     role: Role = "operator",
+    one_session: bool = False,
     parent: int | None = None,
 ) -> None:
     """Serve the page of a recording, or of a running session, until Ctrl-C, SIGTERM or the terminal's end.
@@ -64,6 +60,7 @@ def serve(
         browse: Open the page in a browser.
         foxglove: Let Foxglove look too, by a separate link.
         role: Role of the holder of the printed link.
+        one_session: Show the first session only, then its recording until the last page has gone.
         parent: The process of the hub; this process ends with the hub.
 
     Raises RecordingError if there is no such recording, ConnectError if no port is free or a certificate is
@@ -81,33 +78,29 @@ def serve(
             source = Live(endpoint, session, parent)
         else:
             source = open_recording(recording, stack, trust=trust)
-        _serve(source, listening, role, browse=browse, foxglove=foxglove)
+        console = Console(source, Pilots())
+        afterlife = Afterlife(console, stack) if one_session else None
+        _serve(console, listening, role, afterlife, browse=browse, foxglove=foxglove)
 
 
 def _terminate(_number: int, _frame: FrameType | None) -> None:
     signal.raise_signal(signal.SIGTERM)
 
 
-def open_recording(recording: Path, stack: ExitStack, *, trust: bool = False) -> Recorded:
-    """Return a recording, open as long as `stack`; of a truncated recording, the whole part."""
-    try:
-        return Recorded(recording, trust=trust)
-    except CutShortError:
-        whole = Path(stack.enter_context(TemporaryDirectory()), recording.stem)
-        saved = recover(recording, whole)
-        log.warning("'%s' was cut short: it is shown up to %g s", recording, saved.end_ns / 1e9)
-        return Recorded(whole, trust=trust)
-
-
 def _serve(
-    source: Live | Recorded, listening: Listening, role: Role, *, browse: bool, foxglove: bool
+    console: Console,
+    listening: Listening,
+    role: Role,
+    afterlife: Afterlife | None,
+    *,
+    browse: bool,
+    foxglove: bool,
 ) -> None:
-    pilots = Pilots()
-    console = Console(source, pilots)
+    source = console.source
     face = _foxglove_door(console) if foxglove else None
-    server = Server(console, listening, {} if face is None else {_FOXGLOVE: face.relay})
+    server = Server(console, listening, {} if face is None else {_FOXGLOVE: face.relay}, afterlife)
     link = f"{listening.origins[0]}{server.gate.invite(role)}"
-    hosted = HostedDevices(pilots)
+    hosted = HostedDevices(console.pilots)
     if isinstance(source, Live):
 
         def join() -> None:

@@ -19,6 +19,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from hub.planning.scenario_file import installed_scenarios
 from hub.recording.recording import Recording
 from schemas.errors import MessageError, TrocarError
+from webconsole.afterlife import Afterlife
 from webconsole.assets import asset, compress_all, gzip_response
 from webconsole.commands import MOST_BYTES
 from webconsole.console import Console
@@ -53,6 +54,7 @@ class Server:
         console: Contents of the pages.
         listening: Where.
         others: Servers of programs, by the path of a WebSocket.
+        afterlife: What follows the end of the only session; None: pages wait for another session.
     """
 
     def __init__(
@@ -60,8 +62,9 @@ class Server:
         console: Console,
         listening: Listening,
         others: Mapping[str, Callable[[WebSocket], Awaitable[None]]] | None = None,
+        afterlife: Afterlife | None = None,
     ) -> None:
-        self._console, self._socket = console, listening.socket
+        self._console, self._socket, self._afterlife = console, listening.socket, afterlife
         self.port = listening.port
         self._pages: Counter[Role] = Counter()
         app = Starlette(
@@ -125,11 +128,14 @@ class Server:
                 await self._console.stage()
                 await asyncio.sleep(_AHEAD_S)
 
-        making = asyncio.create_task(make())
+        tasks = [asyncio.create_task(make())]
+        if self._afterlife is not None:
+            tasks.append(asyncio.create_task(self._afterlife.run(self._pages.total, self.stop)))
         try:
             yield
         finally:
-            making.cancel()
+            for task in tasks:
+                task.cancel()
 
     async def _page(self, websocket: WebSocket) -> None:
         role: Role = websocket.state.role

@@ -121,6 +121,10 @@ class StartedSession:
         self.end()
         _wait(self._hub)
         self._thread.join(_PATIENCE_S)
+        if self._viewer is not None:
+            self._viewer.terminate()
+            _wait(self._viewer)
+        self._ready.close()
 
     def _follow(self) -> None:
         """Open the session's page once the hub listens, and watch the session to the end."""
@@ -131,17 +135,15 @@ class StartedSession:
                 if hub is not None and client is None and is_listening(hub.endpoint):
                     with suppress(ConnectError, MessageError, zenoh.ZError):  # it has only begun to listen
                         client = stack.enter_context(reach(hub.endpoint, OBSERVER))
-                        self._viewer = self._ready.page.run(("view", "--connect", hub.endpoint, "--no-open"))
+                        self._viewer = self._ready.page.run(
+                            ("view", "--connect", hub.endpoint, "--no-open", "--one-session")
+                        )
                 if client is not None:
                     self._look(client)
                 sleep(_LOOK_S)
         if self._hub.returncode and not self._asked_to_end:
             said = self._ready.hub.read_output()[-_MOST_SAID:]
             self.error = said.partition("error: ")[2].strip() or said.strip() or "it ended without a word"
-        if self._viewer is not None:
-            self._viewer.terminate()
-            _wait(self._viewer)
-        self._ready.close()
 
     def _look(self, client: zenoh.Session) -> None:
         if not self.link and (found := _LINK.search(self._ready.page.read_output())):

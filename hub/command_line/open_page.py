@@ -8,20 +8,35 @@ import sys
 from collections.abc import Generator
 from contextlib import contextmanager
 
+from hub.command_line.display import console
 from hub.hosting.end_with_parent import NEEDS_INPUT
 
 __all__ = ["page_of_this_process"]
 
 _PATIENCE_S = 3.0
+_NOTICE_S = 1.0
 
 
 @contextmanager
 def page_of_this_process() -> Generator[None]:
-    """Serve the page of this process' session while the context lasts."""
-    command = [sys.executable, "-P", "-m", "trocar", "view", "--with-parent", str(os.getpid())]
+    """Serve the page of this process' session; at the end of the context, until the last page has gone.
+
+    The page goes with an error, and with Ctrl-C.
+    """
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "trocar",
+        "view",
+        "--one-session",
+        "--with-parent",
+        str(os.getpid()),
+    ]
     server = subprocess.Popen(command, stdin=subprocess.PIPE if NEEDS_INPUT else subprocess.DEVNULL)
     try:
         yield
+        _wait_for_last_page(server)
     finally:
         server.terminate()
         try:
@@ -29,3 +44,14 @@ def page_of_this_process() -> Generator[None]:
         except subprocess.TimeoutExpired:
             server.kill()
             server.wait()
+
+
+def _wait_for_last_page(server: subprocess.Popen[bytes]) -> None:
+    try:
+        try:
+            server.wait(_NOTICE_S)
+        except subprocess.TimeoutExpired:
+            console.print("the page stays until it has been closed for a minute; Ctrl-C ends it now")
+            server.wait()
+    except KeyboardInterrupt:
+        return

@@ -85,10 +85,10 @@ def run(
             one_host=one_host,
             profile=profile,
         )
-        with (
-            page_of_this_process() if open_page else nullcontext(),
-            RunProgress(session.scenario) as progress,
-        ):
-            summary = session.run(progress)
-    show_summary(name, summary, again=f"trocar run {scenario}", everything=everything, as_json=as_json)
+        with page_of_this_process() if open_page else nullcontext():
+            with RunProgress(session.scenario) as progress:
+                summary = session.run(progress)
+            show_summary(
+                name, summary, again=f"trocar run {scenario}", everything=everything, as_json=as_json
+            )
     require_complete(summary)

@@ -18,8 +18,8 @@ from tests.fuzz.recordings import Contents
 from tests.webconsole.conftest import finish, served
 from tests.webconsole.test_gate import Visitor
 from webconsole.frame import SectionKind, sections
+from webconsole.open_recording import open_recording
 from webconsole.recorded import Recorded
-from webconsole.serve import open_recording
 
 
 @asynccontextmanager

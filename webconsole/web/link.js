@@ -29,6 +29,8 @@ export function nodesOf(buffer, at, size) {
   return nodes
 }
 
+const RESTART = 1012
+
 export class Link {
   constructor(handlers) {
     this.handlers = handlers
@@ -49,7 +51,8 @@ export class Link {
       const message = JSON.parse(data)
       this.handlers[message.is]?.(message)
     }
-    this.socket.onclose = () => {
+    this.socket.onclose = ({ code }) => {
+      if (code === RESTART) return location.reload() // another source: a recording after its session
       this.handlers.closed()
       this.look()
       setTimeout(() => this.open(), 1000)
