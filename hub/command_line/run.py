@@ -39,6 +39,10 @@ Everything = Annotated[
 OneHost = Annotated[bool, typer.Option("--one-host", help="Run every participant in the hub's process.")]
 
 
+_PAGE_DEVICE = "browser"
+"""Kind of a device led from a page."""
+
+
 def require_complete(summary: Summary) -> None:
     """End with exit code 1 if a recording was asked for and is not complete."""
     if summary.recording_complete is False:
@@ -62,8 +66,12 @@ def run(
         bool, typer.Option("--profile", help="Show where the time goes: by participant, process and phase.")
     ] = False,
     open_page: Annotated[
-        bool, typer.Option("--open", help="Show the session on a page in the browser, as `trocar view` does.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--open/--no-open",
+            help="Show the session on a page in the browser; default: where a page leads a device.",
+        ),
+    ] = None,
     everything: Everything = False,
     as_json: Json = False,
 ) -> None:
@@ -85,7 +93,8 @@ def run(
             one_host=one_host,
             profile=profile,
         )
-        with page_of_this_process() if open_page else nullcontext():
+        led = any(spec.kind == _PAGE_DEVICE for spec in file.scenario.participants.values())
+        with page_of_this_process() if open_page or (led and open_page is None) else nullcontext():
             with RunProgress(session.scenario) as progress:
                 summary = session.run(progress)
             show_summary(
