@@ -46,8 +46,8 @@ log = logging.getLogger(__name__)
 
 _FRAME_S = 1.0 / 60.0
 _STATE_S = 0.25
-_RESTART = 1012
-"""Close code "service restart" (RFC 6455 and its registry): the page is to load again."""
+_OTHER_SOURCE = 4001
+"""Close code for a page that is to load again; RFC 6455 leaves 4000 to 4999 to applications."""
 _MOST_WAITING = 2
 """Unacknowledged frames of a page; with so many, newer values replace the values not yet sent."""
 _MOST_PROBLEMS = 50
@@ -214,7 +214,7 @@ class Page:
         source = self._console.source
         while True:
             if self._console.source is not source:
-                await self._socket.close(_RESTART, "the session has ended; its recording is shown")
+                await self._socket.close(_OTHER_SOURCE, "the session has ended; its recording is shown")
                 return
             if source.generation != self._generation:
                 await self._begin()

@@ -70,7 +70,7 @@ def test_the_page_shows_the_recording_and_goes_with_ctrl_c(tmp_path):
     async def body(page):
         async with page() as socket:
             assert (await told(socket, "session"))["kind"] == "live"
-            assert await closed(socket) == 1012
+            assert await closed(socket) == 4001
         async with page() as socket:
             described = await told(socket, "session")
             assert described["kind"] == "recording"

@@ -29,7 +29,7 @@ export function nodesOf(buffer, at, size) {
   return nodes
 }
 
-const RESTART = 1012
+const OTHER_SOURCE = 4001
 
 export class Link {
   constructor(handlers) {
@@ -52,7 +52,7 @@ export class Link {
       this.handlers[message.is]?.(message)
     }
     this.socket.onclose = ({ code }) => {
-      if (code === RESTART) return location.reload() // another source: a recording after its session
+      if (code === OTHER_SOURCE) return location.reload() // another source: a recording after its session
       this.handlers.closed()
       this.look()
       setTimeout(() => this.open(), 1000)
