@@ -75,10 +75,10 @@ def test_the_page_shows_the_recording_and_goes_with_ctrl_c(tmp_path):
             described = await told(socket, "session")
             assert described["kind"] == "recording"
             state = await told(socket, "state")
-            assert state["end"] == pytest.approx(2.0)
+            assert state["end"] == pytest.approx(8.0)
             return described
 
-    with running(tmp_path, "2 s", "--record", "one") as (run, said, page):
+    with running(tmp_path, "8 s", "--record", "one") as (run, said, page):
         finish(body(page))
         assert "short done" in said.read_text()
         until(lambda: "the page stays until it has been closed for a minute" in said.read_text())
@@ -96,7 +96,7 @@ def test_without_a_recording_the_last_values_stay(tmp_path):
                 state = await told(socket, "state")
             assert (await told(socket, "state"))["state"] == "away", state
 
-    with running(tmp_path, "2 s") as (run, said, page):
+    with running(tmp_path, "8 s") as (run, said, page):
         finish(body(page, said))
         run.send_signal(signal.SIGINT)
         assert run.wait(60) == 0
