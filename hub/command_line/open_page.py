@@ -14,7 +14,8 @@ from hub.hosting.end_with_parent import NEEDS_INPUT
 __all__ = ["page_of_this_process"]
 
 _PATIENCE_S = 3.0
-_NOTICE_S = 1.0
+_NOTICE_S = 2.0
+"""Time in which a server without a page ends, on a machine that is not busy."""
 
 
 @contextmanager
