@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from hub.command_line.display import RunProgress, results, table
 from hub.command_line.options import Certificates, Directory, Json, Overrides, RecordingPath, Trust
-from hub.command_line.record_option import Overwrite, RecordTo, recording_directory
+from hub.command_line.record_option import Overwrite, RecordTo, delete_earlier, recording_directory
 from hub.command_line.run import Everything, Listening, OneHost, require_complete
 from hub.command_line.run_summary import show_summary
 from hub.recording.family import recording_family
@@ -62,12 +62,15 @@ def fork(
     """
     from hub.fork import Fork
 
+    target = recording_directory(record, f"{_name_of(recording)}-fork", overwrite=overwrite)
+    if target is not None and recording.resolve().is_relative_to(target.resolve()):
+        raise typer.BadParameter(f"'{target}' is the recording to fork; record to another directory")
     inside, outside = listening_ports(listen or ())
     made = Fork(
         Recording(recording, unfinished=True),
         _parse_instant(at),
         [*(overrides or ()), *([f"pace={pace}"] if pace else ())],
-        record=recording_directory(record, f"{_name_of(recording)}-fork", overwrite=overwrite),
+        record=target,
         trust=trust,
         directory=directory,
         one_host=one_host,
@@ -75,6 +78,7 @@ def fork(
         outside=outside,
         certificates=certs,
     )
+    delete_earlier(target)
     with RunProgress(made.session.scenario) as progress:
         summary = made.run(progress)
     show_summary(f"fork of {_name_of(recording)}", summary, everything=everything, as_json=as_json)

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-__all__ = ["Overwrite", "RecordTo", "RecordingCommand", "recording_directory"]
+__all__ = ["Overwrite", "RecordTo", "RecordingCommand", "delete_earlier", "recording_directory"]
 
 _OPTION = "--record"
 _UNNAMED = "."
@@ -42,14 +42,14 @@ class RecordingCommand(TyperCommand):
 
 
 def recording_directory(given: Path | None, name: str, *, overwrite: bool) -> Path | None:
-    """Return the directory to record to, free of an earlier recording; None: no recording is asked for.
+    """Return the directory to record to; None: no recording is asked for.
 
     Args:
         given: value of `--record`.
         name: name of the scenario, for a recording without a name.
-        overwrite: whether an earlier recording is deleted.
+        overwrite: whether the directory may hold an earlier recording, for `delete_earlier`.
 
-    Raises typer.BadParameter for a directory that holds something.
+    Raises typer.BadParameter for a directory that holds something else.
     """
     if given is None:
         return None
@@ -63,8 +63,13 @@ def recording_directory(given: Path | None, name: str, *, overwrite: bool) -> Pa
         )
     if not given.is_dir() or given.is_symlink() or not _holds_a_recording_only(given):
         raise typer.BadParameter(f"'{given}' holds something else than a recording; delete it yourself")
-    shutil.rmtree(given)
     return given
+
+
+def delete_earlier(directory: Path | None) -> None:
+    """Delete the earlier recording in a `recording_directory`, just before the session records there."""
+    if directory is not None and directory.exists():
+        shutil.rmtree(directory)
 
 
 def _dated_directory(name: str) -> Path:

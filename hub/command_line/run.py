@@ -11,7 +11,7 @@ import typer
 from hub.command_line.display import RunProgress, console
 from hub.command_line.open_page import page_of_this_process
 from hub.command_line.options import Certificates, Json, Overrides, ScenarioName, with_places
-from hub.command_line.record_option import Overwrite, RecordTo, recording_directory
+from hub.command_line.record_option import Overwrite, RecordTo, delete_earlier, recording_directory
 from hub.command_line.run_summary import show_summary
 from hub.command_line.scenarios import print_scenarios
 from hub.observation.summary import Summary
@@ -93,6 +93,7 @@ def run(
             one_host=one_host,
             profile=profile,
         )
+        delete_earlier(directory)
         led = any(spec.kind == _PAGE_DEVICE for spec in file.scenario.participants.values())
         with page_of_this_process() if open_page or (led and open_page is None) else nullcontext():
             with RunProgress(session.scenario) as progress:

@@ -64,6 +64,10 @@ def test_a_recording_is_overwritten_on_demand_alone(trocar, here):
     assert trocar("run", "short.yaml", "--record", "one")[0] == 0
     code, _, err = trocar("run", "short.yaml", "--record", "one")
     assert (code, "add --overwrite" in " ".join(err.replace("│", " ").split())) == (2, True)
+    kept = (here / "one" / "one_0.mcap").read_bytes()
+    assert trocar("run", "shirt.yaml", "--record", "one", "--overwrite")[0] == 2
+    assert trocar("fork", "one", "--at", "1 ms", "--record", "one", "--overwrite")[0] == 2
+    assert (here / "one" / "one_0.mcap").read_bytes() == kept, "an error deletes nothing"
     assert trocar("run", "short.yaml", "--record", "one", "--overwrite")[0] == 0
     (here / "one" / "notes.txt").write_text("mine")
     code, _, err = trocar("run", "short.yaml", "--record", "one", "--overwrite")
