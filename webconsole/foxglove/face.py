@@ -113,13 +113,10 @@ class Face:
                 address, ssl=self._trust, subprotocols=offered, compression=None, max_size=None, proxy=None
             ) as inside:
                 await websocket.accept(subprotocol=inside.subprotocol)
-                ways = [
-                    asyncio.create_task(way) for way in (_in(websocket, inside), _send_out(websocket, inside))
-                ]
-                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-                for way in ways:
-                    way.cancel()
-                await asyncio.gather(*ways, return_exceptions=True)
+                try:
+                    await _relay_both(websocket, inside)
+                finally:
+                    inside.transport.abort()  # the SDK (0.30) may never answer a close
         except WebSocketException as error:  # it offered no protocol of Foxglove
             log.warning("a client of Foxglove is refused: %s", error)
         with suppress(RuntimeError, WebSocketDisconnect):  # it is closed already
@@ -164,6 +161,14 @@ class Face:
         made = () if stage is None else channels_of(stage, source.outlets, source, self._context)
         self._channels = [*made]
         self._server.clear_session()
+
+
+async def _relay_both(websocket: WebSocket, inside: ClientConnection) -> None:
+    ways = [asyncio.create_task(way) for way in (_in(websocket, inside), _send_out(websocket, inside))]
+    await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+    for way in ways:
+        way.cancel()
+    await asyncio.gather(*ways, return_exceptions=True)
 
 
 async def _in(websocket: WebSocket, inside: ClientConnection) -> None:
