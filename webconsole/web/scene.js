@@ -3,10 +3,9 @@
 import * as THREE from "./vendor/three.module.js"
 import { Orbit } from "./orbit.js"
 import { Markers } from "./markers.js"
-import { creased, gathered, smooth } from "./mesh.js"
+import { Contents } from "./contents.js"
 
 const ASIDE_M = 0.1, ASIDE_RAD = 0.5
-const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
 const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5, SMOOTH = 2
 const FORCE = 0xf2b705, M_PER_N = 0.05, LONGEST_M = 0.1, LEAST_N = 0.005
 export const FORCES = 3 // layer of what no endoscope sees; 1 and 2 are the eyes of a headset
@@ -35,6 +34,7 @@ export class Scene {
     this.world.add(new THREE.HemisphereLight(0xffffff, 0x6f7f8c, 1.5))
     this.lamp = new THREE.DirectionalLight(0xffffff, 2)
     this.world.add(this.lamp, this.lamp.target)
+    this.contents = new Contents(this.world)
     this.clear()
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.ground())
     this.ground()
@@ -64,40 +64,28 @@ export class Scene {
       old.traverse((one) => { if (one.geometry !== POINT) one.geometry?.dispose(); one.material?.dispose() })
     }
     this.owned = []
-    this.bodies = [] // by scene: a group for each body
-    this.surfaces = []
+    this.contents.clear()
     this.axes = []
     this.bonds = [] // arrows of each
     this.cameras = [] // { name, group, pose, fieldOfView }
     this.tips = [] // { name, group }
     this.places = new Map() // a group of each frame in which markers may be, by its name on /tf
     this.markers = new Markers((frame) => this.place(frame))
-    this.placed = false
     this.focused = this.touched = false
   }
+
+  get bodies() { return this.contents.bodies }
+  get surfaces() { return this.contents.surfaces }
+  get placed() { return this.contents.placed }
 
   // `buffer` is what /scene answers: webconsole/stage.py, `geometry`.
   load(buffer, surfaces) {
     this.clear()
-    const size = new DataView(buffer).getUint32(0, true)
-    const text = new TextDecoder().decode(new Uint8Array(buffer, 4, size))
-    const start = 4 + size
-    for (const scene of JSON.parse(text)) this.add(scene, buffer, start)
-    this.surfaces = surfaces.map(({ colour }) => ({ colour, mesh: null, triangles: null }))
+    this.contents.load(buffer, surfaces).forEach((scene, index) => this.add(scene, this.bodies[index]))
     this.dirty()
   }
 
-  add(scene, buffer, start) {
-    const groups = scene.bodies.map(() => new THREE.Group())
-    const materials = new Map()
-    for (const group of groups) { group.visible = false; this.own(group) }
-    for (const part of scene.parts) {
-      const positions = new Float32Array(buffer, start + part.vertices.at, part.vertices.count)
-      const faces = new Uint32Array(buffer, start + part.faces.at, part.faces.count)
-      const key = part.colour.join()
-      if (!materials.has(key)) materials.set(key, material(part.colour))
-      groups[part.body].add(new THREE.Mesh(geometry(positions, faces, SHARP), materials.get(key)))
-    }
+  add(scene, groups) {
     for (const frame of scene.frames) {
       const axes = new THREE.AxesHelper(frame.name.endsWith("tip") ? 0.012 : 0.06)
       pose(axes, frame.pose)
@@ -114,7 +102,6 @@ export class Scene {
       if (!this.places.has(LEFT_EYE)) this.places.set(LEFT_EYE, eye)
     }
     scene.bodies.forEach((name, body) => { if (!this.places.has(name)) this.places.set(name, groups[body]) })
-    this.bodies.push(groups)
   }
 
   // Where markers of a frame are drawn: what is fixed in the world has the world's, and every camera the same eye.
@@ -139,44 +126,12 @@ export class Scene {
     return ["work", "robot", ...(this.cameras.length ? ["endoscope"] : []), ...arms]
   }
 
-  // In a buffer: positions (f32), then quaternions (i16, 32767 is 1).
-  poses(index, buffer, at, size) {
-    const groups = this.bodies[index]
-    if (!groups || size !== 20 * groups.length) return
-    const places = new Float32Array(buffer, at, 3 * groups.length)
-    const turns = new Int16Array(buffer, at + 12 * groups.length, 4 * groups.length)
-    groups.forEach((group, body) => {
-      group.position.fromArray(places, 3 * body)
-      group.quaternion.fromArray(turns, 4 * body).normalize()
-      group.visible = true
-    })
-    this.placed = true
-  }
-
-  surface(index, triangles) {
-    const surface = this.surfaces[index]
-    if (surface) surface.triangles = triangles
-  }
+  poses(index, buffer, at, size) { this.contents.poses(index, buffer, at, size) }
+  surface(index, triangles) { this.contents.surface(index, triangles) }
 
   nodes(index, positions) {
-    const surface = this.surfaces[index]
-    if (!surface?.triangles) return
-    if (!surface.mesh) {
-      const split = creased(positions, surface.triangles, SOFT)
-      surface.origin = split.origin
-      const made = new THREE.BufferGeometry()
-      made.setAttribute("position", attribute(3 * split.origin.length))
-      made.setAttribute("normal", attribute(3 * split.origin.length))
-      made.setIndex(new THREE.BufferAttribute(split.index, 1))
-      surface.mesh = new THREE.Mesh(made, material([...surface.colour, 1], THREE.DoubleSide))
-      surface.mesh.frustumCulled = false
-      this.own(surface.mesh)
-      this.focused &&= this.touched // the work is where the organ is, unless somebody looks elsewhere
-    }
-    const { position, normal } = surface.mesh.geometry.attributes
-    gathered(positions, surface.origin, position.array)
-    smooth(position.array, surface.mesh.geometry.index.array, normal.array)
-    position.needsUpdate = normal.needsUpdate = true
+    // the work is where the organ is, unless somebody looks elsewhere
+    if (this.contents.nodes(index, positions)) this.focused &&= this.touched
   }
 
   // `rows`: point (m) and force (N) of each arrow of a bond.
@@ -353,25 +308,6 @@ export class Scene {
     this.camera.quaternion.copy(group.quaternion).multiply(new THREE.Quaternion(...q)).multiply(FLIP)
     this.camera.translateX(aside)
   }
-}
-
-function geometry(positions, faces, cosine) {
-  const { index, origin } = creased(positions, faces, cosine)
-  const made = new THREE.BufferGeometry()
-  const position = attribute(3 * origin.length), normal = attribute(3 * origin.length)
-  gathered(positions, origin, position.array)
-  smooth(position.array, index, normal.array)
-  made.setAttribute("position", position)
-  made.setAttribute("normal", normal)
-  made.setIndex(new THREE.BufferAttribute(index, 1))
-  return made
-}
-
-function attribute(size) { return new THREE.BufferAttribute(new Float32Array(size), 3) }
-
-function material([red, green, blue, opacity], side = THREE.FrontSide) {
-  const colour = new THREE.Color().setRGB(red, green, blue, THREE.SRGBColorSpace)
-  return new THREE.MeshLambertMaterial({ color: colour, side, transparent: opacity < 1, opacity })
 }
 
 function placed(parent, numbers) {
