@@ -24,13 +24,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from engines.bullet.meshing.grid import block
-from engines.bullet.meshing.tet_mesh import TetMesh
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 from engines.mujoco.pictures.skin_mesh import SkinMesh
 from engines.mujoco.pictures.skins import SoftBody
+from engines.tissue.meshing.grid import block
+from engines.tissue.meshing.tet_mesh import TetMesh
 from schemas.ros import Header
 from schemas.trocar_msgs import SoftBodyState
 from schemas.vectors import Vector

@@ -24,7 +24,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' rig
 
-from engines.bullet.organs.organ import Organ
+from engines.bullet.organ import Organ
 from engines.bullet.params import BulletParams
 from engines.bullet.probes.near_faces import closest_points
 from schemas.vectors import Vector

@@ -22,8 +22,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' truth and rig
 
-from engines.bullet.elasticity.stable_step import highest_frequency
 from engines.bullet.params import BulletParams
+from engines.tissue.frequencies import highest_frequency
 from schemas.vectors import Vector
 from tests.engines.bullet.finite_elements import Body
 from tests.engines.bullet.rig import Rig

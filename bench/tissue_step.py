@@ -15,8 +15,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from bench.indentation import places
-from engines.bullet.elasticity.stable_step import face_loss, highest_frequency
+from engines.bullet.elasticity.stable_step import face_loss
 from engines.bullet.params import BulletParams
+from engines.tissue.frequencies import highest_frequency
 from schemas.vectors import Vector
 from tests.engines.bullet import rig
 from tests.engines.bullet.finite_elements import Body

@@ -28,12 +28,12 @@ from skfem import Basis, ElementTetP2, ElementTriP2, FacetBasis, MeshTet, MeshTr
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from engines.bullet.elasticity.half_space import DEEPEST, POISSON_RATIOS, sphere_force
-from engines.bullet.elasticity.material import Material
-from engines.bullet.meshing.isosurface_stuffing import fill
-from engines.bullet.meshing.smoothing import _onto_surface, smoothed
-from engines.bullet.organs import kidney, liver
-from engines.bullet.organs.catalogue import SHAPES
-from engines.bullet.organs.materials import preset
+from engines.tissue.material import Material
+from engines.tissue.meshing.isosurface_stuffing import fill
+from engines.tissue.meshing.smoothing import _onto_surface, smoothed
+from engines.tissue.organs import kidney, liver
+from engines.tissue.organs.catalogue import SHAPES
+from engines.tissue.organs.materials import preset
 from schemas.vectors import Vector
 
 __all__ = ["Solid", "axisymmetric", "three_dimensional"]

@@ -47,8 +47,8 @@ def organs(
 def _shapes(nodes: int) -> dict[str, Any]:
     import numpy as np
 
-    from engines.bullet.meshing.tet_mesh import dihedral_angles, shape_quality
-    from engines.bullet.organs.catalogue import SHAPES
+    from engines.tissue.meshing.tet_mesh import dihedral_angles, shape_quality
+    from engines.tissue.organs.catalogue import SHAPES
 
     shapes: dict[str, Any] = {}
     for name, shape in SHAPES.items():
@@ -72,8 +72,8 @@ def _shapes(nodes: int) -> dict[str, Any]:
 
 def _contact(shape: str, nodes: int) -> list[dict[str, Any]]:
     """Return the error of the mesh under spheres of `_RADII_M`; empty: no correction."""
-    from engines.bullet.organs.params import OrganParams
     from engines.bullet.probes.band import band
+    from engines.tissue.organs.params import OrganParams
 
     organ = OrganParams.model_validate({"shape": shape, "nodes": nodes})
     found = [band(organ, radius) for radius in _RADII_M]
@@ -81,7 +81,7 @@ def _contact(shape: str, nodes: int) -> list[dict[str, Any]]:
 
 
 def _material_rows() -> dict[str, Any]:
-    from engines.bullet.organs.materials import presets
+    from engines.tissue.organs.materials import presets
 
     return {name: preset.model_dump() for name, preset in presets().items()}
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from engines.bullet.elasticity.half_space import DEEPEST
 from engines.bullet.elasticity.stable_step import ACCURATE_PHASE, face_loss, longest_step
-from engines.bullet.organs.anchors import add_rigid
-from engines.bullet.organs.organ import Organ
+from engines.bullet.organ import Organ
 from engines.bullet.params import BulletParams
 from engines.bullet.probes.contact_gain import Contacts, Tissue
 from engines.bullet.probes.grasp import Grasp, grasp_ports, nothing_held
@@ -19,7 +18,7 @@ from engines.bullet.probes.params import Coupling, ProbeParams
 from engines.bullet.probes.probe import Probe
 from engines.bullet.probes.sub_grid import SubGrid, Surface
 from engines.bullet.warn_once import warn_once
-from engines.bullet.world import connect, disconnect
+from engines.bullet.world import add_rigid, connect, disconnect
 from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, signal_out, state_hash
 from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port

@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 
 from engines.bullet.elasticity.compliance import MOST_NODES
 from engines.bullet.elasticity.stable_step import longest_step
-from engines.bullet.organs.anchors import WORLD, RigidParams
-from engines.bullet.organs.params import OrganParams
 from engines.bullet.probes.params import ProbeParams
+from engines.tissue.organs.anchors import WORLD, RigidParams
+from engines.tissue.organs.params import OrganParams
 from hub.participant import Params
 from schemas.errors import did_you_mean
 from schemas.quantity import Acceleration, Duration

@@ -8,9 +8,10 @@ import sys
 from collections.abc import Generator
 from contextlib import contextmanager
 
+from engines.tissue.organs.anchors import RigidParams
 from schemas.errors import MissingExtraError, SessionError
 
-__all__ = ["COLLISION_MARGIN_M", "connect", "disconnect", "quiet"]
+__all__ = ["COLLISION_MARGIN_M", "add_rigid", "connect", "disconnect", "quiet"]
 
 COLLISION_MARGIN_M = 1e-4
 """Distance of first contact in Bullet; the spheres of probes are smaller by this distance."""
@@ -59,6 +60,20 @@ def connect(part: str, timestep: float, gravity: float) -> int:
     bullet.setPhysicsEngineParameter(useSplitImpulse=0, physicsClientId=client)
     bullet.setGravity(0.0, 0.0, -gravity, physicsClientId=client)
     return client
+
+
+def add_rigid(params: RigidParams, client: int) -> int:
+    """Add a rigid part to the world of `client`, and return its number in Bullet."""
+    import pybullet as bullet
+
+    shape = bullet.createCollisionShape(
+        bullet.GEOM_BOX, halfExtents=[0.5 * edge for edge in params.box], physicsClientId=client
+    )
+    body = bullet.createMultiBody(
+        0.0, shape, basePosition=params.position, baseOrientation=params.orientation, physicsClientId=client
+    )
+    bullet.changeDynamics(body, -1, lateralFriction=params.friction, physicsClientId=client)
+    return body
 
 
 def disconnect(client: int) -> None:

@@ -40,7 +40,10 @@ def test_messages_in_troubleshooting_are_those_of_the_code():
 
 
 def test_files_and_modules_that_a_page_names_exist():
-    roots = (ROOT, *(ROOT / folder for folder in ("engines/bullet", "engines/mujoco", "robots/dvrk")))
+    roots = (
+        ROOT,
+        *(ROOT / folder for folder in ("engines/bullet", "engines/mujoco", "engines/tissue", "robots/dvrk")),
+    )
     missing = []
     for page in PAGES:
         text = page.read_text("utf-8")

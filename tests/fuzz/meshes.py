@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from engines.bullet.meshing.tet_mesh import TetMesh
-from engines.bullet.organs.params import OrganParams
+from engines.tissue.meshing.tet_mesh import TetMesh
+from engines.tissue.organs.params import OrganParams
 from tests.fuzz.byte_mutations import mutated, mutated_text
 from tests.fuzz.harness import Note, Target, search
 from tests.participants import make_participant

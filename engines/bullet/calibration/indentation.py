@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
-from engines.bullet.elasticity.material import Material
+from engines.tissue.material import Material
 from schemas.errors import RecordingError
 from schemas.vectors import Vector
 

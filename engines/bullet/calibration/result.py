@@ -6,7 +6,7 @@ from typing import Any
 
 from engines.bullet.calibration.fit import Calibration
 from engines.bullet.calibration.indentation import Indenter
-from engines.bullet.organs.material_file import MaterialFile
+from engines.tissue.organs.material_file import MaterialFile
 from schemas.errors import RecordingError
 
 __all__ = ["material_file"]

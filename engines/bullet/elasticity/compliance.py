@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.bullet.elasticity.half_space import point_displacement, point_stress
-from engines.bullet.elasticity.material import Material
 from engines.bullet.elasticity.rims import MIRRORED, mirror_displacement, rims_of
-from engines.bullet.meshing.tet_mesh import Indices, TetMesh
+from engines.tissue.material import Material
+from engines.tissue.meshing.tet_mesh import Indices, TetMesh
 from schemas.vectors import Vector
 
 __all__ = ["MOST_NODES", "SurfaceCompliance"]

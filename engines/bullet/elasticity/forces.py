@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.elasticity.material import Material
-from engines.bullet.meshing.tet_mesh import Indices, TetMesh
+from engines.tissue.material import Material
+from engines.tissue.meshing.tet_mesh import Indices, TetMesh
 from robots.vector3 import cross
 from schemas.vectors import Vector
 

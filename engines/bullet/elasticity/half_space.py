@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engines.bullet.elasticity.material import Material
+from engines.tissue.material import Material
 from schemas.vectors import Vector
 
 __all__ = [

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engines.bullet.elasticity.material import Material
-from engines.bullet.meshing.tet_mesh import Indices
+from engines.tissue.material import Material
+from engines.tissue.meshing.tet_mesh import Indices
 from schemas.vectors import Vector
 
 __all__ = ["MIRRORED", "Rims", "mirror_displacement", "rim_share", "rims_of"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from engines.bullet.elasticity.compliance import MOST_NODES, SurfaceCompliance
 from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
-from engines.bullet.organs.params import OrganParams
+from engines.tissue.organs.params import OrganParams
 
 __all__ = ["Band", "band"]
 

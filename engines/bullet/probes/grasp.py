@@ -13,7 +13,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.organs.organ import Organ
+from engines.bullet.organ import Organ
 from engines.bullet.probes.held_patch import HeldPatch, missing_compliance
 from engines.bullet.probes.params import GraspParams
 from engines.bullet.probes.probe import Probe

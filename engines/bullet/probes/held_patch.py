@@ -12,9 +12,9 @@ import numpy as np
 
 from engines.bullet.elasticity.compliance import SurfaceCompliance
 from engines.bullet.elasticity.half_space import patch_compliance
-from engines.bullet.elasticity.material import Material
-from engines.bullet.meshing.tet_mesh import Indices
 from engines.bullet.probes.params import Coupling
+from engines.tissue.material import Material
+from engines.tissue.meshing.tet_mesh import Indices
 from schemas.vectors import Vector
 
 __all__ = ["HeldPatch", "missing_compliance"]

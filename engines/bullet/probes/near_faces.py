@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engines.bullet.meshing.tet_mesh import Indices
+from engines.tissue.meshing.tet_mesh import Indices
 from robots.vector3 import cross
 from schemas.vectors import Vector
 

@@ -17,12 +17,12 @@ import numpy as np
 
 from engines.bullet.elasticity.compliance import SurfaceCompliance
 from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
-from engines.bullet.elasticity.material import Material
 from engines.bullet.elasticity.rims import rim_share
-from engines.bullet.meshing.tet_mesh import Indices
-from engines.bullet.organs.organ import Organ
+from engines.bullet.organ import Organ
 from engines.bullet.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, closest_points
 from engines.bullet.probes.params import Coupling
+from engines.tissue.material import Material
+from engines.tissue.meshing.tet_mesh import Indices
 from schemas.vectors import Vector
 
 __all__ = ["SubGrid", "Surface"]

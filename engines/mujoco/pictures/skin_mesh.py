@@ -22,7 +22,7 @@ Indices = NDArray[np.int64]
 _CREASE = radians(80.0)
 """Faces that meet at a greater angle at rest (0: in one plane) meet at a sharp edge, as those of a box do.
 
-The curved parts of the organs in `engines.bullet.organs`, of 150 to 3000 nodes, stay below, all but some
+The curved parts of the organs in `engines.tissue.organs`, of 150 to 3000 nodes, stay below, all but some
 rims; the ends of the colon are above.
 """
 

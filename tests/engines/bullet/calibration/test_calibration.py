@@ -14,8 +14,8 @@ from engines.bullet.calibration.fit import calibrate
 from engines.bullet.calibration.indentation import Indenter, elastic_force
 from engines.bullet.calibration.measurements import Measured, read
 from engines.bullet.calibration.relaxation import Prony
-from engines.bullet.organs.material_file import MaterialFile
-from engines.bullet.organs.params import OrganParams
+from engines.tissue.organs.material_file import MaterialFile
+from engines.tissue.organs.params import OrganParams
 from schemas.errors import RecordingError
 
 SPHERE = Indenter("sphere", 5e-3)

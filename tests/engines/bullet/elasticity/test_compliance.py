@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engines.bullet.elasticity.compliance import SurfaceCompliance
-from engines.bullet.organs.params import OrganParams
+from engines.tissue.organs.params import OrganParams
 from tests.engines.bullet.finite_elements import Elements
 from tests.engines.bullet.rig import BLOCK, SMALL_BLOCK
 

@@ -7,9 +7,10 @@ import pytest
 
 from engines.bullet.elasticity import stable_step
 from engines.bullet.elasticity.stable_step import ACCURATE_PHASE, face_loss, longest_step
-from engines.bullet.organs.organ import Organ
-from engines.bullet.organs.params import OrganParams
+from engines.bullet.organ import Organ
 from engines.bullet.world import connect, disconnect
+from engines.tissue.frequencies import highest_frequency
+from engines.tissue.organs.params import OrganParams
 from schemas.errors import SessionError
 from tests.engines.bullet.finite_elements import Body
 from tests.engines.bullet.rig import RADIUS, SMALL_BLOCK, Rig, params
@@ -43,9 +44,7 @@ def ripple(phase, monkeypatch):
     mesh = OrganParams.model_validate(SMALL_BLOCK).rest
     free = np.where(mesh.nodes[:, 2] > mesh.nodes[:, 2].min(), 1.0, 0.0)
     soft = OrganParams.model_validate(SMALL_BLOCK)
-    young_modulus = (
-        soft.young_modulus * (phase / (1e-3 * stable_step.highest_frequency(mesh, free, soft.elastic))) ** 2
-    )
+    young_modulus = soft.young_modulus * (phase / (1e-3 * highest_frequency(mesh, free, soft.elastic))) ** 2
     with Rig(
         params({**SMALL_BLOCK, "young_modulus": young_modulus}),
     ) as rig:
@@ -67,7 +66,7 @@ def at_phase(phase):
     """Return the small block, as stiff as sub-steps of 1 ms make `phase`."""
     soft = OrganParams.model_validate(SMALL_BLOCK)
     free = np.where(soft.rest.nodes[:, 2] > soft.rest.nodes[:, 2].min(), 1.0, 0.0)
-    frequency = stable_step.highest_frequency(soft.rest, free, soft.elastic)
+    frequency = highest_frequency(soft.rest, free, soft.elastic)
     return {**SMALL_BLOCK, "young_modulus": soft.young_modulus * (phase / (1e-3 * frequency)) ** 2}
 
 

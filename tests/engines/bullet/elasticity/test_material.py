@@ -3,9 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from engines.bullet.elasticity.material import Material
-from engines.bullet.elasticity.stable_step import highest_frequency, longest_step, lowest_frequency
-from engines.bullet.meshing.grid import block
+from engines.bullet.elasticity.stable_step import longest_step
+from engines.tissue.frequencies import highest_frequency, lowest_frequency
+from engines.tissue.material import Material
+from engines.tissue.meshing.grid import block
 from tests.engines.bullet.finite_elements import energy, internal_forces
 
 MATERIALS = st.builds(Material, st.floats(1e2, 1e6), st.floats(0.01, 0.495), st.just(1000.0), st.just(0.0))

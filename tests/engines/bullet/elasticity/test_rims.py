@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from engines.bullet.elasticity.rims import rim_share, rims_of
-from engines.bullet.organs.params import OrganParams
+from engines.tissue.organs.params import OrganParams
 from tests.engines.bullet.rig import BLOCK, RADIUS, Rig, params
 
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -4,9 +4,9 @@ import pytest
 from typer.testing import CliRunner
 
 from engines.bullet.command_line import app
-from engines.bullet.organs.params import OrganParams
 from engines.bullet.probes.band import band
 from engines.bullet.report_notes import notes
+from engines.tissue.organs.params import OrganParams
 from hub.recording.report_notes import participant_notes
 from schemas.scenario import Scenario
 from tests.engines.bullet.rig import BLOCK

@@ -8,9 +8,9 @@ from pydantic import ValidationError
 
 from engines.bullet.elasticity.compliance import SurfaceCompliance
 from engines.bullet.engine import BulletEngine
-from engines.bullet.organs.params import OrganParams
 from engines.bullet.params import BulletParams
 from engines.bullet.probes.held_patch import missing_compliance
+from engines.tissue.organs.params import OrganParams
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from tests.engines.bullet.finite_elements import Body, equilibrium

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from engines.bullet.meshing.grid import block
 from engines.mujoco.pictures.skin_mesh import SkinMesh
+from engines.tissue.meshing.grid import block
 from schemas.vectors import Vector
 
 SIZE = np.array([0.08, 0.06, 0.02])

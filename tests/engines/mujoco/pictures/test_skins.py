@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engines.bullet.meshing.grid import block
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope import Endoscope
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.skin_params import SkinParams
 from engines.mujoco.pictures.skins import Skins, SoftBody
+from engines.tissue.meshing.grid import block
 from hub.participant import Inputs, Outputs, Setup
 from hub.testing import check_engine
 from robots.dvrk.endoscope import EYES

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from engines.bullet.engine import BulletEngine
-from engines.bullet.meshing.grid import block
-from engines.bullet.meshing.tet_mesh import TetMesh
 from engines.bullet.params import BulletParams
+from engines.tissue.meshing.grid import block
+from engines.tissue.meshing.tet_mesh import TetMesh
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
 from hub.recording.recording import Recording

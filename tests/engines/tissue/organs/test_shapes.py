@@ -13,16 +13,16 @@ from pydantic import ValidationError
 from typer.testing import CliRunner
 
 from engines.bullet.command_line import app
-from engines.bullet.meshing.grid import block
-from engines.bullet.meshing.isosurface_stuffing import fill
-from engines.bullet.meshing.mesh_check import checked_mesh
-from engines.bullet.meshing.smoothing import smoothed
-from engines.bullet.meshing.tet_mesh import TetMesh, dihedral_angles, shape_quality, volumes
-from engines.bullet.meshing.vtk_file import read_vtk
-from engines.bullet.organs.catalogue import SHAPES
-from engines.bullet.organs.materials import presets
-from engines.bullet.organs.params import OrganParams
 from engines.bullet.params import BulletParams
+from engines.tissue.meshing.grid import block
+from engines.tissue.meshing.isosurface_stuffing import fill
+from engines.tissue.meshing.mesh_check import checked_mesh
+from engines.tissue.meshing.smoothing import smoothed
+from engines.tissue.meshing.tet_mesh import TetMesh, dihedral_angles, shape_quality, volumes
+from engines.tissue.meshing.vtk_file import read_vtk
+from engines.tissue.organs.catalogue import SHAPES
+from engines.tissue.organs.materials import presets
+from engines.tissue.organs.params import OrganParams
 from hub.recording.file_hashes import file_hashes
 
 BLOCK = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa"}

@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from engines.bullet.meshing.grid import grid_indices
-from engines.bullet.meshing.tet_mesh import Indices, TetMesh, compact, volumes
+from engines.tissue.meshing.grid import grid_indices
+from engines.tissue.meshing.tet_mesh import Indices, TetMesh, compact, volumes
 from schemas.vectors import Vector
 
 __all__ = ["Field", "fill"]

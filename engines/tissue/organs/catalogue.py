@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from engines.bullet.meshing.grid import block
-from engines.bullet.organs.colon import COLON
-from engines.bullet.organs.kidney import KIDNEY_WITH_ADRENAL
-from engines.bullet.organs.liver import LIVER_LOBE
-from engines.bullet.organs.shape import SIDES, Shape, on_side
+from engines.tissue.meshing.grid import block
+from engines.tissue.organs.colon import COLON
+from engines.tissue.organs.kidney import KIDNEY_WITH_ADRENAL
+from engines.tissue.organs.liver import LIVER_LOBE
+from engines.tissue.organs.shape import SIDES, Shape, on_side
 
 __all__ = ["SHAPES", "block_shape"]
 

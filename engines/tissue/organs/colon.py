@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.meshing.grid import tetrahedra_of_cells
-from engines.bullet.meshing.tet_mesh import TetMesh
-from engines.bullet.organs.shape import ROUNDING_DIGITS, Shape
+from engines.tissue.meshing.grid import tetrahedra_of_cells
+from engines.tissue.meshing.tet_mesh import TetMesh
+from engines.tissue.organs.shape import ROUNDING_DIGITS, Shape
 from schemas.vectors import Vector
 
 __all__ = ["COLON"]

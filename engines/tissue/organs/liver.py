@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.organs.shape import Shape, mesher
+from engines.tissue.organs.shape import Shape, mesher
 from schemas.vectors import Vector
 
 __all__ = ["LIVER_LOBE"]

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
-from engines.bullet.elasticity.material import Material
-from engines.bullet.elasticity.stable_step import highest_frequency, lowest_frequency
-from engines.bullet.meshing.grid import FEWEST_NODES
-from engines.bullet.meshing.mesh_check import LARGEST_M, MOST_NODES, SMALLEST_M, checked_mesh
-from engines.bullet.meshing.tet_mesh import TetMesh
-from engines.bullet.meshing.vtk_file import read_vtk
-from engines.bullet.organs.anchors import AnchorParams, Edges
-from engines.bullet.organs.catalogue import SHAPES, block_shape
-from engines.bullet.organs.material_file import MaterialFile
-from engines.bullet.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
-from engines.bullet.organs.shape import Shape
+from engines.tissue.frequencies import highest_frequency, lowest_frequency
+from engines.tissue.material import Material
+from engines.tissue.meshing.grid import FEWEST_NODES
+from engines.tissue.meshing.mesh_check import LARGEST_M, MOST_NODES, SMALLEST_M, checked_mesh
+from engines.tissue.meshing.tet_mesh import TetMesh
+from engines.tissue.meshing.vtk_file import read_vtk
+from engines.tissue.organs.anchors import AnchorParams, Edges
+from engines.tissue.organs.catalogue import SHAPES, block_shape
+from engines.tissue.organs.material_file import MaterialFile
+from engines.tissue.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
+from engines.tissue.organs.shape import Shape
 from robots import rotation
 from robots.dvrk.parameters import UnitQuaternion
 from schemas.files import find_file

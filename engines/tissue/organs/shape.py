@@ -9,9 +9,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.meshing.isosurface_stuffing import Field, fill
-from engines.bullet.meshing.smoothing import smoothed
-from engines.bullet.meshing.tet_mesh import TetMesh
+from engines.tissue.meshing.isosurface_stuffing import Field, fill
+from engines.tissue.meshing.smoothing import smoothed
+from engines.tissue.meshing.tet_mesh import TetMesh
 from schemas.errors import did_you_mean
 from schemas.vectors import Vector
 

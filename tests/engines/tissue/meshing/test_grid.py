@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from engines.bullet.meshing.grid import FEWEST_NODES, block, block_cells
-from engines.bullet.meshing.tet_mesh import volumes
-from engines.bullet.organs.organ import Organ
-from engines.bullet.organs.params import OrganParams
+from engines.bullet.organ import Organ
 from engines.bullet.world import connect, disconnect
+from engines.tissue.meshing.grid import FEWEST_NODES, block, block_cells
+from engines.tissue.meshing.tet_mesh import volumes
+from engines.tissue.organs.params import OrganParams
 
 SIZES = st.tuples(*3 * [st.floats(5e-3, 0.2)]).map(np.array)
 NODES = st.integers(FEWEST_NODES, 600)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engines.bullet.meshing.isosurface_stuffing import Field
-from engines.bullet.meshing.tet_mesh import Indices, TetMesh
+from engines.tissue.meshing.isosurface_stuffing import Field
+from engines.tissue.meshing.tet_mesh import Indices, TetMesh
 from schemas.vectors import Vector
 
 __all__ = ["smoothed"]

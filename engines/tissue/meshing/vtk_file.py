@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.meshing.tet_mesh import Indices
+from engines.tissue.meshing.tet_mesh import Indices
 from schemas.vectors import Vector
 
 __all__ = ["read_vtk"]

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from engines.bullet.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio
+from engines.tissue.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio
 from schemas.yaml_model import load_yaml_model, yaml_text
 
 __all__ = ["MaterialFile"]

@@ -12,7 +12,7 @@ from schemas.quantity import Length
 from schemas.scenario import Name
 from schemas.vectors import Vector
 
-__all__ = ["WORLD", "AnchorParams", "Edges", "RigidParams", "add_rigid"]
+__all__ = ["WORLD", "AnchorParams", "Edges", "RigidParams"]
 
 WORLD = "world"
 
@@ -66,17 +66,3 @@ class RigidParams(BaseModel):
         default=(0.0, 0.0, 0.0, 1.0), description="of its frame in `world`: quaternion x, y, z, w"
     )
     friction: float = Field(default=0.5, ge=0, le=2, description="Coulomb coefficient against tissue")
-
-
-def add_rigid(params: RigidParams, client: int) -> int:
-    """Add a rigid part to the world of `client`, and return its number in Bullet."""
-    import pybullet as bullet
-
-    shape = bullet.createCollisionShape(
-        bullet.GEOM_BOX, halfExtents=[0.5 * edge for edge in params.box], physicsClientId=client
-    )
-    body = bullet.createMultiBody(
-        0.0, shape, basePosition=params.position, baseOrientation=params.orientation, physicsClientId=client
-    )
-    bullet.changeDynamics(body, -1, lateralFriction=params.friction, physicsClientId=client)
-    return body

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engines.bullet.meshing.tet_mesh import Indices, TetMesh, shape_quality
+from engines.tissue.meshing.tet_mesh import Indices, TetMesh, shape_quality
 from schemas.vectors import Vector
 
 __all__ = ["LARGEST_M", "MOST_NODES", "SMALLEST_M", "checked_mesh"]

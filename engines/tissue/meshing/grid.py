@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from engines.bullet.meshing.tet_mesh import Indices, TetMesh
+from engines.tissue.meshing.tet_mesh import Indices, TetMesh
 from schemas.vectors import Vector
 
 __all__ = ["FEWEST_NODES", "block", "block_cells", "grid_indices", "tetrahedra_of_cells"]

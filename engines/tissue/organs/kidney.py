@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engines.bullet.organs.shape import Shape, mesher, smooth_union
+from engines.tissue.organs.shape import Shape, mesher, smooth_union
 from schemas.vectors import Vector
 
 __all__ = ["KIDNEY_WITH_ADRENAL"]

@@ -9,9 +9,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from engines.bullet.organs.anchors import WORLD
-from engines.bullet.organs.params import OrganParams
 from engines.bullet.world import COLLISION_MARGIN_M, quiet
+from engines.tissue.organs.anchors import WORLD
+from engines.tissue.organs.params import OrganParams
 from schemas.errors import SessionError
 from schemas.vectors import Vector
 
