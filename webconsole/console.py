@@ -31,11 +31,17 @@ _VERBS = {"pause": "pause", "resume": "resume", "step": "step", "stop": "shutdow
 
 
 class Console:
-    """The pages' common ground."""
+    """The pages' common ground.
 
-    def __init__(self, source: Live | Recorded, pilots: Pilots) -> None:
+    Args:
+        source: Source of the values.
+        pilots: Pilots of devices.
+        started: Sessions started from pages, shared with other consoles; None: a separate collection.
+    """
+
+    def __init__(self, source: Live | Recorded, pilots: Pilots, started: Started | None = None) -> None:
         self.source, self.pilots = source, pilots
-        self.started = Started()
+        self.started = started or Started()
         self.drawable: Callable[[], None] = lambda: None
         """Called in a thread when the stage of a session is complete, with nothing left to compute: to
         compile a model stops all threads for up to 0.1 s.

@@ -17,6 +17,7 @@ from webconsole.afterlife import Afterlife
 from webconsole.console import Console
 from webconsole.gate import Role
 from webconsole.hosted import HostedDevices
+from webconsole.library import Library, home_of
 from webconsole.listening import Listening, fingerprint, on_loopback, with_tls
 from webconsole.live import Live
 from webconsole.open_recording import open_recording
@@ -80,7 +81,8 @@ def serve(
             source = open_recording(recording, stack, trust=trust)
         console = Console(source, Pilots())
         afterlife = Afterlife(console, stack) if one_session else None
-        _serve(console, listening, role, afterlife, browse=browse, foxglove=foxglove)
+        library = Library(home_of(recording), console, stack)
+        _serve(console, listening, library, role, afterlife, browse=browse, foxglove=foxglove)
 
 
 def _terminate(_number: int, _frame: FrameType | None) -> None:
@@ -90,6 +92,7 @@ def _terminate(_number: int, _frame: FrameType | None) -> None:
 def _serve(
     console: Console,
     listening: Listening,
+    library: Library,
     role: Role,
     afterlife: Afterlife | None,
     *,
@@ -98,7 +101,8 @@ def _serve(
 ) -> None:
     source = console.source
     face = _foxglove_door(console) if foxglove else None
-    server = Server(console, listening, {} if face is None else {_FOXGLOVE: face.relay}, afterlife)
+    others = {} if face is None else {_FOXGLOVE: face.relay}
+    server = Server(console, listening, others, afterlife, library)
     link = f"{listening.origins[0]}{server.gate.invite(role)}"
     hosted = HostedDevices(console.pilots)
     if isinstance(source, Live):

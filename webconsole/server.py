@@ -10,14 +10,14 @@ from math import isfinite
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from hub.planning.scenario_file import installed_scenarios
-from hub.recording.recording import Recording
 from schemas.errors import MessageError, TrocarError
 from webconsole.afterlife import Afterlife
 from webconsole.assets import asset, compress_all, gzip_response
@@ -25,8 +25,10 @@ from webconsole.commands import MOST_BYTES
 from webconsole.console import Console
 from webconsole.fork import fork_form, tree_of
 from webconsole.gate import MOST_HEAD_BYTES, Gate, Role
+from webconsole.library import Library, numbers_of
 from webconsole.listening import Listening
 from webconsole.page import Page
+from webconsole.recorded import Recorded
 from webconsole.start import start_form
 
 __all__ = ["Server"]
@@ -34,6 +36,10 @@ __all__ = ["Server"]
 _MOST_PAGES = 16
 _MOST_VIEWERS = 12
 """Most pages of viewers: the rest are kept for operators."""
+_NOT_SHOWN = 4002
+"""Close code for a page whose recording cannot be shown; the reason says why."""
+_MOST_REASON_BYTES = 123
+"""Longest reason of a close frame (RFC 6455, 5.5)."""
 _AHEAD_S = 0.2
 _MOST_BUCKETS = 4000
 _BINARY = "application/octet-stream"
@@ -55,6 +61,7 @@ class Server:
         listening: Where.
         others: Servers of programs, by the path of a WebSocket.
         afterlife: What follows the end of the only session; None: pages wait for another session.
+        library: Further recordings for the pages of operators; None: none.
     """
 
     def __init__(
@@ -63,8 +70,10 @@ class Server:
         listening: Listening,
         others: Mapping[str, Callable[[WebSocket], Awaitable[None]]] | None = None,
         afterlife: Afterlife | None = None,
+        library: Library | None = None,
     ) -> None:
         self._console, self._socket, self._afterlife = console, listening.socket, afterlife
+        self._library = library
         self.port = listening.port
         self._pages: Counter[Role] = Counter()
         app = Starlette(
@@ -76,6 +85,8 @@ class Server:
                 Route("/series", self._series),
                 Route("/pressed", self._force_rows),
                 Route("/events", self._events),
+                Route("/numbers", self._numbers),
+                Route("/recordings", self._recordings),
                 Route("/sessions", self._sessions),
                 Route("/start", self._start),
                 Route("/fork", self._fork),
@@ -144,12 +155,45 @@ class Server:
             return
         self._pages[role] += 1
         try:
-            await Page(websocket, role, self._console, self.gate).run()
+            console = await self._console_for(websocket)
+        except (HTTPException, TrocarError) as error:
+            self._pages[role] -= 1
+            await websocket.accept()
+            await websocket.close(_NOT_SHOWN, _close_reason(error))
+            return
+        try:
+            await Page(websocket, role, console, self.gate).run()
         finally:
             self._pages[role] -= 1
 
-    async def _scene(self, _request: Request) -> Response:
-        stage = await self._console.stage()
+    async def _console_for(self, request: HTTPConnection) -> Console:
+        """Return the contents of the page that asks: the server's own, or those of another recording.
+
+        Raises HTTPException for a viewer, MessageError for an unknown name, RecordingError if the recording
+        cannot be read.
+        """
+        name = request.query_params.get("recording")
+        if name is None or self._library is None:
+            return self._console
+        if request.state.role != "operator":
+            raise HTTPException(403, "a viewer opens no other recording\n")
+        return await self._library.console(name)
+
+    async def _recordings(self, request: Request) -> Response:
+        """Answer an operator with the recordings that may be opened."""
+        if request.state.role != "operator":
+            return PlainTextResponse("a viewer opens no other recording\n", status_code=403)
+        return JSONResponse([] if self._library is None else await asyncio.to_thread(self._library.rows))
+
+    async def _numbers(self, request: Request) -> Response:
+        """Answer with the result of a recorded session."""
+        return await self._from_recorded(request, numbers_of)
+
+    async def _scene(self, request: Request) -> Response:
+        try:
+            stage = await (await self._console_for(request)).stage()
+        except TrocarError as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)
         if stage is None:
             return PlainTextResponse("no session\n", status_code=404)
         return gzip_response(stage.packed_geometry, _BINARY)
@@ -162,7 +206,7 @@ class Server:
             buckets = min(int(query.get("buckets", "1000")), _MOST_BUCKETS)
             if buckets < 1 or not isfinite(start):
                 raise ValueError(f"from {start}, {buckets} buckets")
-            recorded = self._console.recorded_source()
+            recorded = (await self._console_for(request)).recorded_source()
             columns, rows = await asyncio.to_thread(
                 recorded.series, query.get("port", ""), start, end, buckets
             )
@@ -175,7 +219,8 @@ class Server:
     async def _force_rows(self, request: Request) -> Response:
         """Answer with time, point and force of a bond of a recording, rows of seven f64."""
         try:
-            recorded, stage = self._console.recorded_source(), await self._console.stage()
+            console = await self._console_for(request)
+            recorded, stage = console.recorded_source(), await console.stage()
             name = request.query_params.get("bond")
             found = [one for one in (stage.arrows if stage else ()) if one.name == name and one.at_one_point]
             if not found:
@@ -185,14 +230,9 @@ class Server:
             return PlainTextResponse(f"{error}\n", status_code=400)
         return Response(rows.astype("<f8").tobytes(), media_type=_BINARY)
 
-    async def _events(self, _request: Request) -> Response:
+    async def _events(self, request: Request) -> Response:
         """Answer with the events of a recording."""
-        try:
-            recorded = self._console.recorded_source()
-            found = await asyncio.to_thread(lambda: recorded.events)
-        except TrocarError as error:
-            return PlainTextResponse(f"{error}\n", status_code=400)
-        return JSONResponse([one.as_json() for one in found])
+        return await self._from_recorded(request, lambda one: [event.as_json() for event in one.events])
 
     async def _sessions(self, _request: Request) -> Response:
         """Answer with the running sessions of this machine."""
@@ -214,16 +254,23 @@ class Server:
         except TrocarError as error:
             return PlainTextResponse(f"{error}\n", status_code=400)
 
-    async def _fork(self, _request: Request) -> Response:
+    async def _fork(self, request: Request) -> Response:
         """Answer with the form of a fork."""
-        return await self._of_recording(fork_form)
+        return await self._from_recorded(request, lambda one: fork_form(one.recording))
 
-    async def _answer_forks(self, _request: Request) -> Response:
+    async def _answer_forks(self, request: Request) -> Response:
         """Answer with the tree of the recordings beside this recording."""
-        return await self._of_recording(tree_of)
+        return await self._from_recorded(request, lambda one: tree_of(one.recording))
 
-    async def _of_recording(self, make: Callable[[Recording], object]) -> Response:
+    async def _from_recorded(self, request: Request, make: Callable[[Recorded], object]) -> Response:
         try:
-            return JSONResponse(await asyncio.to_thread(make, self._console.recorded_source().recording))
+            recorded = (await self._console_for(request)).recorded_source()
+            return JSONResponse(await asyncio.to_thread(make, recorded))
         except TrocarError as error:
             return PlainTextResponse(f"{error}\n", status_code=400)
+
+
+def _close_reason(error: Exception) -> str:
+    """Return why a page is closed, in the bytes allowed."""
+    text = error.detail if isinstance(error, HTTPException) else str(error)
+    return text.strip().encode()[:_MOST_REASON_BYTES].decode("utf-8", "ignore")

@@ -5,7 +5,7 @@ import http.client
 import shutil
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import pytest
 
@@ -13,6 +13,7 @@ pytest.importorskip("starlette", reason="needs trocar[web]")
 
 from tests.hub.sample_session import write_session
 from webconsole.console import Console
+from webconsole.library import Library
 from webconsole.listening import on_loopback
 from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
@@ -22,16 +23,19 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
 @contextmanager
-def served(source, pilots=None, listening=None):
-    """Serve pages of a source in a thread; yield the server."""
-    server = Server(Console(source, pilots or Pilots()), listening or on_loopback(0))
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    try:
-        yield server
-    finally:
-        server.stop()
-        thread.join()
+def served(source, pilots=None, listening=None, home=None):
+    """Serve pages of a source, and of the recordings in `home`, in a thread; yield the server."""
+    with ExitStack() as stack:
+        console = Console(source, pilots or Pilots())
+        library = None if home is None else Library(home, console, stack)
+        server = Server(console, listening or on_loopback(0), library=library)
+        thread = threading.Thread(target=server.run)
+        thread.start()
+        try:
+            yield server
+        finally:
+            server.stop()
+            thread.join()
 
 
 def finish(coroutine):

@@ -3,6 +3,7 @@
 // As in the report of a recording: depth is the displacement of the motion side since first contact, against the mean
 // direction of the force on it; a line for each contact.
 
+import { pathTo } from "./address.js"
 import { GAP_S, short } from "./plots.js"
 
 const TOUCH_N = 0.02, RELEASE_N = 0.01 // webconsole/recorded.py; less, so that noise makes no new contact
@@ -86,7 +87,7 @@ class Depth {
   }
 
   async load() {
-    const answer = await fetch(`/pressed?${new URLSearchParams({ bond: this.name })}`)
+    const answer = await fetch(pathTo("/pressed", { bond: this.name }))
     if (!answer.ok) return
     const rows = new Float64Array(await answer.arrayBuffer())
     for (let at = 0; at < rows.length; at += 7) this.contacts.push(...rows.subarray(at, at + 7))

@@ -1,5 +1,6 @@
 // Forks: the form at an instant of a recording, the sessions that were started from it, and the tree.
 
+import { pathTo } from "./address.js"
 import { make } from "./started.js"
 
 const $ = (id) => document.getElementById(id)
@@ -29,7 +30,7 @@ export class Forks {
   }
 
   async offer() {
-    const answer = await fetch("/fork")
+    const answer = await fetch(pathTo("/fork"))
     if (!answer.ok) { this.error(await answer.text()); return }
     const { devices, duration, parameters } = this.offered = await answer.json()
     $("fork-duration").placeholder = duration ?? "without end"
@@ -78,7 +79,7 @@ export class Forks {
   }
 
   async tree() {
-    const answer = await fetch("/forks")
+    const answer = await fetch(pathTo("/forks"))
     if (answer.ok) $("fork-tree").replaceChildren(drawn(await answer.json()))
   }
 }

@@ -1,6 +1,8 @@
 // The WebSocket to the server: frames, states and answers in, commands and acknowledgements out.
 // webconsole/frame.py has the layout of the frames.
 
+import { pathTo } from "./address.js"
+
 const MAGIC = 0x46435254 // "TRCF", little-endian
 const HEAD = 24
 export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7, FELT = 8
@@ -29,17 +31,18 @@ export function nodesOf(buffer, at, size) {
   return nodes
 }
 
-const OTHER_SOURCE = 4001
+const OTHER_SOURCE = 4001, NOT_SHOWN = 4002
 
 export class Link {
-  constructor(handlers) {
-    this.handlers = handlers
+  // `recording`: a name of /recordings; null: what the server was started for.
+  constructor(handlers, recording) {
+    Object.assign(this, { handlers, recording })
     this.ack = new Uint32Array(1)
     this.open()
   }
 
   open() {
-    this.socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/page`) // https: wss
+    this.socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}${pathTo("/page", {}, this.recording)}`) // https: wss
     this.socket.binaryType = "arraybuffer"
     this.socket.onopen = () => this.handlers.opened()
     this.socket.onmessage = ({ data }) => {
@@ -51,7 +54,8 @@ export class Link {
       const message = JSON.parse(data)
       this.handlers[message.is]?.(message)
     }
-    this.socket.onclose = ({ code }) => {
+    this.socket.onclose = ({ code, reason }) => {
+      if (code === NOT_SHOWN) return this.handlers.refused(reason)
       if (code === OTHER_SOURCE) return location.reload() // another source: a recording after its session
       this.handlers.closed()
       this.look()

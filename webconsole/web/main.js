@@ -1,6 +1,7 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
 import { ARROWS, FELT, Link, nodesOf, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { pathTo, shown } from "./address.js"
 import { Alerts } from "./alerts.js"
 import { Depths } from "./depth.js"
 import { Eyes } from "./eyes.js"
@@ -12,6 +13,7 @@ import { Log } from "./log.js"
 import { Network } from "./network.js"
 import { Notices, markersOf } from "./notices.js"
 import { Plots } from "./plots.js"
+import { Recordings } from "./recordings.js"
 import { Pilot } from "./pilot.js"
 import { Timeline } from "./timeline.js"
 import { showCard } from "./card.js"
@@ -32,7 +34,7 @@ const link = new Link({
     head.banner("The server of this page does not answer. The page comes back by itself.")
     waiting = []
   },
-  refused() { head.banner("This page's server was started again. Open the link that it has printed.") },
+  refused(why) { head.banner(why || "This page's server was started again. Open the link that it has printed.") },
   frame(frame) { waiting.push(frame); dirty = true },
   session: begin,
   state(state) {
@@ -54,7 +56,7 @@ const link = new Link({
     start.answered(answer)
   },
   trouble({ text }) { said("page", text) },
-})
+}, shown)
 let lastTime = 0, framed = null
 const head = new Head(link)
 const feel = new Feel()
@@ -77,6 +79,7 @@ const timeline = new Timeline((time) => {
 })
 const started = new Started(link, [...document.querySelectorAll(".started")])
 const forks = new Forks(link, timeline, started), start = new Start(link, started)
+const recordings = new Recordings()
 timeline.found = (events) => log.add(events, true)
 const guide = new Guide($("guide"), link, eyes, () => past)
 const plots = new Plots($("plot-list"), $("add"), $("ports"), ask)
@@ -102,6 +105,7 @@ async function begin(described) {
   guide.begin(described)
   forks.begin(described)
   start.begin(described)
+  recordings.begin(described)
   log.clear()
   alerts.clear()
   for (const text of described.notes ?? []) said("scene", text)
@@ -119,7 +123,7 @@ async function begin(described) {
 async function stage(described) {
   if (!scene && !refused) await makeScene()
   if (!scene) return
-  const answer = await fetch("/scene")
+  const answer = await fetch(pathTo("/scene"))
   if (!answer.ok) return
   scene.load(await answer.arrayBuffer(), described.surfaces)
   scene.frames($("frames").checked)

@@ -1,5 +1,6 @@
 // Plots of numeric ports by name: of a running session its last seconds, of a recording all of it.
 
+import { pathTo } from "./address.js"
 import uPlot from "./vendor/uPlot.esm.js"
 
 const LAST_S = 20, KEPT = 2400, HEIGHT = 120, MOST = 24, SHORTEST_S = 1e-5
@@ -177,8 +178,7 @@ class Plot {
 
   // Columns of the recording between two times (s), with least and greatest of each part; null if there are none.
   async between(from, to) {
-    const query = new URLSearchParams({ port: this.entry.name, from, to, buckets: "1000" })
-    const answer = await fetch(`/series?${query}`)
+    const answer = await fetch(pathTo("/series", { port: this.entry.name, from, to, buckets: "1000" }))
     if (!answer.ok) { this.element.querySelector(".unit").textContent = await answer.text(); return null }
     const width = Number(answer.headers.get("X-Width")), rows = new Float64Array(await answer.arrayBuffer())
     const count = rows.length / width

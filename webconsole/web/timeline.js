@@ -1,6 +1,8 @@
 // The timeline of a recording, or of a running session that is recorded: the instant that is shown, playing,
 // events, and of a recording the instant in the URL.
 
+import { pathTo } from "./address.js"
+
 const $ = (id) => document.getElementById(id)
 
 const MOST_EVENTS = 500
@@ -32,7 +34,7 @@ export class Timeline {
     this.scrub.min = start; this.scrub.max = end
     $("timeline").hidden = false
     if (!this.fromUrl()) this.go(start)
-    const answer = await fetch("/events")
+    const answer = await fetch(pathTo("/events"))
     if (answer.ok) this.events = await answer.json()
     this.found?.(this.events)
     this.marks()

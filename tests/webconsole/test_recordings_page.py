@@ -1,0 +1,57 @@
+"""The list of recordings in a real browser: opening one, and comparing two."""
+
+import pytest
+
+from tests.webconsole.conftest import served
+from tests.webconsole.recorded_scene import write_scene
+from tests.webconsole.test_browser import NAMELESS, Person
+from webconsole.recorded import Recorded
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    home = tmp_path_factory.mktemp("recordings")
+    write_scene(home / "first")
+    write_scene(home / "second", 90)
+    (home / "broken.mcap").write_bytes(b"no recording")
+    with served(Recorded(home / "first"), home=home) as server:
+        yield server
+
+
+@pytest.fixture
+def person(browser, server):
+    made = []
+
+    def open_page(role="operator", **context):
+        link = f"http://127.0.0.1:{server.port}{server.gate.invite(role)}"
+        made.append(Person(browser, link, **context))
+        made[-1].sees("Boolean(window.trocar?.scene?.placed)")
+        return made[-1]
+
+    yield open_page
+    for one in made:
+        one.context.close()
+
+
+def test_a_recording_of_the_list_is_opened_and_the_first_one_again(person):
+    one = person()
+    one.page.get_by_role("button", name="Recordings").click()
+    dialog = one.page.get_by_role("dialog", name="Recordings")
+    dialog.get_by_role("row", name="second").wait_for()
+    assert "shown" in dialog.get_by_role("row", name="first").inner_text()
+    assert "is not an MCAP file" in dialog.get_by_role("row", name="broken").inner_text()
+    assert dialog.get_by_role("link", name="broken").count() == 0
+    assert one.page.evaluate(NAMELESS) == []
+    dialog.get_by_label("Find in the list").fill("sec pal")
+    assert not dialog.get_by_role("row", name="first").is_visible()
+    dialog.get_by_role("link", name="second", exact=True).click()
+    one.page.wait_for_url("**/?recording=second*")
+    one.sees("window.trocar?.scene?.placed && Number(document.querySelector('#scrub').max) > 1.4")
+    one.page.get_by_role("link", name="Back to the first").click()
+    one.sees("window.trocar?.scene?.placed && Number(document.querySelector('#scrub').max) < 1")
+    assert one.errors == []
+
+
+def test_a_viewer_has_no_list(person):
+    one = person("viewer")
+    assert not one.page.get_by_role("button", name="Recordings").is_visible()
