@@ -12,7 +12,7 @@ from engines.bullet.elasticity.stable_step import longest_step
 from engines.bullet.probes.params import ProbeParams
 from engines.tissue.organs.anchors import WORLD, RigidParams
 from engines.tissue.organs.params import OrganParams
-from hub.participant import Params
+from hub.participant import Surface, TissueParams
 from schemas.errors import did_you_mean
 from schemas.quantity import Acceleration, Duration
 from schemas.scenario import Name
@@ -23,7 +23,7 @@ _LONGEST_NS, _HALVES = 1_000_000, 4
 """Longest default sub-step, and most halvings; 62.5 us are far from real time."""
 
 
-class BulletParams(Params):
+class BulletParams(TissueParams):
     """Organs, probes, and numerics."""
 
     open_to_pages: ClassVar[bool] = True
@@ -61,6 +61,11 @@ class BulletParams(Params):
             " restored; recordings of version 0.1.0 are without"
         ),
     )
+
+    @property
+    def bodies(self) -> dict[str, Surface]:
+        """The organs at rest."""
+        return {name: Surface(organ.rest.nodes, organ.rest.triangles) for name, organ in self.organs.items()}
 
     @cached_property
     def sub_step(self) -> int:

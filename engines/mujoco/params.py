@@ -8,19 +8,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, model_validator, with_config
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
 from engines.mujoco.object_params import ObjectParams, TableParams
-from hub.participant import Params
+from engines.mujoco.tools import instrument_tool
+from hub.participant import Params, Tool, ToolParams
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
 from robots.dvrk.mounted import MountedArms, MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import SIMULATED, CartArm, base_pose
 from robots.training.fixtures import FixtureParams
 from schemas.keys import valid_name
 from schemas.quantity import Duration
 from schemas.scenario import Name
+from schemas.vectors import Vector
 
 __all__ = ["MujocoParams", "SceneParams"]
 
@@ -90,6 +93,12 @@ class SceneParams(Params):
         default=True, description="give the robot its meshes; without, it has collision shapes only"
     )
 
+    def base_pose(self, arm: CartArm) -> Vector:
+        """Return the pose of the arm's base frame in the world, shape (4, 4)."""
+        if self.mounting == "cart":
+            return base_pose(arm, np.array(self.setup_joints.get(arm, SIMULATED[arm])))
+        return self.arms[arm].pose
+
     @model_validator(mode="after")
     def _stands_in_one_place(self) -> Self:
         if self.mounting == "free" and self.setup_joints:
@@ -123,7 +132,7 @@ class SceneParams(Params):
         return self
 
 
-class MujocoParams(SceneParams):
+class MujocoParams(SceneParams, ToolParams):
     """A scene and stepping."""
 
     open_to_pages: ClassVar[bool] = True
@@ -161,3 +170,12 @@ class MujocoParams(SceneParams):
             " stand still in the model, and the covers of arms touch nothing"
         ),
     )
+
+    @property
+    def tools(self) -> tuple[Tool, ...]:
+        """The instruments of all PSMs."""
+        return tuple(
+            instrument_tool(name, arm, self.base_pose(name))
+            for name, arm in self.arms.items()
+            if isinstance(arm, MountedPsm)
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import defaultdict
 from collections.abc import Mapping
 from typing import Annotated
@@ -11,12 +12,15 @@ from rich.markup import escape
 
 from hub.command_line.display import results
 from hub.command_line.options import Json, Overrides, ScenarioName, with_places
+from hub.planning.contacts import missing_contacts
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.planning.scenario_file import load
 from hub.planning.scenario_schema import scenario_schema
 from hub.session.launch import plan_of
 
 __all__ = ["check", "schema"]
+
+log = logging.getLogger(__name__)
 
 
 def check(
@@ -35,6 +39,14 @@ def check(
     file = load(scenario, overrides or ())
     with with_places(file.source):
         plan, _ = plan_of(file.scenario, file.params)
+    for missing in missing_contacts(file.params, file.scenario.bonds):
+        log.warning(
+            "the instrument of %s reaches '%s', and there is no contact between them: it would pass"
+            " through. %s",
+            missing.tool.name,
+            missing.body,
+            missing.remedy,
+        )
     if as_json:
         typer.echo(plan.model_dump_json(indent=2))
         return

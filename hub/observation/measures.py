@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hub.observation.contact_watch import ContactWatch
 from hub.planning.measured import measured_port
 from hub.planning.plan import Plan
 from schemas.ros import Float64Message
@@ -83,7 +84,7 @@ class Measures:
 
     def __init__(self, scenario: Scenario, plan: Plan) -> None:
         self._meters: dict[str, _Meter] = {}
-        self.by_port: dict[tuple[str, str], list[_Meter]] = {
+        self.by_port: dict[tuple[str, str], list[_Meter | ContactWatch]] = {
             (planned.name, port.name): []
             for planned in plan.participants.values()
             for port in planned.ports
@@ -97,6 +98,10 @@ class Measures:
             period = 1e-9 * (planned.read_ns or plan.step_ns * plan.output_stride(planned.name, port.name))
             meter = self._meters[name] = _Meter(measure, part, period)
             self.by_port.setdefault((measure.of.participant, port.name), []).append(meter)
+
+    def watch(self, watch: ContactWatch) -> None:
+        """Give `watch` every pose of its tool's tip."""
+        self.by_port.setdefault(watch.port, []).append(watch)
 
     @property
     def ports(self) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 from hub.participant.base import Outputs, Params, Participant, Value
 from hub.participant.bond import ForceSide, MotionSide
+from hub.participant.contact import Surface, TissueParams, Tool, ToolParams
 from hub.participant.controller import Controller
 from hub.participant.device import Device, Sample, VectorSample
 from hub.participant.inputs import Inputs
@@ -25,6 +26,10 @@ __all__ = [
     "Setup",
     "SignalFields",
     "Stepped",
+    "Surface",
+    "TissueParams",
+    "Tool",
+    "ToolParams",
     "Value",
     "VectorSample",
     "array",

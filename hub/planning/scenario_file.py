@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from hub.participant import Params
 from hub.planning import registry
+from hub.planning.contacts import add_contacts
 from hub.planning.foreign_code import foreign_code
 from hub.planning.limits import MAX_PARTICIPANTS, MAX_PROBLEMS, safe_text
 from hub.planning.renamed import SCENARIOS, replace_old_names
@@ -82,6 +83,8 @@ def validate_source(source: Source, overrides: Sequence[str] = ()) -> ScenarioFi
     if len(found) == MAX_PROBLEMS:  # the scene is not spread to its end: what would be said of it is wrong
         raise ScenarioError("\n".join(found))
     params = _all_params(source, found)
+    if not found:
+        _make_contacts(source, params, found)
     try:
         scenario = Scenario.model_validate(source.tree)
     except ValidationError as error:
@@ -169,6 +172,16 @@ def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
                 del found[MAX_PROBLEMS:]
                 break
     return params
+
+
+def _make_contacts(source: Source, params: dict[str, Params], found: list[str]) -> None:
+    """Add the contacts of the tools to the tree, and the new probes to `params`."""
+    try:
+        for name in add_contacts(source, params):
+            spec = source.tree["participants"][name]
+            params[name] = _participant_params(("participants", name), spec, source, {spec["kind"]})
+    except ScenarioError as error:
+        found += str(locate_error(error, source)).splitlines()
 
 
 def _participant_params(at: Location, spec: dict[str, Any], source: Source, present: set[str]) -> Params:

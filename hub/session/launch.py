@@ -13,6 +13,7 @@ from typing import Any
 
 from hub.participant import Device, Params, Stepped
 from hub.planning import registry
+from hub.planning.contacts import missing_contacts
 from hub.planning.plan import Plan
 from hub.planning.scenario_file import ScenarioFile
 from hub.planning.wiring import make_plan
@@ -108,6 +109,7 @@ def launch(
         successors=successors,
         on_ack=None if continuation is None else continuation.on_ack,
         profile=profile,
+        missing_contacts=missing_contacts(loaded.params, scenario.bonds),
     )
 
 

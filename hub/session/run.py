@@ -17,9 +17,11 @@ from hub.hosting.host import Host
 from hub.hosting.host_processes import HostProcesses
 from hub.hosting.interrupt import Interrupt
 from hub.hosting.watchdog import Watchdog
+from hub.observation.contact_watch import ContactWatch
 from hub.observation.measures import Measures
 from hub.observation.monitor import Monitor
 from hub.participant import Device, Stepped
+from hub.planning.contacts import MissingContact
 from hub.planning.plan import Plan
 from hub.planning.session_parameters import SessionParameters, Successors
 from hub.recording.recorder import Recorder
@@ -78,6 +80,8 @@ class SessionSpec:
     """Where the time goes is measured."""
     recording: str = ""
     """The directory of the recording; empty: there is none."""
+    missing_contacts: Sequence[MissingContact] = ()
+    """Tools that pass through tissue within their reach."""
 
     @property
     def live_from(self) -> int | None:
@@ -136,7 +140,10 @@ class Run:
         self.processes = HostProcesses(_links(plan))
         stack.callback(self.processes.end)
         self.clock = _clock(scenario, plan, spec.live_from or 0)
-        self.monitor = Monitor(plan, keys, self.connection.number, Measures(scenario, plan), recorder)
+        measures = Measures(scenario, plan)
+        for missing in spec.missing_contacts:
+            measures.watch(ContactWatch(missing))
+        self.monitor = Monitor(plan, keys, self.connection.number, measures, recorder)
         ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
         self.acks = AckReceiver(self.connection, ack_keys, self.processes.links)
         self.profile = RunProfile(self.connection, self.clock, self.monitor) if spec.profiled else None

@@ -10,6 +10,7 @@ from pathlib import Path
 from hub.hosting.interrupt import Interrupt
 from hub.observation.summary import Progress, Summary
 from hub.participant import Device, Stepped
+from hub.planning.contacts import MissingContact
 from hub.planning.plan import Plan
 from hub.planning.session_parameters import Successors
 from hub.recording.recorder import Recorder
@@ -49,6 +50,7 @@ class Session:
         successors: Successors in this process of `participants`, each with the first step.
         on_ack: Is called with every participant's ack of every grant.
         profile: Measure the use of time, for summary, recording and `trocar ls`.
+        missing_contacts: Tools that pass through tissue: a warning says so when one enters it.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class Session:
         successors: Successors | None = None,
         on_ack: OnAck | None = None,
         profile: bool = False,
+        missing_contacts: Sequence[MissingContact] = (),
     ) -> None:
         self.scenario = scenario
         self.plan = plan
@@ -88,6 +91,7 @@ class Session:
         self._successors = successors or {}
         self._on_ack = on_ack
         self._profiled = profile
+        self._missing_contacts = missing_contacts
         self._profile: Profile | None = None
 
     @property
@@ -130,6 +134,7 @@ class Session:
                         successors=self._successors,
                         profiled=self._profiled,
                         recording="" if self._record is None else str(self._record.resolve()),
+                        missing_contacts=self._missing_contacts,
                     )
                     run = Run(stack, spec, session, self.state, interrupt, recorder)
                     self._step(run, interrupt, progress)

@@ -46,10 +46,11 @@ from robots.dvrk.parameters import (
     start_positions,
 )
 from robots.serial_chain import SerialChain
-from robots.transform import rigid_transform
+from robots.transform import inverse_transform, rigid_transform
 from schemas.errors import MotionError
 from schemas.files import find_file
 from schemas.quantity import Angle, Length
+from schemas.scenario import Name
 from schemas.vectors import Vector
 
 __all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedArms", "MountedEcm", "MountedPsm", "PsmTool"]
@@ -223,6 +224,13 @@ class MountedPsm(PsmTool, MountedArm):
         default=FOLDED,
         description="closings, then spreads, of a hand's fingers at time 0; default: folded",
     )
+    touches: tuple[Name, ...] = Field(
+        default=(),
+        description=(
+            "organs that the instrument touches: the tissue gets a probe of the arm's name, and the session a"
+            " bond between both; state either for numbers of your own"
+        ),
+    )
 
     @cached_property
     def tool(self) -> Instrument:
@@ -230,6 +238,33 @@ class MountedPsm(PsmTool, MountedArm):
         tool = super().tool
         is_probe = isinstance(tool.end_effector, Probe)
         return replace(tool, end_effector=Probe(self.probe_radius)) if is_probe else tool
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of the instrument's end from the remote centre of motion, m."""
+        out = np.array([joint.upper if joint.kind == "prismatic" else 0.0 for joint in self.chain.joints])
+        return float(np.linalg.norm(self.chain.forward(out)[:3, 3])) + self._extent
+
+    @property
+    def sphere_centres(self) -> Vector:
+        """Centres of the contact spheres in the tip's frame, every joint at 0, m, shape (n, 3).
+
+        A palpation probe is one sphere at the tip.
+        """
+        if isinstance(self.end_effector, Probe):
+            return np.zeros((1, 3))
+        mount = Mount.on(self.chain)
+        poses = {link.name: link.pose for link in self.end_effector_links} | {mount.link: mount.pose}
+        from_base = inverse_transform(mount.tip)
+        centres = [from_base @ poses[one.link] @ (*one.position, 1.0) for one in self.spheres]
+        return np.array(centres).reshape(-1, 4)[:, :3]
+
+    @property
+    def _extent(self) -> float:
+        """Distance of the end of the farthest sphere from the tip, m."""
+        radius = self.probe_radius if isinstance(self.end_effector, Probe) else 0.0
+        radius = max([radius, *(sphere.radius for sphere in self.spheres)])
+        return radius + max(np.linalg.norm(self.sphere_centres, axis=1).tolist(), default=0.0)
 
     @property
     def _driven(self) -> list[str]:

@@ -1,0 +1,35 @@
+"""Instruments of a scene as tools that touch tissue."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hub.participant import Tool
+from robots.dvrk.end_effectors.probe import Probe
+from robots.dvrk.mounted import MountedPsm
+from schemas.vectors import Vector
+
+__all__ = ["instrument_tool"]
+
+
+def instrument_tool(arm: str, mounted: MountedPsm, base: Vector) -> Tool:
+    """Return the instrument of an arm with its base frame at `base`, pose in the world, shape (4, 4)."""
+    is_probe, spheres = isinstance(mounted.end_effector, Probe), mounted.spheres
+    probe: dict[str, Any] = {}
+    if is_probe:
+        probe = {"radius": mounted.probe_radius}
+    elif spheres:
+        radii = [sphere.radius for sphere in spheres]
+        probe = {"spheres": len(spheres), "radius": radii[0] if len(set(radii)) == 1 else radii}
+        probe |= {} if mounted.tool.jaw is None else {"grasp": {}}
+    return Tool(
+        name=arm,
+        touches=mounted.touches,
+        path=("arms", arm, "touches"),
+        bond=f"{arm}/{'probe' if is_probe else 'contact'}" if probe else "",
+        probe=probe,
+        tip=f"{arm}/measured_cp",
+        base=base,
+        reach=mounted.reach,
+        spheres=mounted.sphere_centres,
+    )
