@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hub.devices.network_link_control import NetworkLinkRequest
+from hub.recording.bond_trace import Contact
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError, ScenarioError
 from schemas.trocar_msgs import ScoreCard
@@ -157,6 +158,16 @@ class Console:
         if not isinstance(self.source, Recorded):
             raise MessageError("this page shows a running session; its recording has a timeline")
         return self.source
+
+    async def contacts(self, bond: str) -> list[Contact]:
+        """Return the contacts of a bond with a single point; raises MessageError or RecordingError."""
+        stage = await self.stage()
+        found = next((one for one in (stage.arrows if stage else ()) if one.name == bond), None)
+        if stage is None or found is None or not found.at_one_point:
+            raise MessageError(f"no bond '{bond:.80}' acts at one point")
+        if isinstance(self.source, Recorded):
+            return await asyncio.to_thread(self.source.contacts, found)
+        return stage.histories[bond].trace.contacts
 
     def card(self, time_ns: int | None) -> dict[str, Any] | None:
         """Return the newest score card at a simulated time, ready for JSON; None if there is none."""

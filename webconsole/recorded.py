@@ -12,6 +12,7 @@ import numpy as np
 
 from hub.participant import Params
 from hub.recording.bag import output_port
+from hub.recording.bond_trace import BondTrace, Contact
 from hub.recording.moments import Moments
 from hub.recording.recording import STATUS_TOPIC, Recording
 from hub.recording.series import Series
@@ -144,18 +145,11 @@ class Recorded:
             columns, pyramid = self._pyramid(name)
         return columns, pyramid.rows(start_s, end_s, buckets)
 
-    def force_rows(self, bond: BondArrows, most: int) -> Vector:
-        """Return rows of time (s), point (m) and force (N) of a bond with a single point, shape (n, 7).
-
-        Of more than `most` rows, each second, third, ... is kept. Raises RecordingError.
-        """
+    def contacts(self, bond: BondArrows) -> list[Contact]:
+        """Return the contacts of a bond with a single point. Raises RecordingError."""
         with self._lock:
             place, force = self._series(bond.place), self._series(bond.force)
-        at = np.searchsorted(place.time, force.time, "right") - 1
-        every = slice(None, None, -(-len(at) // most) or 1)
-        at, times, forces = at[every], force.time[every], force.values[every, :3]
-        known = at >= 0
-        return np.column_stack([times, place.values[at, :3], forces])[known]
+        return BondTrace.of_series(bond.name, place.time, place.values, force.time, force.values).contacts
 
     def _read_series(self, name: str) -> Series:
         if name not in self.recording:

@@ -8,6 +8,7 @@ from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from math import isfinite
 
+import numpy as np
 import uvicorn
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -18,7 +19,7 @@ from starlette.websockets import WebSocket
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from hub.planning.scenario_file import installed_scenarios
-from schemas.errors import MessageError, TrocarError
+from schemas.errors import TrocarError
 from webconsole.afterlife import Afterlife
 from webconsole.assets import asset, compress_all, gzip_response
 from webconsole.commands import MOST_BYTES
@@ -42,6 +43,8 @@ _MOST_REASON_BYTES = 123
 """Longest reason of a close frame (RFC 6455, 5.5)."""
 _AHEAD_S = 0.2
 _MOST_BUCKETS = 4000
+_MOST_CONTACTS, _MOST_POINTS = 6, 300
+"""Contacts of a bond on a page, and points of each."""
 _BINARY = "application/octet-stream"
 
 
@@ -83,7 +86,7 @@ class Server:
                 Route("/web/{name:path}", asset),
                 Route("/scene", self._scene),
                 Route("/series", self._series),
-                Route("/pressed", self._force_rows),
+                Route("/contacts", self._contacts),
                 Route("/events", self._events),
                 Route("/numbers", self._numbers),
                 Route("/recordings", self._recordings),
@@ -216,19 +219,19 @@ class Server:
             rows.astype("<f8").tobytes(), media_type=_BINARY, headers={"X-Width": str(len(columns) + 1)}
         )
 
-    async def _force_rows(self, request: Request) -> Response:
-        """Answer with time, point and force of a bond of a recording, rows of seven f64."""
+    async def _contacts(self, request: Request) -> Response:
+        """Answer with the newest contacts of a bond: rows of number, depth (mm) and force (N), f32."""
         try:
             console = await self._console_for(request)
-            recorded, stage = console.recorded_source(), await console.stage()
-            name = request.query_params.get("bond")
-            found = [one for one in (stage.arrows if stage else ()) if one.name == name and one.at_one_point]
-            if not found:
-                raise MessageError("no bond of this name acts at one point")
-            rows = await asyncio.to_thread(recorded.force_rows, found[0], _MOST_BUCKETS)
+            contacts = await console.contacts(request.query_params.get("bond", ""))
         except TrocarError as error:
             return PlainTextResponse(f"{error}\n", status_code=400)
-        return Response(rows.astype("<f8").tobytes(), media_type=_BINARY)
+        lines = [one.thin(_MOST_POINTS) for one in contacts[-_MOST_CONTACTS:]]
+        rows = [
+            np.column_stack([np.full(len(one.force), i), 1e3 * one.depth, one.force])
+            for i, one in enumerate(lines)
+        ]
+        return Response(np.vstack([np.empty((0, 3)), *rows]).astype("<f4").tobytes(), media_type=_BINARY)
 
     async def _events(self, request: Request) -> Response:
         """Answer with the events of a recording."""

@@ -23,6 +23,7 @@ from schemas.scenario import Scenario
 from schemas.trocar_msgs import ShownMarkers, SoftBodyState
 from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
+from webconsole.bond_history import BondHistory
 from webconsole.felt import felt_wrenches
 from webconsole.frame import Section, SectionKind, node_content
 from webconsole.gauges import GAUGES
@@ -71,6 +72,8 @@ class Stage:
         drawn = {name for participant in self.scenes for name in self.inputs(participant)}
         self._codecs = {name: codec for name, codec in self.numbers.items() if name in drawn}
         self.arrows = bond_arrows(scenario, self.numbers)
+        self.histories = {bond.name: BondHistory(bond.name) for bond in self.arrows if bond.at_one_point}
+        """Live values of each bond with a single point, by name."""
         self.felt = felt_wrenches(scenario, self.numbers)
         """Outlets of the wrenches on the moved instruments, by device led from pages."""
         of_hands = (name for names in self.felt.values() for name in names)
@@ -152,12 +155,13 @@ class Stage:
         row = np.concatenate([[value.time_ns / 1e9], numbers])
         return Section(SectionKind.SAMPLE, index, row.astype("<f8").tobytes())
 
-    def arrow(self, bond: BondArrows, place: Value, force: Value) -> Section:
-        """Return the arrows of a bond; raises MessageError if a value is not valid."""
-        vectors = (
-            self.numbers[name].decode(value.payload) for name, value in zip(bond, (place, force), strict=True)
-        )
-        rows = bond.rows(*vectors)
+    def arrow(self, bond: BondArrows, place: Value, force: Value, *, live: bool = False) -> Section:
+        """Return the arrows of a bond, and keep live values; raises MessageError if a value is not valid."""
+        placed = self.numbers[bond.place].decode(place.payload)
+        pushed = self.numbers[bond.force].decode(force.payload)
+        if live and bond.at_one_point:
+            self.histories[bond.name].add(place.time_ns / 1e9, placed, force.time_ns / 1e9, pushed)
+        rows = bond.rows(placed, pushed)
         return Section(SectionKind.ARROWS, self.arrows.index(bond), rows.astype("<f4").tobytes())
 
     def force(self, device: str, values: Mapping[str, Value]) -> Section:

@@ -10,11 +10,11 @@ from string import Template
 
 import numpy as np
 
+from hub.recording.bond_trace import BondTrace, read_bond_trace
 from hub.recording.profiles import profile_numbers, profile_tables
 from hub.recording.recording import Recording
 from hub.recording.report_canvas import Figure
 from hub.recording.report_figures import (
-    BondTrace,
     energy_figures,
     force_figure,
     motion_figure,
@@ -26,7 +26,6 @@ from hub.recording.report_notes import participant_notes
 from hub.recording.report_scores import last_score_cards, score_figures, score_table
 from hub.recording.report_tissue import tissue_figures
 from hub.recording.report_vision import vision_figures
-from hub.recording.series import Series
 from schemas.errors import RecordingError
 from schemas.scenario import Bond, Scenario
 from schemas.trocar_msgs import SessionStatus
@@ -42,7 +41,7 @@ def report(recording: Recording, output: Path) -> None:
     `output` cannot be written.
     """
     scenario = recording.scenario()
-    traces = [trace for bond in scenario.bonds if (trace := _bond_trace(recording, bond)) is not None]
+    traces = [trace for bond in scenario.bonds if (trace := read_bond_trace(recording, bond)) is not None]
     books = {bond.name: _energy_book(recording, bond) for bond in scenario.bonds}
     statuses = list(recording.statuses())
     page = Template((files("hub.recording") / "report_page.html").read_text(encoding="utf-8"))
@@ -66,22 +65,6 @@ def report(recording: Recording, output: Path) -> None:
         output.write_text(text, encoding="utf-8")
     except OSError as error:
         raise RecordingError(f"cannot write the report to '{output}': {error.strerror}") from error
-
-
-def _bond_trace(recording: Recording, bond: Bond) -> BondTrace | None:
-    """Return both sides of `bond` at the times of the force; None if a side is not recorded."""
-    motion = _first(recording, f"{bond.motion.participant}.{bond.motion.port}", ("pose", "position"))
-    force = _first(recording, f"{bond.force.participant}.{bond.force.port}", ("wrench", "force"))
-    if not motion or not force:
-        return None
-    dof = min(3, motion.values.shape[1], force.values.shape[1])
-    position = [np.interp(force.time, motion.time, motion.values[:, i]) for i in range(dof)]
-    return BondTrace(bond.name, force.time, np.stack(position, axis=1), force.values[:, :dof])
-
-
-def _first(recording: Recording, bond: str, names: Iterable[str]) -> Series | None:
-    """Return the first recorded port among the ports `names` of a side of a bond."""
-    return next((recording[f"{bond}/{name}"] for name in names if f"{bond}/{name}" in recording), None)
 
 
 def _energy_book(recording: Recording, bond: Bond) -> tuple[Vector, Vector, Vector]:
@@ -147,7 +130,7 @@ def _numbers(
             ("dropped messages", f"{status.dropped_messages:,}"),
         ]
     rows.append(("communication step", f"{scenario.step * 1e-6:g} ms"))
-    rows += [(f"peak force, {trace.name}", f"{trace.magnitude.max(initial=0):.3f} N") for trace in traces]
+    rows += [(f"peak force, {trace.name}", f"{trace.peak:.3f} N") for trace in traces]
     rows += [
         (f"energy residual, {bond}", f"{(taken[-1] - given[-1]) * 1e6:.3g} µJ")
         for bond, (_, given, taken) in books.items()

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
+from hub.recording.bond_trace import CONTACT_SHARE, BondTrace
 from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, draw_legend, line_of, thin
 from schemas.vectors import Vector
 
 __all__ = [
-    "BondTrace",
     "energy_figures",
     "force_figure",
     "motion_figure",
@@ -20,84 +17,34 @@ __all__ = [
     "step_time_figures",
 ]
 
-CONTACT_SHARE = 0.05
-"""Share of the peak force above which there is contact; a virtual coupling moved through air shows 2 % in the
-palpation scenario.
-"""
-
 _POINTS = 1200
-"""Points of a line, all kept whatever their height."""
-
-
-@dataclass(frozen=True)
-class BondTrace:
-    """Where the motion side of a bond was, and how the force side pushed back."""
-
-    name: str
-    times_s: Vector
-    """Shape (n,)."""
-    position: NDArray[np.float64]
-    """Position of the motion side, m, shape (n, 1 to 3)."""
-    force: NDArray[np.float64]
-    """Force on the motion side, N, shape (n, 1 to 3)."""
-
-    @property
-    def magnitude(self) -> Vector:
-        """Magnitude of the force, N, shape (n,)."""
-        return np.linalg.norm(self.force, axis=1)
-
-    @property
-    def contact(self) -> NDArray[np.bool_]:
-        """Where the sides touch, shape (n,)."""
-        peak = self.magnitude.max(initial=0.0)
-        return (self.magnitude > CONTACT_SHARE * peak) if peak > 0 else np.zeros(len(self.times_s), bool)
-
-    @property
-    def depth(self) -> Vector:
-        """Displacement since first contact against the mean force on the motion side, m, shape (n,).
-
-        Zeros if there was no contact.
-        """
-        contact = self.contact
-        if not contact.any():
-            return np.zeros(len(self.times_s))
-        direction = self.force[contact].mean(axis=0)
-        first = int(np.argmax(contact))
-        return -(self.position - self.position[first]) @ (direction / np.linalg.norm(direction))
-
-    def episodes(self, gap_s: float = 0.05) -> list[slice]:
-        """Return the intervals of contact; shorter interruptions than `gap_s` do not count."""
-        inside = np.flatnonzero(self.contact)
-        if not inside.size:
-            return []
-        breaks = np.flatnonzero(np.diff(self.times_s[inside]) > gap_s)
-        starts, ends = np.append(inside[0], inside[breaks + 1]), np.append(inside[breaks], inside[-1])
-        return [slice(int(a), int(b) + 1) for a, b in zip(starts, ends, strict=True)]
+"""Points of a line."""
 
 
 def press_figure(trace: BondTrace) -> Figure:
     """Force against depth, a line per contact."""
-    episodes = trace.episodes()
-    depth_mm, magnitude = trace.depth * 1e3, trace.magnitude
+    contacts = trace.contacts
     with axes_of("depth (mm)", "force (N)") as (axes, result):
-        for i, part in enumerate(episodes):
-            label = f"{trace.times_s[part.start]:.1f}–{trace.times_s[part.stop - 1]:.1f} s"
-            every = slice(part.start, part.stop, 1 + (part.stop - part.start) // _POINTS)
+        for i, contact in enumerate(contacts):
+            line = contact.thin(_POINTS)
             axes.plot(
-                depth_mm[every],
-                magnitude[every],
+                line.depth * 1e3,
+                line.force,
                 linewidth=1,
                 color=SERIES[i % len(SERIES)],
-                label=label if len(episodes) <= len(SERIES) else None,
+                label=f"{line.times_s[0]:.1f}–{line.times_s[-1]:.1f} s"
+                if len(contacts) <= len(SERIES)
+                else None,
             )
-        if 1 <= len(episodes) <= len(SERIES):
+        if 1 <= len(contacts) <= len(SERIES):
             draw_legend(axes)
         axes.set_ylim(bottom=0)
+    deepest_mm = 1e3 * max((float(one.depth.max()) for one in contacts), default=0.0)
     caption = (
-        "Depth is the displacement of the motion side since first contact, against the mean direction of the"
-        f" force on it; contact is where the force exceeds {CONTACT_SHARE:.0%} of its peak of"
-        f" {magnitude.max(initial=0):.3g} N. {len(episodes)} contact{'s' if len(episodes) != 1 else ''},"
-        f" deepest {depth_mm.max(initial=0):.2f} mm."
+        "Depth is the displacement of the motion side since the touch, against the force until half of the"
+        f" contact's largest; contact is where the force exceeds {CONTACT_SHARE:.0%} of its peak of"
+        f" {trace.peak:.3g} N. {len(contacts)} contact{'s' if len(contacts) != 1 else ''},"
+        f" deepest {deepest_mm:.2f} mm."
     )
     return Figure(f"{trace.name}: force against depth", result.svg(caption), caption)
 
@@ -111,7 +58,7 @@ def force_figure(trace: BondTrace) -> Figure:
         for i, name in zip(range(trace.force.shape[1]), "xyz", strict=False):
             axes.plot(*thin(trace.times_s, trace.force[:, i]), color=SERIES[i], label=name)
         draw_legend(axes)
-    caption = f"Force on the motion side, in the bond's frame. Peak {trace.magnitude.max(initial=0):.3g} N."
+    caption = f"Force on the motion side, in the bond's frame. Peak {trace.peak:.3g} N."
     return Figure(f"{trace.name}: force", result.svg(caption), caption)
 
 

@@ -16,6 +16,8 @@ import pytest
 from PIL import Image
 from websockets.asyncio.client import connect
 
+from hub.recording.bond_trace import read_bond_trace
+from hub.recording.recording import Recording
 from tests.waiting import until
 from tests.webconsole.conftest import CHROMIUM, cookie_of, finish, served
 from tests.webconsole.recorded_scene import EYES, write_scene
@@ -136,11 +138,8 @@ def test_both_eyes_are_one_picture_for_red_and_cyan_glasses(person):
 
 PRESSED = """
 async () => {
-  const { Contacts } = await import("/web/depth.js")
-  const contacts = new Contacts(), answer = await fetch("/pressed?bond=robot.PSM1/probe")
-  const rows = new Float64Array(await answer.arrayBuffer())
-  for (let at = 0; at < rows.length; at += 7) contacts.push(...rows.subarray(at, at + 7))
-  return [contacts.lines.length, Math.max(...contacts.lines[0].map(([depth, force]) => force))]
+  const { contactsOf } = await import("/web/depth.js")
+  return (await contactsOf("robot.PSM1/probe")).map((line) => line.at(-1))
 }
 """
 MARKED = """
@@ -535,7 +534,12 @@ def test_force_against_depth_and_pictures_that_the_page_draws(browser, tmp_path)
         one = Person(browser, f"http://127.0.0.1:{server.port}{server.gate.invite('viewer')}")
         one.sees("Boolean(trocar.scene?.placed)")
         one.page.get_by_role("img", name="force against depth").wait_for()
-        assert one.page.evaluate(PRESSED) == [1, pytest.approx(0.05 * 53, abs=0.2)]
+        (contact,) = read_bond_trace(
+            recording := Recording(tmp_path / "pressed"), recording.scenario().bonds[0]
+        ).contacts
+        assert one.page.evaluate(PRESSED) == [
+            [pytest.approx(1e3 * contact.depth[-1]), pytest.approx(50 * 0.054)]
+        ]
         assert not one.page.get_by_role("img", name="Picture of").first.is_visible(), "it has no endoscope"
         assert one.errors == []
         one.context.close()

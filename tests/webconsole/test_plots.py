@@ -53,10 +53,10 @@ def test_values_that_leave_no_scale_are_drawn_without_an_error(person, values, s
 
 
 def test_what_a_page_has_not_seen_is_a_gap(person):
-    """Who looked at the past for some seconds has no line over them, and no contact without a beginning."""
-    data, contacts = person.page.evaluate(
+    """Who looked at the past for some seconds has no line over them."""
+    data = person.page.evaluate(
         """async () => {
-          const { Plots } = await import("/web/plots.js"), { Contacts } = await import("/web/depth.js")
+          const { Plots } = await import("/web/plots.js")
           const tags = ["div", "input", "datalist"]
           const [list, input, options] = tags.map((name) => document.createElement(name))
           const plots = new Plots(list, input, options, () => {})
@@ -65,17 +65,11 @@ def test_what_a_page_has_not_seen_is_a_gap(person):
           plots.add(plots.entries.get("slow"))
           for (const time of [0, 0.1, 0.2, 5.2, 5.3]) plots.sample("tissue.probe/wrench", [time, 1])
           for (const time of [0, 1, 2]) plots.sample("slow", [time, 1])
-          const contacts = new Contacts()
-          const press = (time, force) => contacts.push(time, 0, 0, -time, 0, 0, force)
-          press(0, 0); press(0.1, 1); press(0.2, 1)
-          contacts.miss()
-          press(5.2, 1); press(5.3, 0); press(5.4, 1)
-          return [plots.plots.map(({ data }) => data), contacts.lines.map(({ length }) => length)]
+          return plots.plots.map(({ data }) => data)
         }"""
     )
     assert [[0, 0.1, 0.2, 2.7, 5.2, 5.3], [1, 1, 1, None, 1, 1]] in data
     assert [[0, 1, 2], [1, 1, 1]] in data
-    assert contacts == [2, 1]
     assert person.errors == []
 
 

@@ -1,54 +1,20 @@
 // Force against depth of the bonds that act at one point: how stiff what is pressed feels.
 //
-// As in the report of a recording: depth is the displacement of the motion side since first contact, against the mean
-// direction of the force on it; a line for each contact.
+// The server computes the lines, one for each contact, as it does for the report (hub/recording/bond_trace.py).
 
 import { pathTo } from "./address.js"
-import { GAP_S, short } from "./plots.js"
+import { short } from "./plots.js"
 
-const TOUCH_N = 0.02, RELEASE_N = 0.01 // webconsole/recorded.py; less, so that noise makes no new contact
-const MOST_POINTS = 4000, MOST_CONTACTS = 6
+const PERIOD_MS = 200 // between two questions while a force acts
 const HEIGHT = 150, LEFT = 52, BOTTOM = 30, RIGHT = 8, TOP = 8
 
-export class Contacts {
-  constructor() { this.all = [] }
-
-  // Time (s), point (m) and force (N).
-  push(time, x, y, z, fx, fy, fz) {
-    const force = Math.hypot(fx, fy, fz), last = this.all.at(-1)
-    if (this.joined) {
-      this.joined = force > RELEASE_N
-      return false
-    }
-    if (!last || last.over) {
-      if (!(force > TOUCH_N)) return false
-      this.all.push({ first: [x, y, z], sum: [0, 0, 0], rows: [], over: false })
-      if (this.all.length > MOST_CONTACTS) this.all.shift()
-    } else if (time <= last.time) return false
-    const contact = this.all.at(-1)
-    contact.time = time
-    contact.over = force < RELEASE_N
-    contact.sum = contact.sum.map((sum, i) => sum + [fx, fy, fz][i])
-    contact.rows.push([x, y, z, force])
-    if (contact.rows.length > MOST_POINTS) contact.rows = contact.rows.filter((_, i) => i % 2 === 0)
-    return true
-  }
-
-  // What came since is not known: a contact that goes on has no beginning.
-  miss() {
-    const last = this.all.at(-1)
-    if (last) last.over = true
-    this.joined = true
-  }
-
-  // [[depth (mm), force (N)], ...] of each contact.
-  get lines() {
-    return this.all.map(({ first, sum, rows }) => {
-      const length = Math.hypot(...sum) || 1
-      return rows.map(([x, y, z, force]) =>
-        [-1000 * ((x - first[0]) * sum[0] + (y - first[1]) * sum[1] + (z - first[2]) * sum[2]) / length, force])
-    })
-  }
+// [[[depth (mm), force (N)], ...], ...] of each contact of a bond; null if the server has none.
+export async function contactsOf(bond) {
+  const answer = await fetch(pathTo("/contacts", { bond }))
+  if (!answer.ok) return null
+  const rows = new Float32Array(await answer.arrayBuffer()), lines = []
+  for (let at = 0; at < rows.length; at += 3) (lines[rows[at]] ??= []).push([rows[at + 1], rows[at + 2]])
+  return lines
 }
 
 export class Depths {
@@ -67,7 +33,7 @@ export class Depths {
   }
 
   // The arrows of a bond, as a frame has them: point (m) and force (N).
-  take(bond, time, rows) { this.plots[bond]?.take(time, rows) }
+  take(bond, rows) { this.plots[bond]?.take(rows) }
 
   refresh() { for (const plot of this.plots) plot?.refresh() }
   redraw() { for (const plot of this.plots) plot?.draw() }
@@ -76,7 +42,7 @@ export class Depths {
 class Depth {
   constructor(name, recorded) {
     Object.assign(this, { name, recorded })
-    this.contacts = new Contacts()
+    this.lines = []
     this.element = document.createElement("div")
     this.element.className = "depth"
     this.element.hidden = true // until something is touched
@@ -87,24 +53,28 @@ class Depth {
   }
 
   async load() {
-    const answer = await fetch(pathTo("/pressed", { bond: this.name }))
-    if (!answer.ok) return
-    const rows = new Float64Array(await answer.arrayBuffer())
-    for (let at = 0; at < rows.length; at += 7) this.contacts.push(...rows.subarray(at, at + 7))
+    this.loading = true
+    try { this.lines = await contactsOf(this.name) ?? this.lines } catch { /* the server is gone: the page says it */ }
+    this.loading = false
     this.draw()
   }
 
-  take(time, [x, y, z, fx, fy, fz]) {
-    if (this.recorded) return
-    if (time - this.time > GAP_S) this.contacts.miss()
-    this.time = time
-    if (this.contacts.push(time, x, y, z, fx, fy, fz)) this.fresh = true
+  take([, , , ...force]) {
+    const acts = Math.hypot(...force) > 0
+    if (acts || this.acts) this.fresh = true
+    this.acts = acts
   }
 
-  refresh() { if (this.fresh) { this.fresh = false; this.draw() } }
+  refresh() {
+    const now = performance.now()
+    if (this.recorded || !this.fresh || this.loading || now - this.asked < PERIOD_MS) return
+    this.fresh = false
+    this.asked = now
+    this.load()
+  }
 
   draw() {
-    const lines = this.contacts.lines
+    const { lines } = this
     this.element.hidden = !lines.length
     const width = this.element.clientWidth
     if (!lines.length || !width) return
@@ -132,7 +102,7 @@ class Depth {
       line(onto, rows.map(([depth, force]) => [x(depth), y(force)]))
     })
     const [depth, force] = lines.at(-1).at(-1)
-    if (!this.recorded) dot(onto, x(depth), y(force), colour("--accent"))
+    if (!this.recorded && this.acts) dot(onto, x(depth), y(force), colour("--accent"))
   }
 }
 

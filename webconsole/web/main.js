@@ -168,7 +168,7 @@ function apply(frame) {
     else if (kind === ARROWS) {
       const rows = new Float32Array(frame.buffer, at, size / 4)
       scene?.arrows(index, rows)
-      if (!past || session.kind === "recording") depths.take(index, frame.time, rows)
+      if (!past || session.kind === "recording") depths.take(index, rows)
     } else if (kind === FELT) feel.take(session.felt[index], new Float32Array(frame.buffer, at, 1)[0])
     else if (kind === MARKERS) {
       const markers = notices.take(index, markersOf(frame.buffer, at))

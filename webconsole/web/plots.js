@@ -11,7 +11,7 @@ const LIKELY = [
 ]
 
 // Nothing came for so long (s), and five times as long as between the samples before: the page looked elsewhere.
-export const GAP_S = 0.5
+const GAP_S = 0.5
 
 export class Plots {
   constructor(list, input, options, changed) {

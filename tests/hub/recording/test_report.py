@@ -7,13 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
 from hub.recording.report import report
-from hub.recording.report_figures import BondTrace
 from schemas.codec import encode
 from schemas.errors import MissingExtraError, RecordingError
 from schemas.ros import Header, Time
@@ -137,38 +134,6 @@ def test_without_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(MissingExtraError, match=r"pip install 'trocar\[report\]'"):
         report(Recording(tmp_path / "run"), tmp_path / "x.html")
-
-
-@given(st.integers(0, 2**32 - 1))
-def test_depth_is_measured_from_first_contact_against_the_force(seed: int) -> None:
-    numbers = np.random.default_rng(seed)
-    normal = numbers.normal(size=3)
-    normal /= np.linalg.norm(normal)
-    start = numbers.normal(size=3)
-    height = np.concatenate([np.linspace(3, -5, 81), np.linspace(-5, 3, 81)]) * 1e-3
-    trace = BondTrace(
-        "x",
-        np.arange(162) * 1e-3,
-        start + height[:, None] * normal,
-        np.maximum(0, -height)[:, None] * 100 * normal,
-    )
-    first = height[np.argmax(trace.contact)]
-    assert np.allclose(trace.depth, first - height, atol=1e-12)
-    assert [s.start for s in trace.episodes()] == [int(np.argmax(trace.contact))]
-
-
-def test_contacts_are_told_apart() -> None:
-    times = np.arange(1000) * 1e-3
-    push = np.where((times > 0.1) & (times < 0.3) | (times > 0.5) & (times < 0.7), 1.0, 0.0)
-    push[200:210] = 0.0
-    trace = BondTrace("x", times, np.zeros((1000, 1)), push[:, None])
-    assert [(s.start, s.stop) for s in trace.episodes()] == [(101, 300), (501, 700)]
-
-
-def test_no_contact_at_all() -> None:
-    trace = BondTrace("x", np.arange(10.0), np.ones((10, 3)), np.zeros((10, 3)))
-    assert trace.episodes() == []
-    assert trace.depth.tolist() == [0.0] * 10
 
 
 HOSTILE = (
