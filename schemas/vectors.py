@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Iterable, Iterator, Sequence
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Any, cast
 
 import numpy as np
@@ -106,6 +106,23 @@ class VectorCodec:
                 self.fields |= {f"{field}.{name}": slice(i, i + 1) for i, name in enumerate(names, at)}
             yield path, names, block
             at += count
+
+    @cached_property
+    def parts(self) -> dict[str, slice]:
+        """Positions of the blocks, by the block's last word: `position`, `orientation`."""
+        return {name: at for name, at in self.fields.items() if "." not in name}
+
+    @cached_property
+    def columns(self) -> dict[str, int]:
+        """Position of each number by name: `position.x`, `velocity.insertion`, `data.0`."""
+        found: dict[str, int] = {}
+        for block, at in self.parts.items():
+            width = at.stop - at.start
+            known = [name for name in self.fields if name.startswith(f"{block}.")]
+            joints = [f"{block}.{joint}" for joint in self.port.names]
+            numbered = [f"{block}.{i}" for i in range(width)] if width > 1 else [block]
+            found |= dict(zip(known or joints or numbered, range(at.start, at.stop), strict=True))
+        return found
 
     def _compile_layout(self) -> None:
         """Find the positions of the stamp and the blocks in the CDR bytes, by encoding unique numbers."""

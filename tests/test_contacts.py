@@ -7,7 +7,7 @@ import trocar
 from hub.planning.contacts import missing_contacts
 from hub.planning.scenario_file import installed_scenarios, load
 from robots import rotation
-from schemas.errors import ScenarioError
+from schemas.errors import ScenarioError, SessionError
 
 TOUCHES = """\
 name: touching
@@ -122,6 +122,8 @@ def test_spheres_at_the_tip_are_the_models(write):
     (tool,) = file.params["robot"].tools
     with trocar.SteppedSession(file) as session:
         tip = session["robot.PSM1/measured_cp"]
+        with pytest.raises(SessionError, match="has messages, without names"):
+            session.read("tissue.liver/nodes")
         there = session["robot.PSM1/contact/position"].reshape(-1, 3)
     expected = tool.spheres @ rotation.matrix(tip[3:]).T + tip[:3] + tool.base[:3, 3]
     assert np.abs(there - expected).max() < 1e-4

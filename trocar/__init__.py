@@ -15,8 +15,8 @@ release) is public. All other modules of the distribution (`schemas`, `robots`, 
 `python -m trocar` is the command line.
 
 Sessions          `run`, `verify`, `fork`, `load_scenario`, `run_in_process`, `SteppedSession`
-Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `recover` for a recording cut short;
-                  `write_bag` for samples to play
+Results           `Recording`, `Series`, `Reading`, `Summary`, `VerifySummary`; `recover` for a recording
+                  cut short; `write_bag` for samples to play
 Participants      `Stepped`, `Controller`, `Device`, `Params`, `Setup`, `Port`, `Inputs`, `Outputs`,
                   `Sample`, `Value`, `state_hash`, `restore_arrays`
 Ports             `signal_in`, `signal_out`, `event_in`, `event_out`: each returns a `Port`
@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from hub.recording.recover import recover
     from hub.recording.ros_bag_writer import write_bag
     from hub.recording.series import Series
+    from hub.session.reading import Reading
     from hub.session.stepped_session import SteppedSession
     from hub.testing import check_device, check_engine, run_in_process
     from hub.verify import VerifySummary
@@ -79,6 +80,7 @@ __all__ = [
     "Outputs",
     "Params",
     "Port",
+    "Reading",
     "Recording",
     "Sample",
     "Series",
@@ -134,6 +136,7 @@ _MODULES = {
     "hub.recording.recording": ("Recording",),
     "hub.recording.recover": ("recover",),
     "hub.recording.series": ("Series",),
+    "hub.session.reading": ("Reading",),
     "hub.session.stepped_session": ("SteppedSession",),
     "hub.testing": ("check_device", "check_engine", "run_in_process"),
     "hub.verify": ("VerifySummary",),

@@ -166,24 +166,13 @@ class Series:
             return codec.port
         return self._declared or Port(name=self.name, causality="output", type=self.type)
 
-    @cached_property
+    @property
     def _field_slices(self) -> dict[str, slice]:
-        codec = self._vector_codec
-        return {} if codec is None else {name: at for name, at in codec.fields.items() if "." not in name}
+        return {} if self._vector_codec is None else self._vector_codec.parts
 
-    @cached_property
+    @property
     def _columns(self) -> dict[str, int]:
-        codec = self._vector_codec
-        if codec is None:
-            return {}
-        found: dict[str, int] = {}
-        for block, at in self._field_slices.items():
-            width = at.stop - at.start
-            known = [name for name in codec.fields if name.startswith(f"{block}.")]
-            joints = [f"{block}.{joint}" for joint in self.names]
-            numbered = [f"{block}.{i}" for i in range(width)] if width > 1 else [block]
-            found |= dict(zip(known or joints or numbered, range(at.start, at.stop), strict=True))
-        return found
+        return {} if self._vector_codec is None else self._vector_codec.columns
 
     def _row(self, codec: VectorCodec, time_ns: int, payload: bytes) -> Vector:
         with self._message_errors(time_ns):

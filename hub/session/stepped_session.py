@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 
@@ -23,12 +23,14 @@ from hub.planning.scenario_file import ScenarioFile
 from hub.recording.recorder import Recorder
 from hub.session.clock import most_steps
 from hub.session.launch import attachments_of, in_one_host, plan_of
+from hub.session.reading import Reading
 from hub.session.state_digests import StateDigests
 from hub.transport.port_codec import PortCodec
 from schemas.errors import ScenarioError, SessionError, StateError, did_you_mean
 from schemas.keys import Keys
 from schemas.lockstep import Ack, Entering, Grant, pack_grant
 from schemas.trocar_msgs import SessionStatus
+from schemas.vectors import Vector, VectorCodec
 
 __all__ = ["SteppedSession"]
 
@@ -40,8 +42,9 @@ class SteppedSession:
     """The participants of a scenario, stepped by the caller. Scenarios with devices are refused.
 
         with trocar.SteppedSession(trocar.load_scenario("pick.yaml")) as session:
-            session.advance(100)                            # steps
-            session["robot.needle/pose"]                    # (7,), m
+            session.advance(100)                                            # steps
+            session["robot.needle/pose"]                                    # (7,), m
+            session.read("robot.PSM1/measured_js")["position.insertion"]    # m
 
     A new session stands at time 0. Observers in pace `realtime` are not stepped with the others; `look` steps
     an observer.
@@ -61,6 +64,7 @@ class SteppedSession:
         self._codecs = self._inlets()
         self._recorder: Recorder | None = None
         self._looking: set[str] = set()
+        self._readable: dict[str, VectorCodec] = {}
         self._host = Host("hub", self.plan, self._stepped)
         self._configure_all()
 
@@ -93,24 +97,25 @@ class SteppedSession:
             self._saved = {}
         self._begin(None)
 
-    def restart(self, record: Path | None = None) -> None:
+    def restart(self, record: str | Path | None = None) -> None:
         """Go back to time 0, from saved states or, if any participant cannot save states, all made anew.
 
         `record`: a new directory for a recording from here to the next `restart` or `close`. Raises
         RecordingError if the directory is not empty, or cannot be written.
         """
         self._end_recording()
+        directory = None if record is None else Path(record)
         if self._saved:
             for name, state in self._saved.items():
                 self._stepped[name].restore(state)
-            self._begin(record)
+            self._begin(directory)
             return
         self.close()
         self.plan, self._stepped = self._make_participants()
         self._host = Host("hub", self.plan, self._stepped)
         self._configure_all()
-        if record is not None:
-            self._begin(record)
+        if directory is not None:
+            self._begin(directory)
 
     def _begin(self, record: Path | None) -> None:
         """Connect the participants anew, and begin with their outputs at time 0."""
@@ -202,6 +207,20 @@ class SteppedSession:
             raise SessionError(f"no output '{port}'.{did_you_mean(port, known)}")
         value = newest[output]
         return value.copy() if isinstance(value, np.ndarray) else value
+
+    def read(self, port: str) -> Reading:
+        """Return the newest value of the signal `participant.port`, with the names of its numbers.
+
+        Raises SessionError if there is no such output, or if its values are messages: `session[port]`.
+        """
+        values = self[port]
+        if not isinstance(values, np.ndarray):
+            raise SessionError(f"'{port}' has messages, without names of numbers: use session[port]")
+        if (codec := self._readable.get(port)) is None:
+            name, _, output = port.partition(".")
+            declared = self.plan.participants[name].port(output)
+            codec = self._readable[port] = VectorCodec(declared)
+        return Reading(port, cast("Vector", values), codec)
 
     def look(self, observer: str) -> Outputs:
         """Step an observer, such as a camera, at the present state; return the outputs.

@@ -39,10 +39,10 @@ class EnvironmentView:
         """Read the present instant."""
         session = self._session
         for i, arm in enumerate(self.arms):
-            pose, base = session[f"robot.{arm}/measured_cp"], self._bases[i]
-            self.tips[i, :3] = base[:3, :3] @ pose[:3] + base[:3, 3]
-            self.tips[i, 3:] = rotation.product(self._turns[i], pose[3:])
-            self.jaws[i] = session[f"robot.{arm}/jaw/measured_js"][0]
+            tip, base = session.read(f"robot.{arm}/measured_cp"), self._bases[i]
+            self.tips[i, :3] = base[:3, :3] @ tip["position"] + base[:3, 3]
+            self.tips[i, 3:] = rotation.product(self._turns[i], tip["orientation"])
+            self.jaws[i] = session.read(f"robot.{arm}/jaw/measured_js")["position.jaw"]
         for i, thing in enumerate(self.things):
             self.poses[i] = session[f"robot.{thing}/pose"]
             holder = session[f"robot.{thing}/held_by"][0]

@@ -31,6 +31,7 @@ PUBLIC = [
     "Outputs",
     "Params",
     "Port",
+    "Reading",
     "Recording",
     "Sample",
     "Series",

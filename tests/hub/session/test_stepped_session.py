@@ -87,12 +87,32 @@ def test_its_values_may_be_kept(session):
     assert not np.array_equal(session["robot.PSM1/measured_js"], kept)
 
 
+def test_numbers_have_names(session):
+    session.restart()
+    session.advance(2)
+    joints = session.read("robot.PSM1/measured_js")
+    assert joints.names[2] == "insertion"
+    assert joints.fields == ("position", "velocity", "effort")
+    assert joints["position"].tolist() == joints.values[:6].tolist()
+    assert joints["velocity.insertion"] == joints.values[8]
+    assert joints.columns[8] == "velocity.insertion"
+    tip = session.read("robot.PSM1/measured_cp")
+    assert (tip.frame, tip.fields, tip["orientation"].shape) == (
+        "PSM1_base",
+        ("position", "orientation"),
+        (4,),
+    )
+    assert session.read("robot.needle/slip").unit == "m"
+    assert "position.z 0.000399" in repr(session.read("robot.needle/pose"))
+
+
 @pytest.mark.parametrize(
     ("work", "problem"),
     [
         (lambda s: s.advance(1, {"actions.acton": np.zeros(5)}), "Did you mean 'actions.action'"),
         (lambda s: s.advance(1, {"robot.PSM1/servo_jp": np.zeros(6)}), "no input without a connection"),
         (lambda s: s["robot.needle/posse"], "Did you mean 'robot.needle/pose'"),
+        (lambda s: s.read("robot.PSM1/measured_cp")["place"], "no field 'place'.*position"),
         (lambda s: s.look("robot"), "no participant that only looks; there is none"),
     ],
 )
