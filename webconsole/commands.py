@@ -174,6 +174,8 @@ class Hand(_Command):
     """1 opens, -1 closes."""
     dead_man: bool = False
     jaw: bool = False
+    away: bool = False
+    """Whether the page is no longer in front: its last input."""
     device: Name | None = None
     """The device, where this page leads several."""
     tracked: tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite] | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -158,6 +159,18 @@ class Console:
         if not isinstance(self.source, Recorded):
             raise MessageError("this page shows a running session; its recording has a timeline")
         return self.source
+
+    def led(self, page: object, stage: Stage | None) -> dict[str, dict[str, str]]:
+        """Return how each device led by `page` follows it, and why an arm does not follow the device."""
+        found: dict[str, dict[str, str]] = {}
+        for device, obedience in self.pilots.obediences(page).items():
+            found[device] = {"obedience": obedience}
+            for follower in stage.followers.get(device, ()) if stage else ():
+                values = {name: self.source.newest(name, None) for name in follower.outlets}
+                with suppress(MessageError):  # a damaged value has its own line
+                    if (why := follower.hindrance(values)) is not None:
+                        found[device]["hindrance"] = why
+        return found
 
     async def contacts(self, bond: str) -> list[Contact]:
         """Return the contacts of a bond with a single point; raises MessageError or RecordingError."""

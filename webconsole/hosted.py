@@ -63,7 +63,9 @@ class HostedDevices:
         hand_of(name).served = True
         request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
         host = DeviceHost(name, lambda: reach(self._endpoints[name], name), Keys("*"), request, None)
-        host.joined = partial(self._pilots.offer, name, partial(_give_hand, name))
+        host.joined = partial(
+            self._pilots.offer, name, partial(_give_hand, name), lambda: hand_of(name).obedience
+        )
         try:
             host.serve(self._check)
         except TrocarError as error:
@@ -88,7 +90,7 @@ def _give_hand(device: str, hand: Hand | None) -> None:
         hand_of(device).release()
         return
     wish = Wish(hand.linear, hand.angular, hand.gripper, hand.dead_man, hand.jaw)
-    hand_of(device).give(PageInput(wish, hand.drag, _tracked_pose(hand)))
+    hand_of(device).give(PageInput(wish, hand.drag, _tracked_pose(hand), hand.away))
 
 
 def _tracked_pose(hand: Hand) -> tuple[Vector3, Quaternion] | None:

@@ -78,6 +78,8 @@ class Page:
         self._new = NewSections(console)
         self._told: set[str] = set()
         """Problems already told to the page."""
+        self._led: dict[str, dict[str, str]] = {}
+        """How the devices follow the page, as told to the page."""
         self._lines = 0
         self._rate = TokenBucket(_MESSAGES_PER_S)
         self._refused = 0
@@ -273,6 +275,13 @@ class Page:
             numbers = (name for name in self._show.numbers if stage.is_numeric(name))
             self._console.want(self, stage.shown.union(pictures, numbers))
 
+    async def _tell_led(self) -> None:
+        """Tell the page how the devices that it leads follow it, if this has changed."""
+        found = self._console.led(self, self._stage)
+        if found != self._led:
+            self._led = found
+            await self._tell({"is": "led", "devices": found})
+
     async def _frames(self) -> None:
         live, due_s = self._console.source.kind == "live", monotonic()
         while True:
@@ -282,6 +291,7 @@ class Page:
             else:
                 await self._changed.wait()
                 self._changed.clear()
+            await self._tell_led()
             if self._stage is None or self._number - self._acknowledged >= _MOST_WAITING:
                 continue
             at_ns, new = self._at_ns, self._new

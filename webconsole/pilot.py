@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection
 from time import monotonic
 from typing import Any
 
+from devices.browser import Obedience
 from schemas.errors import MessageError, did_you_mean
 from webconsole.commands import Hand
 
@@ -20,21 +21,30 @@ class Pilots:
 
     def __init__(self) -> None:
         self._devices: dict[str, Callable[[Hand | None], None]] = {}
+        self._obediences: dict[str, Callable[[], Obedience]] = {}
         self._pages: dict[str, object] = {}
         self._heard_s: dict[str, float] = {}
         self._numbers: dict[str, int] = {}
         self._people: dict[object, int] = {}
 
-    def offer(self, device: str, take: Callable[[Hand | None], None]) -> None:
-        """Let pages lead a device; `take` gets the wishes of the pages, and None when no page leads."""
-        self._devices[device] = take
+    def offer(
+        self, device: str, take: Callable[[Hand | None], None], obedience: Callable[[], Obedience]
+    ) -> None:
+        """Let pages lead a device.
+
+        Args:
+            device: Name of the device.
+            take: Gets the wishes of the pages, and None when no page leads.
+            obedience: Returns how the device follows the page now.
+        """
+        self._devices[device], self._obediences[device] = take, obedience
 
     def keep(self, devices: Collection[str]) -> None:
         """Offer no others than these: another session is shown."""
         for device in self._devices.keys() - set(devices):
             if device in self._pages:
                 self._release(device)
-            del self._devices[device]
+            del self._devices[device], self._obediences[device]
 
     def lead(self, page: object, device: str, *, beside: bool = False) -> None:
         """Make `page` the pilot of `device`, and of no further device unless `beside` is true.
@@ -74,6 +84,10 @@ class Pilots:
     def leads(self, page: object) -> bool:
         """Return whether `page` leads a device."""
         return page in self._pages.values()
+
+    def obediences(self, page: object) -> dict[str, Obedience]:
+        """Return how each device that `page` leads follows it."""
+        return {device: self._obediences[device]() for device, held in self._pages.items() if held is page}
 
     def state(self, page: object) -> list[dict[str, Any]]:
         """Return each device and its pilot, as `page` is told, ready for JSON."""

@@ -25,6 +25,7 @@ from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
 from webconsole.bond_history import BondHistory
 from webconsole.felt import felt_wrenches
+from webconsole.followers import find_followers
 from webconsole.frame import Section, SectionKind, node_content
 from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
@@ -76,9 +77,14 @@ class Stage:
         """Live values of each bond with a single point, by name."""
         self.felt = felt_wrenches(scenario, self.numbers)
         """Outlets of the wrenches on the moved instruments, by device led from pages."""
+        self.followers = find_followers(scenario, self._outlets)
+        """Controllers that follow a device led from pages, by device."""
+        of_followers = (name for found in self.followers.values() for one in found for name in one.outlets)
         of_hands = (name for names in self.felt.values() for name in names)
         of_arrows = (name for bond in self.arrows for name in bond)
-        self.shown = frozenset((*self._codecs, *self.surfaces, *self.markers, *of_arrows, *of_hands))
+        self.shown = frozenset(
+            (*self._codecs, *self.surfaces, *self.markers, *of_arrows, *of_hands, *of_followers)
+        )
         """The outlets needed for the scene itself."""
 
     def _draw(self, scenario: Scenario, params: Callable[[str], Params]) -> dict[str, Rgb]:

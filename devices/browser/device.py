@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from devices.browser.page_hand import PageInput, hand_of
+from devices.browser.page_hand import Obedience, PageInput, hand_of
 from devices.diagnosis import Diagnosis, Level
 from devices.keyboard.virtual_hand import VirtualHand, VirtualHandParams
 from devices.keyboard.virtual_stylus import Wish
@@ -52,7 +52,8 @@ class Browser(VirtualHand):
         silence = self.params.silence  # the last read that is in time lets go
         self._longest_age_ns = silence - min(round(1e9 / self.params.rate) + _WAY_NS, silence // 4)
         self._lead, self._dragged = -1, np.zeros(3)
-        self._spent = False
+        self._moved_ns = 0
+        self._interrupted = self._spent = False
 
     def open(self, directory: Path) -> None:  # noqa: ARG002
         """Wait for a page."""
@@ -66,19 +67,21 @@ class Browser(VirtualHand):
         seconds = self._elapse(t)
         newest = self._hand.newest()
         if newest is None:
-            self._spent |= self._pressed[0]
+            self._spent |= self._pressed[0] or self._interrupted
+            self._hand.obedience = Obedience.UNLED
             return self._press(t, Wish()) + self._diagnosis.report(Level.WARN, self._describe_missing_lead())
         asked, age_ns, lead = newest
-        if age_ns > self._longest_age_ns:
-            self._spent |= self._pressed[0]
+        if asked.away:
+            self._spent |= self._pressed[0] or self._interrupted
+            self._hand.obedience = Obedience.AWAY
             return self._press(t, Wish()) + self._diagnosis.report(
-                Level.WARN,
-                "the page that leads is silent or not in front: the arm holds; click into it",
+                Level.OK, "the page that leads is not in front: the arm holds"
             )
-        if self._spent and asked.wish.dead_man:  # what was held through a loss has to be pressed anew
+        if age_ns > self._longest_age_ns:
+            return self._hold(t)
+        self._hand.obedience = self._obey(t, held=asked.wish.dead_man)
+        if self._spent:
             asked = replace(asked, wish=Wish())
-        else:
-            self._spent = False
         samples = self._press(t, asked.wish) + self._diagnosis.report(Level.OK, "a page leads")
         if asked.tracked is None:
             self._stylus.advance(self._with_drag(asked, lead, seconds), seconds)
@@ -86,7 +89,33 @@ class Browser(VirtualHand):
             self._stylus.follow(*asked.tracked, asked.wish.gripper, seconds)
         else:  # the clutch is open: hand and stylus meet, and the arm holds
             self._stylus.place(*asked.tracked)
+        self._moved_ns = t
         return samples + self._motion(t)
+
+    def _hold(self, t: int) -> list[Sample]:
+        """Let go while the page is silent."""
+        self._interrupted |= self._pressed[0]
+        samples = self._press(t, Wish())
+        if not self._is_stale(t):
+            self._hand.obedience = Obedience.SILENT
+            return samples
+        self._spent |= self._interrupted
+        self._hand.obedience = Obedience.SPENT if self._spent else Obedience.SILENT
+        return samples + self._diagnosis.report(Level.WARN, "the page that leads is silent: the arm holds")
+
+    def _obey(self, t: int, *, held: bool) -> Obedience:
+        """Return how the arm follows an input that is in time.
+
+        After a silence, a held dead-man goes on if the pose never was stale; else it has to be pressed anew.
+        """
+        self._spent = held and (self._spent or (self._interrupted and self._is_stale(t)))
+        self._interrupted = False
+        if self._spent:
+            return Obedience.SPENT
+        return Obedience.MOVES if held else Obedience.OPEN
+
+    def _is_stale(self, t: int) -> bool:
+        return t - self._moved_ns > self.params.max_age
 
     def _describe_missing_lead(self) -> str:
         if self._hand.served:

@@ -1,16 +1,17 @@
-"""Inputs of a leading page, from the page's server to the device, in the same process."""
+"""Inputs of a leading page, from the page's server to the device, in the same process, and the answer."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import StrEnum
 from time import monotonic_ns
 
 from devices.keyboard.virtual_stylus import Wish
 from devices.vendor_axes import Quaternion, Vector3
 
-__all__ = ["PageHand", "PageInput", "hand_of"]
+__all__ = ["Obedience", "PageHand", "PageInput", "hand_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +27,25 @@ class PageInput:
     """Pose of the head or hand by a headset, in the base frame, in place of shares and way. The axes of
     head and hand, too, are x ahead, y left, z up.
     """
+    away: bool = False
+    """Whether the page is no longer in front: the last input before a silence."""
+
+
+class Obedience(StrEnum):
+    """How a device follows its leading page."""
+
+    UNLED = "unled"
+    """No page leads."""
+    OPEN = "open"
+    """The dead-man is open."""
+    MOVES = "moves"
+    """The dead-man is held."""
+    AWAY = "away"
+    """The page is not in front."""
+    SILENT = "silent"
+    """The page is silent; the dead-man may go on, if the silence is short."""
+    SPENT = "spent"
+    """The dead-man was held through a loss, and has to be pressed anew."""
 
 
 class PageHand:
@@ -38,6 +58,8 @@ class PageHand:
         self._leads = 0
         self.served = False
         """Whether a server of pages is in this process."""
+        self.obedience = Obedience.UNLED
+        """Written by the device, read by the page's server."""
 
     def give(self, asked: PageInput) -> None:
         """Replace the input."""

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from devices.browser.device import Browser, BrowserParams
-from devices.browser.page_hand import PageHand, PageInput
+from devices.browser.page_hand import Obedience, PageHand, PageInput
 from devices.keyboard.virtual_stylus import Wish
 from hub.testing import check_device
 
@@ -90,16 +90,58 @@ def test_it_lets_go_when_nobody_leads(page):
 
 
 @pytest.mark.parametrize(
-    "lost", [lambda page: page.read(200), lambda page: (page.hand.release(), page.read(4))]
+    "lost",
+    [
+        lambda page: page.read(220),
+        lambda page: (page.hand.release(), page.read(4)),
+        lambda page: (page.read(120), page.hand.release(), page.read(4)),
+        lambda page: (page.hand.give(PageInput(Wish(), away=True)), page.read(4)),
+    ],
 )
 def test_what_is_held_through_a_loss_has_to_be_pressed_anew(page, lost):
     here = position(page.ask(100, linear=(1.0, 0.0, 0.0), dead_man=True))
     lost(page)
     held = page.ask(100, linear=(1.0, 0.0, 0.0), dead_man=True)
     assert "buttons" not in held
+    assert page.hand.obedience is Obedience.SPENT
     assert np.linalg.norm(position(held) - here) < 0.1 * 0.1 + 1e-9, "what was asked until the loss"
     page.ask(20)
     assert page.ask(20, dead_man=True)["buttons"].buttons.tolist() == [1, 0]
+
+
+@pytest.mark.parametrize("silence_ms", [100, 140, 160])
+def test_what_is_held_goes_on_after_a_silence_in_which_the_pose_was_never_stale(page, silence_ms):
+    """As on a page that draws slowly: the arm holds meanwhile, and nobody has to press anew."""
+    here = position(page.ask(100, linear=(1.0, 0.0, 0.0), dead_man=True))
+    silent = page.read(silence_ms)
+    assert silent["buttons"].buttons.tolist() == [0, 0]
+    assert page.hand.obedience is Obedience.SILENT
+    assert "diagnostics" not in silent, "no warning for each late picture"
+    again = page.ask(100, linear=(1.0, 0.0, 0.0), dead_man=True)
+    assert again["buttons"].buttons.tolist() == [1, 0]
+    assert page.hand.obedience is Obedience.MOVES
+    assert np.linalg.norm(position(again) - here) <= 0.1 * 0.250 + 1e-9, "no leap for the time of the silence"
+
+
+def test_how_it_follows_is_said(page):
+    said = []
+
+    def note():
+        said.append(page.hand.obedience)
+
+    page.read(4), note()
+    page.ask(20), note()
+    page.ask(20, dead_man=True), note()
+    page.read(300), note()
+    page.ask(20, dead_man=True), note()
+    page.ask(20), note()
+    page.hand.give(PageInput(Wish(), away=True))
+    samples = page.read(200)
+    note()
+    assert samples["diagnostics"].level == 0, "it is no fault of anything"
+    page.hand.release()
+    page.read(4), note()
+    assert [str(one) for one in said] == ["unled", "open", "moves", "spent", "spent", "open", "away", "unled"]
 
 
 def test_it_never_leaps_after_a_pause(page):

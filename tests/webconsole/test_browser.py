@@ -10,6 +10,7 @@ import subprocess
 import sys
 from contextlib import AsyncExitStack, contextmanager
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from webconsole.listening import on_loopback
 from webconsole.live import Live
 from webconsole.recorded import Recorded
 
+LED_ARM = Path(__file__).parent / "led_arm.yaml"
 LED = [{"device": "hand", "pilot": "you"}]
 TIP = "trocar.scene.tips[0].axes.parent.position.toArray()"
 GAMEPAD = """
@@ -287,7 +289,7 @@ def running(hub, *arguments):
 def session(tmp_path_factory):
     """A running session that a page can lead, and what makes links to its page."""
     hub = tmp_path_factory.mktemp("hub")
-    with running(hub, "browser", "--set", "step=5 ms", "--record", str(hub / "recorded")) as session:
+    with running(hub, str(LED_ARM), "--record", str(hub / "recorded")) as session:
         yield session
 
 
@@ -298,6 +300,7 @@ def test_a_page_leads_an_arm_and_lets_go(browser, session):
     one.sees("Boolean(trocar.scene?.placed)")
     one.page.get_by_role("button", name="Lead hand").click()
     one.page.get_by_text("you lead it").wait_for()
+    one.page.get_by_text("holding: press space, and hold it, to move").wait_for()
     start = one.page.evaluate(TIP)
 
     def moves(from_):
@@ -306,8 +309,9 @@ def test_a_page_leads_an_arm_and_lets_go(browser, session):
     one.page.keyboard.down("Space")
     one.page.keyboard.down("s")
     moves(start)
+    one.page.get_by_text("moving: dead-man held").wait_for()
     one.page.evaluate("window.dispatchEvent(new Event('blur'))")
-    one.page.get_by_text("holding: the dead-man is let go").wait_for()
+    one.page.get_by_text("holding: press space, and hold it, to move").wait_for()
     one.page.keyboard.up("s")
     one.page.keyboard.up("Space")
     place = still(one)
@@ -336,7 +340,7 @@ def test_a_page_leads_an_arm_and_lets_go(browser, session):
     second.context.close()
 
     one.page.get_by_role("button", name="Pause").click()
-    one.page.get_by_role("button", name="Resume").wait_for()
+    one.page.get_by_text("holding: the session is paused; press Resume").wait_for()
     one.page.get_by_role("button", name="Resume").click()
     one.sees("document.querySelector('#state').textContent === 'running'")
     one.page.evaluate("press(-1)")
@@ -397,6 +401,7 @@ def test_a_browser_that_stands_still_or_is_killed_lets_the_arm_hold(browser, ses
         send(signal.SIGCONT)
         other.page.wait_for_timeout(500)
         assert np.allclose(other.page.evaluate(TIP), place, atol=2e-4), "the key has to be pressed anew"
+        one.page.get_by_text("let go of space, and press it again").wait_for()
         one.page.keyboard.up("w")
         one.page.keyboard.up("Space")
         one.page.get_by_role("button", name="Leave hand").wait_for()

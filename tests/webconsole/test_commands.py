@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from devices.browser import Obedience
 from schemas.errors import MessageError
 from webconsole.commands import At, Hand, command
 from webconsole.pilot import Pilots
@@ -47,7 +48,7 @@ def test_anything_else_is_refused(text):
 def pilots():
     pilots = Pilots()
     pilots.given = []
-    pilots.offer("hand", pilots.given.append)
+    pilots.offer("hand", pilots.given.append, lambda: Obedience.OPEN)
     return pilots
 
 
@@ -107,7 +108,7 @@ def test_an_unknown_device_is_named(pilots):
 
 
 def test_a_headset_leads_several(pilots):
-    pilots.offer("head", pilots.given.append)
+    pilots.offer("head", pilots.given.append, lambda: Obedience.OPEN)
     pilots.lead("page", "hand")
     pilots.lead("page", "head", beside=True)
     asked = hand(0, device="head", tracked=(0, 1, 0, 0, 0, 0, 1))

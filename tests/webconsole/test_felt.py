@@ -1,5 +1,7 @@
 """Which force the hand at a page feels."""
 
+from pathlib import Path
+
 from hub.planning.scenario_file import load
 from schemas.scenario import Scenario
 from webconsole.felt import felt_wrenches
@@ -8,7 +10,9 @@ WRENCHES = ("robot.PSM1/tip_wrench", "robot.PSM2/tip_wrench", "robot.PSM1/measur
 
 
 def test_it_is_on_the_instrument_that_the_hand_moves():
-    assert felt_wrenches(load("browser", []).scenario, WRENCHES) == {"hand": (WRENCHES[0],)}
+    assert felt_wrenches(load(str(Path(__file__).parent / "led_arm.yaml"), []).scenario, WRENCHES) == {
+        "hand": (WRENCHES[0],)
+    }
     assert felt_wrenches(load("palpation", []).scenario, WRENCHES) == {}
 
 

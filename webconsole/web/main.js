@@ -42,12 +42,14 @@ const link = new Link({
     warn(state.log)
     showCard($("card"), state.card)
     headset.show(state.pilots, session?.role)
-    pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one), session?.role)
+    pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one),
+      session?.role, state.state)
     network.show(state.links, session?.role)
     started.show(state.started)
     if (session?.kind === "recording") timeline.begin(state.start, state.end)
     else if (session) timeline.grow(state, pilot.leading || headset.worn)
   },
+  led({ devices }) { pilot.follow(devices) },
   answer(answer) {
     if (answer.error) said(`page: ${answer.to || "message"}`, answer.error)
     else if (answer.path) share(answer)

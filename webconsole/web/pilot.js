@@ -13,8 +13,16 @@ const KEYS = {
   " ": ["hold to move", { dead_man: true }],
   c: ["close", { gripper: -1, jaw: true }], v: ["open", { gripper: 1 }],
 }
+// Why a device holds (devices/browser/page_hand.py), and what to do.
+const WHY = {
+  unled: "the device waits for this page",
+  open: "press space, and hold it, to move",
+  silent: "this page was late; the arm goes on in a moment",
+  spent: "this page was silent for too long; let go of space, and press it again",
+}
 const PERIOD_MS = 25
 const PAD_M_PER_PX = 0.0005
+const LATE_MS = 300 // an arm that does not follow for so long is said
 const DEAD_ZONE = 0.24 // of a stick at rest (XINPUT_GAMEPAD_LEFT_THUMB_DEADZONE, 7849 of 32767)
 
 export class Pilot {
@@ -26,6 +34,7 @@ export class Pilot {
     this.drag = [0, 0, 0]
     this.dragging = false
     this.text = ""
+    this.led = {} // of each device that this page leads: how it follows, and what keeps an arm from following it
     addEventListener("keydown", (event) => this.key(event, true))
     addEventListener("keyup", (event) => this.key(event, false))
     addEventListener("blur", () => this.letGo())
@@ -35,12 +44,13 @@ export class Pilot {
 
   get leading() { return this.device != null }
 
-  // `devices`: [{ device, pilot }] as the server sees them.
-  show(devices, role) {
+  // `devices`: [{ device, pilot }] as the server sees them; `state`: that of the session.
+  show(devices, role, state) {
+    this.state = state
     const mine = devices?.find(({ pilot }) => pilot === "you")?.device ?? null
     if (mine !== this.device) this.become(mine)
     this.panel.hidden = !devices?.length || role === "viewer"
-    const text = JSON.stringify([devices, role, document.hasFocus()])
+    const text = JSON.stringify([devices, role])
     if (text === this.text || this.panel.hidden) return
     this.text = text
     this.build(devices)
@@ -59,6 +69,7 @@ export class Pilot {
       const row = element("div", "row"), button = element("button")
       button.textContent = pilot === "you" ? `Leave ${device}` : `Lead ${device}`
       button.disabled = Boolean(pilot) && pilot !== "you"
+      button.title = button.disabled ? `${pilot} leads ${device}, and must leave it first` : ""
       button.onclick = () => {
         button.blur() // the space bar is the dead-man from here on
         this.link.send(pilot === "you" ? { do: "leave" } : { do: "lead", device })
@@ -74,10 +85,10 @@ export class Pilot {
   }
 
   help() {
-    const state = element("div", "row"), dead = element("span", "pill"), focus = element("span")
+    const state = element("div", "row"), dead = element("span", "pill")
     dead.id = "dead-man"
-    focus.textContent = document.hasFocus() ? "" : "Click here: keys are read while this page has the focus."
-    state.append(dead, focus)
+    dead.setAttribute("role", "status")
+    state.append(dead)
     const keys = element("div", "keys")
     for (const [key, [text]] of Object.entries(KEYS)) {
       const one = element("span"), cap = element("kbd")
@@ -161,13 +172,18 @@ export class Pilot {
     return { ...wish, linear: wish.linear.map(limit), angular: wish.angular.map(limit), gripper: limit(wish.gripper) }
   }
 
+  // How the devices that this page leads follow it now.
+  follow(devices) {
+    this.led = devices
+    this.mark()
+  }
+
   // What is let go is sent at once; then nothing is, while the page is not in front.
   send(last = false) {
     if (!this.leading || (!last && (document.hidden || !document.hasFocus()))) return
     const wish = this.wish()
     if (last) wish.dead_man = false
-    this.link.send({ do: "hand", number: ++this.number, drag: this.drag, ...wish })
-    this.moving = wish.dead_man
+    this.link.send({ do: "hand", number: ++this.number, drag: this.drag, away: last, ...wish })
     this.feel.pulse(this.device, this.pad(), wish.dead_man)
     this.mark()
   }
@@ -175,10 +191,21 @@ export class Pilot {
   mark() {
     const dead = document.getElementById("dead-man")
     if (!dead) return
-    const text = this.moving ? "moving: dead-man held" : "holding: the dead-man is let go"
+    const why = this.hindrance(), text = why ? `holding: ${why}` : "moving: dead-man held"
     if (dead.textContent !== text) dead.textContent = text
-    dead.classList.toggle("held", Boolean(this.moving))
+    dead.classList.toggle("held", !why)
     document.getElementById("pad")?.classList.toggle("held", this.dragging)
+  }
+
+  // Why the arm holds, and what to do about it; null if it moves.
+  hindrance() {
+    const { obedience, hindrance } = this.led[this.device] ?? {}, now = performance.now()
+    if (obedience !== "moves" || !hindrance) this.followed = now
+    if (!document.hasFocus() || obedience === "away") return "this page is not in front; click into it"
+    if (this.state === "paused") return "the session is paused; press Resume"
+    if (this.state !== "running") return `the session is ${this.state}`
+    if (obedience === "moves") return now - this.followed > LATE_MS ? hindrance : null
+    return WHY[obedience] ?? "the device has not heard this page yet"
   }
 }
 

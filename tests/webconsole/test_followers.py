@@ -1,0 +1,38 @@
+"""Which controller follows a hand at a page, and what keeps it from that."""
+
+from pathlib import Path
+
+import pytest
+
+from hub.planning.scenario_file import load
+from schemas.codec import encode
+from schemas.ros import BoolMessage, StringMessage
+from webconsole.followers import Follower, find_followers
+from webconsole.source import Value
+
+LED_ARM = Path(__file__).parent / "led_arm.yaml"
+TELEOP = Follower("teleop")
+
+
+def test_it_is_the_controller_that_the_hand_is_connected_to():
+    scenario = load(str(LED_ARM), []).scenario
+    assert find_followers(scenario, TELEOP.outlets) == {"hand": [TELEOP]}
+    assert find_followers(scenario, ["teleop.following"]) == {"hand": []}
+    assert find_followers(load("palpation", []).scenario, TELEOP.outlets) == {}
+
+
+@pytest.mark.parametrize(
+    ("following", "warning", "said"),
+    [
+        (True, "PSM1 holds: it is not ENABLED and homed", None),
+        (False, "PSM1 holds: it is not ENABLED and homed", "PSM1 holds: it is not ENABLED and homed"),
+        (False, None, "'teleop' does not follow"),
+        (None, None, None),
+    ],
+)
+def test_the_last_warning_says_why_it_does_not_follow(following, warning, said):
+    values = {
+        TELEOP.following: None if following is None else Value(0, encode(BoolMessage(data=following))),
+        TELEOP.warning: None if warning is None else Value(0, encode(StringMessage(data=warning))),
+    }
+    assert TELEOP.hindrance(values) == said

@@ -1,0 +1,59 @@
+"""Controllers that follow a hand led from a page: whether they do, and why not."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+from schemas.codec import decode
+from schemas.ros import BoolMessage, StringMessage
+from schemas.scenario import Scenario
+from webconsole.source import Value
+
+__all__ = ["Follower", "find_followers"]
+
+_KIND = "browser"
+
+
+class Follower(NamedTuple):
+    """A controller that is connected to the pose of a device."""
+
+    participant: str
+
+    @property
+    def following(self) -> str:
+        """The outlet that says whether the arm follows the hand."""
+        return f"{self.participant}.following"
+
+    @property
+    def warning(self) -> str:
+        """The outlet that says why the arm holds."""
+        return f"{self.participant}.warning"
+
+    @property
+    def outlets(self) -> tuple[str, str]:
+        """Both outlets."""
+        return self.following, self.warning
+
+    def hindrance(self, values: Mapping[str, Value | None]) -> str | None:
+        """Return why the arm does not follow; None if it follows, or nothing is known.
+
+        `values`: the newest values of both outlets. Raises MessageError for an invalid value.
+        """
+        following, warning = values[self.following], values[self.warning]
+        if following is None or decode(BoolMessage, following.payload).data:
+            return None
+        said = "" if warning is None else decode(StringMessage, warning.payload).data
+        return said or f"'{self.participant}' does not follow"
+
+
+def find_followers(scenario: Scenario, outlets: Collection[str]) -> dict[str, list[Follower]]:
+    """Return the followers of each device led from pages, with both outlets among `outlets`."""
+    found: dict[str, list[Follower]] = {
+        name: [] for name, spec in scenario.participants.items() if spec.kind == _KIND
+    }
+    for connection in scenario.connections:
+        follower, device = Follower(connection.target.participant), connection.source.participant
+        if device in found and follower not in found[device] and {*follower.outlets} <= {*outlets}:
+            found[device].append(follower)
+    return found
