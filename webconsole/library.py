@@ -34,8 +34,12 @@ def home_of(recording: Path | None) -> Path:
     if recording is None:
         return Path.cwd()
     place = recording.resolve()
-    inside = place.is_file() and (place.parent / "metadata.yaml").is_file()
-    return place.parent.parent if inside else place.parent
+    return place.parent.parent if place.is_file() and _is_in_bag(place) else place.parent
+
+
+def _is_in_bag(file: Path) -> bool:
+    """Return whether a file stands in a rosbag2 directory, whose name is that of the recording."""
+    return (file.parent / "metadata.yaml").is_file()
 
 
 class Library:
@@ -117,7 +121,7 @@ def numbers_of(recorded: Recorded) -> dict[str, Any]:
     Raises RecordingError.
     """
     recording = recorded.recording
-    scenario, state = recording.scenario(), recorded.state
+    scenario, state, file = recording.scenario(), recorded.state, recording.file
     measures = recorded_measures(recording)
     results = measures.results()
     scores = {name: score_numbers(card) for name, card in measures.score_cards.items()}
@@ -134,6 +138,7 @@ def numbers_of(recorded: Recorded) -> dict[str, Any]:
                 (f"{group} {name}".strip(), one["value"], one["unit"]) for name, one in values.items()
             ]
     return {
+        "name": file.parent.name if _is_in_bag(file) else file.name,
         "text": found.text,
         "succeeded": found.succeeded,
         "state": state["state"],

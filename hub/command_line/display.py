@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, TextColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
@@ -109,12 +110,13 @@ def _readable_value(name: str, value: Any) -> tuple[str, str]:
 class RunProgress:
     """The progress line of a run: simulated time, real-time factor, late steps, live measures."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, name: str | None = None) -> None:
+        """`name`: the scenario as the user calls it; None: as it calls itself."""
         self._bar = Bar(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[now]}"), console=console
         )
         total = None if scenario.duration is None else scenario.duration / 1e9
-        self._task = self._bar.add_task(scenario.name, total=total, now="starting")
+        self._task = self._bar.add_task(escape(safe_text(name or scenario.name)), total=total, now="starting")
 
     def __enter__(self) -> Self:
         self._bar.start()

@@ -73,7 +73,6 @@ def report(recording: RecordingPath, *, output: Output = None) -> None:
     """Write a self-contained HTML page with plots of a recording."""
     from hub.recording.report import report as write
 
-    name = recording.stem if recording.is_file() else recording.name
-    page = output or default_output(recording.with_name(f"{name}.html"))
+    page = output or default_output(recording, ".html")
     write(Recording(recording), page)
     results.print(f"wrote {safe_text(str(page))}", markup=False, soft_wrap=True)

@@ -96,7 +96,7 @@ def run(
         delete_earlier(directory)
         led = any(spec.kind == _PAGE_DEVICE for spec in file.scenario.participants.values())
         with page_of_this_process() if open_page or (led and open_page is None) else nullcontext():
-            with RunProgress(session.scenario) as progress:
+            with RunProgress(session.scenario, name) as progress:
                 summary = session.run(progress)
             show_summary(
                 name, summary, again=f"trocar run {scenario}", everything=everything, as_json=as_json

@@ -98,12 +98,14 @@ def bag_file(path: Path) -> Path:
     return path
 
 
-def default_output(path: Path) -> Path:
-    """Return `path`, the output beside a recording for which the user has given no name.
+def default_output(recording: Path, ending: str) -> Path:
+    """Return the default output beside a recording: `x.png` for the recordings `x` and `x.mcap`.
 
-    Raises RecordingError if `path` is a link: a file beside a stranger's recording may be the stranger's, and
+    Raises RecordingError if there is a link: a file beside a stranger's recording may be the stranger's, and
     lead to any file of the user.
     """
+    place = recording.resolve() if recording.name in ("", "..") else recording
+    path = place.with_name(f"{place.stem if place.is_file() else place.name}{ending}")
     if path.is_symlink():
         raise RecordingError(f"'{path}' is a link, through which nothing is written: name another --output")
     return path

@@ -57,10 +57,7 @@ def recover(path: Path, output: Path | None = None) -> RecoverSummary:
     with reading_errors(source), source.open("rb") as stream:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise RecordingError(f"'{source}' is not an MCAP file")
-    named = path.resolve()
-    target = create_bag(
-        output or default_output(named.with_name(f"{named.name if named.is_dir() else named.stem}-recovered"))
-    )
+    target = create_bag(output or default_output(path, "-recovered"))
     try:
         copy = _Copy(target)
         with source.open("rb") as stream:

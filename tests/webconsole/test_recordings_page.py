@@ -7,6 +7,12 @@ from tests.webconsole.recorded_scene import write_scene
 from tests.webconsole.test_browser import NAMELESS, Person
 from webconsole.recorded import Recorded
 
+OWN_TIP = "trocar.scene.tips[0].axes.parent.position.z"
+OTHER_TIP = (
+    "trocar.comparison.ghost.bodies[0][trocar.scene.bodies[0].indexOf(trocar.scene.tips[0].axes.parent)]"
+    ".position.z"
+)
+
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
@@ -55,3 +61,32 @@ def test_a_recording_of_the_list_is_opened_and_the_first_one_again(person):
 def test_a_viewer_has_no_list(person):
     one = person("viewer")
     assert not one.page.get_by_role("button", name="Recordings").is_visible()
+
+
+def test_two_recordings_are_compared_on_one_timeline(person):
+    """The second one is longer, and its arm has gone down further at its end."""
+    one = person()
+    one.page.get_by_role("button", name="Recordings").click()
+    row = one.page.get_by_role("row", name="second")
+    row.get_by_role("link", name="Compare").click()
+    one.page.wait_for_url("**/?compare=second*")
+    table = one.page.get_by_label("Two recordings").get_by_role("table")
+    table.wait_for()
+    assert table.get_by_role("row").first.inner_text().split() == ["first", "second", "difference"]
+    duration = table.get_by_role("row", name="duration")
+    assert duration.inner_text().split() == ["duration", "(s)", "0.96", "1.44", "+0.48"]
+
+    one.sees("window.trocar?.scene?.placed && trocar.comparison?.ghost?.surfaces[0]?.mesh")
+    slider = one.page.get_by_role("slider", name="Instant of the recording")
+    assert slider.get_attribute("max") == "1.44", "until the end of the longer one"
+    slider.fill("0.4")
+    one.sees(f"trocar.time === 0.4 && {OTHER_TIP} === {OWN_TIP}")
+    slider.fill("1.44")
+    one.sees(f"Math.abs({OTHER_TIP} - {OWN_TIP}) > 0.02")
+    one.sees("document.querySelectorAll('.plot i.dashed').length > 0")
+    one.page.get_by_label("ghost in the scene").uncheck()
+    one.sees("!trocar.comparison.world.visible")
+    assert one.page.evaluate(NAMELESS) == []
+    one.page.get_by_role("link", name="End comparison").click()
+    one.sees("window.trocar?.scene?.placed && Number(document.querySelector('#scrub').max) < 1")
+    assert one.errors == []

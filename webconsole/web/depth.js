@@ -2,15 +2,15 @@
 //
 // The server computes the lines, one for each contact, as it does for the report (hub/recording/bond_trace.py).
 
-import { pathTo } from "./address.js"
-import { short } from "./plots.js"
+import { compared, pathTo, shown } from "./address.js"
+import { DASH, short } from "./plots.js"
 
 const PERIOD_MS = 200 // between two questions while a force acts
 const HEIGHT = 150, LEFT = 52, BOTTOM = 30, RIGHT = 8, TOP = 8
 
 // [[[depth (mm), force (N)], ...], ...] of each contact of a bond; null if the server has none.
-export async function contactsOf(bond) {
-  const answer = await fetch(pathTo("/contacts", { bond }))
+export async function contactsOf(bond, recording = shown) {
+  const answer = await fetch(pathTo("/contacts", { bond }, recording))
   if (!answer.ok) return null
   const rows = new Float32Array(await answer.arrayBuffer()), lines = []
   for (let at = 0; at < rows.length; at += 3) (lines[rows[at]] ??= []).push([rows[at + 1], rows[at + 2]])
@@ -43,6 +43,7 @@ class Depth {
   constructor(name, recorded) {
     Object.assign(this, { name, recorded })
     this.lines = []
+    this.others = [] // of the recording to compare with
     this.element = document.createElement("div")
     this.element.className = "depth"
     this.element.hidden = true // until something is touched
@@ -54,7 +55,10 @@ class Depth {
 
   async load() {
     this.loading = true
-    try { this.lines = await contactsOf(this.name) ?? this.lines } catch { /* the server is gone: the page says it */ }
+    try {
+      this.lines = await contactsOf(this.name) ?? this.lines
+      if (compared != null) this.others = await contactsOf(this.name, compared) ?? []
+    } catch { /* the server is gone: the page says it */ }
     this.loading = false
     this.draw()
   }
@@ -74,7 +78,7 @@ class Depth {
   }
 
   draw() {
-    const { lines } = this
+    const lines = [...this.lines, ...this.others]
     this.element.hidden = !lines.length
     const width = this.element.clientWidth
     if (!lines.length || !width) return
@@ -98,7 +102,9 @@ class Depth {
       onto.fillText(short(tick), LEFT - 6, y(tick))
     }
     lines.forEach((rows, i) => {
-      Object.assign(onto, { strokeStyle: colour(`--s${i}`), lineWidth: 1.25, lineJoin: "round" })
+      const own = i < this.lines.length, number = own ? i : i - this.lines.length
+      Object.assign(onto, { strokeStyle: colour(`--s${number}`), lineWidth: 1.25, lineJoin: "round" })
+      onto.setLineDash(own ? [] : DASH)
       line(onto, rows.map(([depth, force]) => [x(depth), y(force)]))
     })
     const [depth, force] = lines.at(-1).at(-1)

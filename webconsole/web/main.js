@@ -1,8 +1,9 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
 import { ARROWS, FELT, Link, nodesOf, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
-import { pathTo, shown } from "./address.js"
+import { compared, pathTo, shown } from "./address.js"
 import { Alerts } from "./alerts.js"
+import { Comparison } from "./compare.js"
 import { Depths } from "./depth.js"
 import { Eyes } from "./eyes.js"
 import { Feel } from "./feel.js"
@@ -77,14 +78,17 @@ const timeline = new Timeline((time) => {
   if (past !== (time != null)) { past = time != null; ask() }
   link.send({ do: "at", time })
   plots.at(time)
+  comparison?.at(time)
   dirty = true
 })
+const comparison = compared == null ? null
+  : new Comparison($("compare"), timeline, () => { dirty = true }, (text) => said(compared, text))
 const started = new Started(link, [...document.querySelectorAll(".started")])
 const forks = new Forks(link, timeline, started), start = new Start(link, started)
 const recordings = new Recordings()
 timeline.found = (events) => log.add(events, true)
 const guide = new Guide($("guide"), link, eyes, () => past)
-const plots = new Plots($("plot-list"), $("add"), $("ports"), ask)
+const plots = new Plots($("plot-list"), $("add"), $("ports"), ask, comparison?.other)
 $("pictures").onchange = ask
 $("frames").onchange = () => scene?.frames($("frames").checked)
 
@@ -129,6 +133,7 @@ async function stage(described) {
   if (!answer.ok) return
   scene.load(await answer.arrayBuffer(), described.surfaces)
   scene.frames($("frames").checked)
+  comparison?.stage(scene)
   const empty = described.scenes.length + described.surfaces.length === 0
   $("no-scene").hidden = !empty
   $("no-scene").textContent = empty ? "Nothing in this session has a scene to draw." : ""
@@ -228,4 +233,4 @@ requestAnimationFrame(draw)
 
 // For the tests and the benchmark: what this page has drawn.
 Object.defineProperty(window, "trocar", { value: { get drawn() { return drawn }, get time() { return lastTime },
-  get framed() { return framed }, get scene() { return scene }, get headset() { return headset }, get session() { return session } } })
+  get framed() { return framed }, get scene() { return scene }, get headset() { return headset }, get session() { return session }, comparison } })

@@ -1,8 +1,9 @@
 // Plots of numeric ports by name: of a running session its last seconds, of a recording all of it.
 
-import { pathTo } from "./address.js"
+import { pathTo, shown } from "./address.js"
 import uPlot from "./vendor/uPlot.esm.js"
 
+export const DASH = [5, 4] // of the other recording
 const LAST_S = 20, KEPT = 2400, HEIGHT = 120, MOST = 24, SHORTEST_S = 1e-5
 // A force and joints or a pose: of each row the first that there is.
 const LIKELY = [
@@ -14,8 +15,9 @@ const LIKELY = [
 const GAP_S = 0.5
 
 export class Plots {
-  constructor(list, input, options, changed) {
-    Object.assign(this, { list, input, options, changed })
+  // `other`: of a recording to compare with, a promise of its name and how much later its times are (s).
+  constructor(list, input, options, changed, other) {
+    Object.assign(this, { list, input, options, changed, other })
     this.plots = []
     this.numbers = new Map()
     this.instant = null
@@ -59,7 +61,7 @@ export class Plots {
   add(entry, tell = true) {
     const label = entry.field ? `${entry.name} · ${entry.field}` : entry.name
     if (this.plots.length >= MOST || this.plots.some((plot) => plot.label === label)) return
-    const plot = new Plot(label, entry, this.recorded, () => {
+    const plot = new Plot(label, entry, this.recorded, this.other, () => {
       this.plots = this.plots.filter((one) => one !== plot)
       this.changed()
     })
@@ -98,10 +100,11 @@ function widened(_, from, to) { return from == null || to - from >= SHORTEST_S ?
 function drawable(value) { return Math.abs(value) < 1e30 ? value : null }
 
 class Plot {
-  constructor(label, entry, recorded, removed) {
-    Object.assign(this, { label, entry, recorded })
+  constructor(label, entry, recorded, other, removed) {
+    Object.assign(this, { label, entry, recorded, other })
     this.columns = entry.columns.slice(0, 7)
-    this.data = [[], ...this.columns.map(() => [])]
+    this.lines = other ? [...this.columns, ...this.columns] : this.columns // those of the other one behind
+    this.data = [[], ...this.lines.map(() => [])]
     this.fresh = false
     this.element = document.createElement("div")
     this.element.className = "plot"
@@ -112,11 +115,19 @@ class Plot {
     const button = this.element.querySelector("button")
     button.setAttribute("aria-label", `Remove the plot of ${label}`)
     button.onclick = () => { this.remove(); removed() }
-    this.legend = this.columns.map(({ text }, i) => {
-      const row = document.createElement("span"), mark = document.createElement("i"), value = document.createElement("b")
-      mark.style.background = `var(--s${i})`
-      row.append(mark, text ? `${text} ` : "", value)
+    const rows = this.columns.map(({ text }) => {
+      const row = document.createElement("span")
+      row.append(text && `${text} `)
       this.element.querySelector(".legend").append(row)
+      return row
+    })
+    this.legend = this.lines.map((_, line) => {
+      const at = line % rows.length, mark = document.createElement("i"), value = document.createElement("b")
+      mark.className = line < rows.length ? "solid" : "dashed"
+      mark.style.color = `var(--s${at})`
+      if (line < rows.length) rows[at].prepend(mark)
+      else rows[at].append(mark)
+      rows[at].append(value)
       return value
     })
     if (recorded) this.load()
@@ -131,8 +142,9 @@ class Plot {
       width: Math.max(width, 100), height: HEIGHT, legend: { show: false }, cursor: { drag: { x: this.recorded, y: false } },
       scales: { x: { time: false, range: widened }, y: { range: spread } },
       axes: [{ ...axis, size: 24 }, { ...axis, size: 52, values: (_, ticks) => ticks.map(short) }],
-      series: [{}, ...this.columns.map((_, i) => ({ stroke: colour(`--s${i}`), width: 1.25, points: { show: false } }))],
-      hooks: { setScale: [(chart, key) => { if (key === "x") this.enlarged(chart) }], draw: [(chart) => this.mark(chart, colour("--accent"))], setCursor: [(chart) => this.read(chart.cursor.idx)] },
+      series: [{}, ...this.lines.map((_, i) => ({ stroke: colour(`--s${i % this.columns.length}`), width: 1.25,
+        dash: i < this.columns.length ? undefined : DASH, points: { show: false } }))],
+      hooks: { setScale: [(chart, key) => { if (key === "x") this.enlarged(chart) }], draw: [(chart) => this.mark(chart, colour("--accent"))], setCursor: [(chart) => this.say(chart.cursor.idx)] },
     }, this.data, this.element.querySelector(".chart"))
     const canvas = this.chart.root.querySelector("canvas")
     canvas.setAttribute("role", "img")
@@ -144,6 +156,7 @@ class Plot {
     const x = Math.round(chart.valToPos(this.instant, "x", true)), { ctx, bbox } = chart
     if (x < bbox.left || x > bbox.left + bbox.width) return
     ctx.save()
+    ctx.setLineDash([])
     ctx.strokeStyle = colour
     ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke()
     ctx.restore()
@@ -176,10 +189,22 @@ class Plot {
     this.at(this.instant)
   }
 
-  // Columns of the recording between two times (s), with least and greatest of each part; null if there are none.
+  // Columns of the recording, or of both, between two times (s); null if there are none.
   async between(from, to) {
-    const answer = await fetch(pathTo("/series", { port: this.entry.name, from, to, buckets: "1000" }))
-    if (!answer.ok) { this.element.querySelector(".unit").textContent = await answer.text(); return null }
+    const { name, later } = await this.other ?? {}
+    const own = await this.read(from, to, shown)
+    if (!own || name == null) return own
+    const [times, ...columns] = await this.read(from + later, to + later, name) ?? [[], ...this.columns.map(() => [])]
+    return uPlot.join([own, [times.map((time) => time - later), ...columns]])
+  }
+
+  // Least and greatest of each part between two times (s) of a recording; null if there are none.
+  async read(from, to, recording) {
+    const answer = await fetch(pathTo("/series", { port: this.entry.name, from, to, buckets: "1000" }, recording))
+    if (!answer.ok) {
+      this.element.querySelector(".unit").textContent = recording === shown ? await answer.text() : `not in ${recording}`
+      return null
+    }
     const width = Number(answer.headers.get("X-Width")), rows = new Float64Array(await answer.arrayBuffer())
     const count = rows.length / width
     const column = (at) => Array.from({ length: count }, (_, i) => rows[i * width + at])
@@ -212,7 +237,7 @@ class Plot {
     const times = this.data[0]
     let low = 0, high = times.length
     while (low < high) { const middle = (low + high) >> 1; if (times[middle] <= time) low = middle + 1; else high = middle }
-    this.read(low - 1)
+    this.say(low - 1)
   }
 
   refresh() {
@@ -223,12 +248,18 @@ class Plot {
       this.chart.setData(this.data, false)
       this.chart.setScale("x", { min: Math.max(this.data[0][0], now - LAST_S), max: now })
     })
-    if (this.chart.cursor.idx == null) this.read(this.data[0].length - 1)
+    if (this.chart.cursor.idx == null) this.say(this.data[0].length - 1)
   }
 
-  read(at) {
+  // The values at a row; where one recording has none at the very time of the other's, the one before.
+  say(at) {
     if (at == null) at = this.data[0].length - 1
-    this.legend.forEach((value, i) => { value.textContent = at >= 0 ? short(this.data[i + 1][at]) : "" })
+    this.legend.forEach((value, i) => {
+      const column = this.data[i + 1]
+      let row = at
+      while (row > 0 && column[row] === undefined) row--
+      value.textContent = row >= 0 ? short(column[row]) : ""
+    })
   }
 
   resize(width) { this.chart?.setSize({ width: Math.max(width, 100), height: HEIGHT }) }

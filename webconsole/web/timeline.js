@@ -40,6 +40,13 @@ export class Timeline {
     this.marks()
   }
 
+  // Another recording is shown beside this one, until a later time.
+  extend(end) {
+    this.end = Math.max(this.end, end)
+    this.scrub.max = this.end
+    this.marks()
+  }
+
   // Another session runs, and nothing of its past is known yet.
   reset() {
     Object.assign(this, { live: true, past: false, begun: false, playing: false, time: null, events: [] })

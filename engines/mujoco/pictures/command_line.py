@@ -64,7 +64,9 @@ def render(
     trust: Trusted = False,
 ) -> None:
     """Draw the scene of a recording at one moment, with its soft bodies and markers."""
-    output = output or _beside(recording, ".png")
+    from hub.recording.bag import default_output
+
+    output = output or default_output(recording, ".png")
     if output.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"'{output}' is not a picture: .png or .jpg", param_hint="--output")
     scene = _open_scene("render", recording, robot, trust=trust)
@@ -85,7 +87,10 @@ def render(
 def film(
     recording: Recorded,
     *,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Film to write: .mp4.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Film to write, .mp4; default: beside the recording."),
+    ] = None,
     start: Annotated[
         float, typer.Option(min=0.0, metavar="S", help="Simulated time of the first picture.")
     ] = 0.0,
@@ -108,7 +113,9 @@ def film(
     trust: Trusted = False,
 ) -> None:
     """Write a film of a recording, with title and time."""
-    output = output or _beside(recording, ".mp4")
+    from hub.recording.bag import default_output
+
+    output = output or default_output(recording, ".mp4")
     if output.suffix.lower() != ".mp4":
         raise typer.BadParameter(f"'{output}' is not a film: .mp4", param_hint="--output")
     if width % 2 or height % 2:
@@ -134,14 +141,6 @@ def film(
     with typer.progressbar(frames, length=len(times), label=str(output), file=sys.stderr) as shown:
         write_film(output, shown, (width, height), fps)
     typer.echo(output)
-
-
-def _beside(recording: Path, suffix: str) -> Path:
-    from hub.recording.bag import default_output
-
-    path = recording.resolve()
-    name = path.stem if path.is_file() else path.name
-    return default_output(recording.with_name(f"{name}{suffix}"))
 
 
 def _open_scene(

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from hub import doctor as examination
-from hub.command_line.display import latency_rows
-from hub.planning.scenario_file import installed_scenarios
+from hub.command_line.display import RunProgress, latency_rows
+from hub.planning.scenario_file import installed_scenarios, load
 from tests.hub.authorities import free_endpoint
 
 SCENARIO = """\
@@ -260,3 +260,9 @@ def test_of_a_device_with_many_streams_the_slowest_is_shown():
         "console, the slowest of 9",
     ]
     assert rows[-1][4] == "8.000 ms"
+
+
+def test_the_progress_line_has_the_name_as_it_was_typed(capsys):
+    with RunProgress(load("colon-grasp", []).scenario, "colon-grasp"):
+        pass
+    assert capsys.readouterr().err.startswith("colon-grasp ")

@@ -6,6 +6,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 
+from hub.recording.bag import default_output
 from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
 from hub.recording.recover import recover
@@ -139,3 +140,15 @@ def test_an_empty_recording(tmp_path: Path) -> None:
     Recorder(tmp_path / "run", attachments={}).close()
     saved = recover(tmp_path / "run")
     assert (saved.messages, saved.chunks, saved.end_ns) == (0, 0, 0)
+
+
+def test_outputs_beside_a_recording_have_its_name(tmp_path, monkeypatch):
+    """A directory may have a dot in its name; a recording may be the working directory."""
+    directory, file = tmp_path / "run-0.5", tmp_path / "run.mcap"
+    directory.mkdir()
+    file.touch()
+    monkeypatch.chdir(directory)
+    places = [directory, file, Path(), Path("../run-0.5")]
+    assert [default_output(place, ".png").resolve() for place in places] == [
+        tmp_path / name for name in ("run-0.5.png", "run.png", "run-0.5.png", "run-0.5.png")
+    ]
