@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from hub.command_line.display import console, table
+from hub.command_line.display import results, table
 from schemas.errors import ConnectError, MissingExtraError
 
 __all__ = ["app"]
@@ -69,13 +68,13 @@ def init(
     from hub.security.certs import create_authority, names_of_this_machine
 
     file = create_authority(_directory(directory), hosts or names_of_this_machine(), days)
-    console.print(
+    results.print(
         f"wrote {file}, for the hub, and beside it the authority ca.pem with its key ca.key: keep that key"
         " secret",
         soft_wrap=True,
     )
     _print_names(file)
-    console.print("next, for each participant on another machine: trocar certs issue NAME", soft_wrap=True)
+    results.print("next, for each participant on another machine: trocar certs issue NAME", soft_wrap=True)
 
 
 @app.command()
@@ -92,7 +91,7 @@ def renew(
     from hub.security.certs import renew as make
 
     file = make(_directory(directory), hosts or (), days)
-    console.print(f"wrote {file}; the next session uses it", soft_wrap=True)
+    results.print(f"wrote {file}; the next session uses it", soft_wrap=True)
     _print_names(file)
 
 
@@ -128,16 +127,16 @@ def issue(
         CONSOLE: "the Zenoh settings of the ROS programs, to connect to tls/HUB:7447 (docs/ros.md)",
     }
     use = uses.get(name, f"trocar device {name} --connect tls/HUB:7447")
-    console.print(
+    results.print(
         f"wrote {file}, which is all that the other machine needs. Copy it there over a channel that others"
         " cannot read, to one of",
         soft_wrap=True,
     )
-    console.print(
+    results.print(
         "    ~/.config/trocar/certs/            (Linux)\n    %APPDATA%\\trocar\\certs\\           (Windows)"
     )
-    console.print("    ~/Library/Application Support/trocar/certs/  (macOS)", soft_wrap=True)
-    console.print(f"and use it there with: {use}", soft_wrap=True)
+    results.print("    ~/Library/Application Support/trocar/certs/  (macOS)", soft_wrap=True)
+    results.print(f"and use it there with: {use}", soft_wrap=True)
 
 
 @app.command()
@@ -158,10 +157,10 @@ def revoke(
 
     place = _directory(directory)
     common_name = ban(place, name)
-    console.print(
+    results.print(
         f"wrote '{common_name}' to {place / FILE}: hubs on this machine reject it from now on", soft_wrap=True
     )
-    console.print(f"for a new certificate: trocar certs issue {name}", soft_wrap=True)
+    results.print(f"for a new certificate: trocar certs issue {name}", soft_wrap=True)
 
 
 @app.command()
@@ -192,15 +191,13 @@ def show(*, directory: Directory = None) -> None:
         days = (certificate.until - datetime.now(UTC)).days
         until = f"{certificate.until:%Y-%m-%d %H:%M} UTC ({days} days)"
         rows.append((file.stem, until, role.get(certificate.name, f"participant {certificate.name}")))
-    Console(highlight=False).print(
-        table(rows, "file", "valid until", "for") if rows else f"no certificate in {place}"
-    )
+    results.print(table(rows, "file", "valid until", "for") if rows else f"no certificate in {place}")
 
 
 def _print_names(file: Path) -> None:
     from hub.security.credentials import examine, load
 
-    console.print(f"names of this hub: {', '.join(examine(load(file.stem, file)).hosts)}", soft_wrap=True)
+    results.print(f"names of this hub: {', '.join(examine(load(file.stem, file)).hosts)}", soft_wrap=True)
 
 
 def _require_cryptography() -> None:

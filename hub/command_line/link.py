@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 from pydantic import ValidationError
 
-from hub.command_line.display import console, show
+from hub.command_line.display import results, show
 from hub.command_line.options import HubEndpoints, Json
 from schemas.network_link import PRESETS
 
@@ -65,4 +65,4 @@ def link(
         show(reply.model_dump(mode="json"), as_json=True)
     else:
         description = reply.description or "none"
-        console.print(f"network link of '{reply.device}' from now on: {description}", soft_wrap=True)
+        results.print(f"network link of '{reply.device}' from now on: {description}", soft_wrap=True)

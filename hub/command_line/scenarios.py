@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -55,24 +54,12 @@ def _columns(source: Source) -> tuple[str, str, str]:
     return what, ", ".join(_leads(tree)), tree.get("duration", "until Ctrl-C")
 
 
-def _leads(tree: dict[str, dict[str, dict[str, str]]]) -> Iterator[str]:
-    """Yield the kinds that lead a session: its devices, else the controllers with goals of their own."""
+def _leads(tree: dict[str, dict[str, dict[str, str]]]) -> list[str]:
+    """Return the kinds that lead a session: its devices, else the first participant, if a controller."""
     kinds = [spec["kind"] for spec in tree["participants"].values()]
-    roles = {name: kind.role for name, kind in registry.kinds().items()}
-    devices = [kind for kind in kinds if roles.get(kind) == "device"]
-    yield from devices or [kind for kind in kinds if kind in _LEADING]
-
-
-_LEADING = (
-    "routine",
-    "expert",
-    "stitching",
-    "guided-stitching",
-    "visual-servoing",
-    "rolling-study",
-    "caliper",
-)
-"""Controllers with goals of their own."""
+    roles = [registry.kinds()[kind].role for kind in kinds]
+    devices = [kind for kind, role in zip(kinds, roles, strict=True) if role == "device"]
+    return devices or kinds[: roles[0] == "controller"]
 
 
 def new(

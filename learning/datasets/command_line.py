@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -43,9 +43,13 @@ def dataset(
         ),
     ] = None,
     task: Annotated[
-        str,
-        typer.Option(help="What is done, in words; default: the scenario's description.", show_default=False),
-    ] = "",
+        list[str] | None,
+        typer.Option(
+            metavar="TEXT",
+            help="What is done, in words; default: the scenario's description. SCENARIO=TEXT is for the"
+            " recordings of one scenario. May be repeated.",
+        ),
+    ] = None,
     state: Annotated[
         list[str] | None,
         typer.Option(
@@ -78,8 +82,21 @@ def dataset(
             raise MissingExtraError("'trocar dataset'", "dataset", "pillow" if package == "PIL" else package)
     from learning.datasets.episode import Wanted
 
-    wanted = Wanted(fps, pixels, " ".join(task.split()), tuple(state or ()), tuple(action or ()))
+    wanted = Wanted(fps, pixels, _tasks(task or ()), tuple(state or ()), tuple(action or ()))
     _run(recordings, output, wanted, trust=trust)
+
+
+def _tasks(given: Sequence[str]) -> dict[str, str]:
+    """Return the task of each named scenario, and the task of all others below an empty name."""
+    tasks: dict[str, str] = {}
+    for text in given:
+        named = re.fullmatch(r"([A-Za-z][A-Za-z0-9_-]*)=(.*)", text, re.DOTALL)
+        scenario = named[1].replace("-", "_") if named else ""
+        if scenario in tasks:
+            whose = f"of '{scenario}'" if scenario else "without a scenario"
+            raise typer.BadParameter(f"two tasks {whose}: expected one", param_hint="--task")
+        tasks[scenario] = " ".join((named[2] if named else text).split())
+    return tasks
 
 
 def _pixels(size: str) -> tuple[int, int]:
@@ -135,6 +152,10 @@ def _run(recordings: list[Path], output: Path, wanted: Wanted, *, trust: bool) -
         finally:
             if conversion.is_whole:
                 new.publish()
-        console.print(f"{conversion.summary()}: {output}", markup=False, soft_wrap=True)
+        typer.echo(f"{conversion.summary()}: {output}")
+        for text, episodes in conversion.tasks.items():
+            typer.echo(f"  {episodes} x {text!r}")  # of a stranger's recording: escapes are shown
+        for name in conversion.tasks_without_recording:
+            console.print(f"--task {name}=...: no recording is of that scenario", markup=False)
     if conversion.left_out:
         raise typer.Exit(1)

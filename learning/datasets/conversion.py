@@ -27,6 +27,10 @@ class Conversion:
         self._directory, self._wanted, self._trust = directory, wanted, trust
         self._writer: Writer | None = None
         self._size = wanted.size
+        self.tasks: dict[str, int] = {}
+        """Number of episodes of each task."""
+        self.tasks_without_recording = sorted(wanted.tasks.keys() - {""})
+        """Scenarios with a task of their own, and without an episode."""
         self.left_out = 0
         """Unusable recordings."""
         self.is_whole = False
@@ -80,6 +84,9 @@ class Conversion:
             "versions": recording.versions(),
         }
         self._writer.add(episode, pictures.count, pictures.pairs, source)
+        if (scenario := recording.scenario().name) in self.tasks_without_recording:
+            self.tasks_without_recording.remove(scenario)
+        self.tasks[episode.task] = self.tasks.get(episode.task, 0) + 1
         return pictures.count / wanted.fps
 
     def summary(self) -> str:

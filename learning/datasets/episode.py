@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from learning.datasets.columns import Columns, choose_columns, commanded_columns, measured_columns
 from schemas.errors import RecordingError
+from schemas.scenario import Scenario
 from trocar import Recording, recover
 
 __all__ = ["Episode", "Wanted", "open_recording"]
@@ -23,8 +24,10 @@ class Wanted:
     fps: int = 25
     size: tuple[int, int] | None = None
     """Width and height of the pictures; None: as in the first recording, else 640 x 480."""
-    task: str = ""
-    """The robot's task in words; empty: the description of each recording's scenario."""
+    tasks: Mapping[str, str] = field(default_factory=dict[str, str])
+    """The robot's task in words by scenario; below an empty name: of all others; default: the description of
+    each recording's scenario.
+    """
     state: tuple[str, ...] = ()
     """Ports, or fields of ports; empty: measured joints of all arms."""
     action: tuple[str, ...] = ()
@@ -70,7 +73,7 @@ class Episode:
         scenario = recording.scenario()
         return cls(
             recording=recording,
-            task=wanted.task or " ".join(scenario.description.split()) or scenario.name,
+            task=_task(scenario, wanted.tasks),
             times_ns=times_ns[:-1],
             state_names=_names(state),
             state=np.hstack([one.at(times_ns[:-1]) for one in state]),
@@ -78,6 +81,11 @@ class Episode:
             # an action leads from one frame to the next: it comes after the picture that it answers
             action=np.hstack([one.at(times_ns[1:]) for one in action]),
         )
+
+
+def _task(scenario: Scenario, tasks: Mapping[str, str]) -> str:
+    given = tasks.get(scenario.name) or tasks.get("")
+    return given or " ".join(scenario.description.split()) or scenario.name
 
 
 def _names(columns: Sequence[Columns]) -> tuple[str, ...]:

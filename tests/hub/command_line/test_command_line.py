@@ -49,6 +49,13 @@ def test_version_and_help(trocar):
     assert "trocar list" in trocar()[1]
 
 
+def test_certificates_are_results(trocar, tmp_path):
+    for words in (["init", "hub.lab"], ["issue", "stylus"], ["show"]):
+        code, out, err = trocar("certs", *words, "--dir", tmp_path)
+        assert (code, err) == (0, "")
+        assert "stylus" in out or "hub.lab" in out
+
+
 def test_bad_usage_is_exit_code_2(trocar):
     for arguments in (
         ["chek"],

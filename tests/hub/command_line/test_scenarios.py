@@ -28,6 +28,10 @@ def test_they_are_listed_a_line_each(trocar):
     assert lines.keys() == installed_scenarios().keys()
     assert "8 s" in lines["colon-grasp"]
     assert "routine" in lines["colon-grasp"]
+    assert "expert" in lines["peg-board"]
+    assert "simulated-touch, scripted" in lines["teleop"]
+    assert "controller" not in out
+    assert lines["cart"].split()[1:4] == ["2", "s", "The"], "nothing leads it"
     assert "until Ctrl-C" in lines["ros"]
     assert trocar("run")[1] == out, "also where a name is missing"
 

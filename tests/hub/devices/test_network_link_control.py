@@ -148,7 +148,7 @@ def test_on_the_command_line(prepare, monkeypatch, capfd):
     as_json, outage, wrong, refused, listed, shown = seen
     assert json.loads(as_json[1])["link"]["preset"] == "300000000 ns"
     assert "from now on: 300 ms each way, up to 1 ms more, nothing at all for 3 s" in " ".join(
-        outage[2].split()
+        outage[1].split()
     )
     assert wrong[0] == 2
     assert "150 ms is no preset" in wrong[2]

@@ -57,7 +57,8 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip(f"no OpenGL: {found.detail}")
     place = tmp_path_factory.mktemp("recordings")
     (place / "seen.yaml").write_text(SCENARIO)
-    (place / "unseen.yaml").write_text(SCENARIO[: SCENARIO.index("  camera:")].replace("      ECM", "#"))
+    unseen = SCENARIO[: SCENARIO.index("  camera:")].replace("name: seen", "name: unseen")
+    (place / "unseen.yaml").write_text(unseen.replace("      ECM", "#"))
     for name in ("seen", "unseen"):
         trocar.run(str(place / f"{name}.yaml"), record=place / name, one_host=True)
     return place
@@ -68,7 +69,8 @@ def made(recordings: Path) -> Path:
     """The data set of `seen`, twice: two episodes."""
     done = run(recordings / "seen", recordings / "seen", "-o", recordings / "set", "--task", "Wait  a\nwhile")
     assert done.exit_code == 0, done.output
-    assert "2 episodes, 16 frames" in done.stderr
+    assert "2 episodes, 16 frames" in done.stdout
+    assert "2 x 'Wait a while'" in done.stdout
     return recordings / "set"
 
 
@@ -103,6 +105,26 @@ def test_it_says_what_is_in_it(made: Path) -> None:
     tasks = pd.read_parquet(made / "meta/tasks.parquet")
     assert tasks.iloc[0].name == "Wait a while"
     assert tasks["task_index"].tolist() == [0]
+
+
+def test_each_scenario_has_a_task_of_its_own_unless_one_is_given(recordings: Path, tmp_path: Path) -> None:
+    words = (
+        recordings / "seen",
+        recordings / "unseen",
+        "-o",
+        tmp_path / "set",
+        "--state",
+        "robot.PSM1/measured_js",
+    )
+    done = run(
+        *words, "--action", "robot.PSM1/setpoint_js", "--task", "unseen=Look away", "--task", "other=?"
+    )
+    assert done.exit_code == 0, done.output
+    tasks = pd.read_parquet(tmp_path / "set/meta/tasks.parquet")
+    assert list(tasks.index) == ["PSM1 waits while the endoscope looks on.", "Look away"]
+    assert "--task other=...: no recording is of that scenario" in done.stderr
+    twice = run(recordings / "seen", "-o", tmp_path / "two", "--task", "a", "--task", "b")
+    assert twice.exit_code == 2
 
 
 def test_each_row_has_what_was_recorded_then(recordings: Path, made: Path) -> None:
@@ -189,8 +211,8 @@ def test_what_cannot_be_used_is_left_out_and_the_rest_is_whole(recordings: Path,
     assert "holds 0 .mcap files" in done.stderr
     assert "cut' was cut short: its first 0." in done.stderr
     assert "has another state than the first recording of the data set (ECM." in done.stderr
-    assert "2 episodes" in done.stderr
-    assert "2 left out" in done.stderr
+    assert "2 episodes" in done.stdout
+    assert "2 left out" in done.stdout
     assert info(tmp_path / "set")["total_frames"] == rows(tmp_path / "set").num_rows
 
 
@@ -210,12 +232,12 @@ def test_a_scene_of_a_changed_file_is_drawn_with_trust_alone(recordings: Path, t
     (tmp_path / "ecm.yaml").write_text(f"# changed\n{own.text()}", "utf-8")
     done = run(tmp_path / "own", recordings / "seen", "-o", tmp_path / "without")
     assert done.exit_code == 1
-    assert "1 episode, 8 frames, 1 left out" in done.stderr
+    assert "1 episode, 8 frames, 1 left out" in done.stdout
     assert "ecm.yaml', which is missing or has other contents than those recorded" in done.stderr
     assert "allow it with --trust" in done.stderr
     done = run(tmp_path / "own", recordings / "seen", "-o", tmp_path / "set", "--trust")
     assert done.exit_code == 0, done.stderr
-    assert "2 episodes" in done.stderr
+    assert "2 episodes" in done.stdout
 
 
 @pytest.mark.parametrize(

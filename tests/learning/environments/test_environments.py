@@ -5,14 +5,17 @@ import sys
 import warnings
 from functools import partial
 
+import av
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import InvalidAction
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv
+from gymnasium.wrappers import RecordVideo
 
 import trocar
+from engines.mujoco.pictures import opengl
 from schemas.errors import RecordingError, SessionError, TrocarError
 from schemas.ros import Header, Point, Pose, PoseStamped, Quaternion
 from trocar.environments import ENVIRONMENTS, oracle
@@ -232,3 +235,17 @@ def test_after_close_a_sentence():
         with pytest.raises(SessionError, match="closed: make a new one"):
             call()
     env.close()
+
+
+def test_gymnasium_records_a_film(tmp_path):
+    pytest.importorskip("moviepy")
+    if not (found := opengl.find()).name:
+        pytest.skip(f"no OpenGL: {found.detail}")
+    made = gymnasium.make("trocar/Reach-v0", render_mode="rgb_array")
+    env = RecordVideo(made, str(tmp_path / "films"), episode_trigger=lambda _: True)
+    env.reset(seed=1)
+    for action in actions(1, 5):
+        env.step(action)
+    env.close()
+    with av.open(str(tmp_path / "films/rl-video-episode-0.mp4")) as film:
+        assert len(list(film.decode(video=0))) == STEPS + 1
