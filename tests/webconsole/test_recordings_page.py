@@ -90,3 +90,36 @@ def test_two_recordings_are_compared_on_one_timeline(person):
     one.page.get_by_role("link", name="End comparison").click()
     one.sees("window.trocar?.scene?.placed && Number(document.querySelector('#scrub').max) < 1")
     assert one.errors == []
+
+
+def test_the_log_follows_the_instant_and_can_be_filtered_and_resized(person):
+    one = person()
+    first = one.page.locator("#lines li").first
+    first.get_by_text("contact, 0.05 N").wait_for()
+    slider = one.page.get_by_role("slider", name="Instant of the recording")
+    slider.fill("0.05")
+    one.sees("document.querySelector('#lines li').className === 'info later'")
+    slider.fill("0.5")
+    one.sees("document.querySelector('#lines .current')?.textContent.includes('contact, 0.05 N')")
+    one.page.get_by_label("Levels in the log").select_option("errors")
+    assert not first.is_visible()
+    one.page.get_by_label("Levels in the log").select_option("all")
+    one.page.get_by_label("Participant in the log").select_option("tissue")
+    one.page.get_by_label("Find in the log").fill("Contact")
+    assert first.is_visible()
+    one.page.get_by_label("Find in the log").fill("grasp")
+    assert not first.is_visible()
+    edge, height = one.page.get_by_label("Height of the log"), "document.querySelector('#lines').clientHeight"
+    before = one.page.evaluate(height)
+    edge.focus()
+    one.page.keyboard.press("ArrowUp")
+    assert one.page.evaluate(height) == before + 17
+    box = edge.bounding_box()
+    one.page.mouse.move(box["x"] + 300, box["y"] + 3)
+    one.page.mouse.down()
+    one.page.mouse.move(box["x"] + 300, box["y"] - 97, steps=4)
+    one.page.mouse.up()
+    assert one.page.evaluate(height) == pytest.approx(before + 117, abs=2)
+    one.page.reload()
+    one.sees(f"{height} > {before} + 100")
+    assert one.errors == []

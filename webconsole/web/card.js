@@ -1,4 +1,4 @@
-// The score card of a training task.
+// The score card of a training task: one line below the plots, which opens.
 
 import { short } from "./plots.js"
 
@@ -9,7 +9,7 @@ export function showCard(element, card) {
   const text = JSON.stringify(card ?? null)
   if (text === shown || !card) return
   shown = text
-  const rows = [["goals", `${card.reached} of ${card.goals}`], ...card.metrics.map(value)]
+  const rows = [...card.metrics.map(value)]
   for (const { rules, values } of card.rules) rows.push([rules, ""], ...values.map(value))
   const table = document.createElement("table")
   for (const [name, number] of rows) {
@@ -17,9 +17,11 @@ export function showCard(element, card) {
     row.insertCell().textContent = name
     row.insertCell().textContent = number
   }
-  const head = document.createElement("h2")
-  head.textContent = `Score: ${card.task}`
+  const head = document.createElement("summary")
+  head.textContent = `Score: ${card.task}, ${card.reached} of ${card.goals} goals`
   element.replaceChildren(head, table)
 }
 
-function value({ name, value: number, unit, reason }) { return [name, reason || `${short(number)} ${unit}`.trim()] }
+function value({ name, value: number, unit, reason }) {
+  return [name.replaceAll("_", " "), reason || `${short(number)} ${unit}`.trim()]
+}

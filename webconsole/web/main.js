@@ -79,6 +79,7 @@ const timeline = new Timeline((time) => {
   link.send({ do: "at", time })
   plots.at(time)
   comparison?.at(time)
+  log.at(time)
   dirty = true
 })
 const comparison = compared == null ? null
