@@ -1,6 +1,10 @@
 """The list of recordings in a real browser: opening one, and comparing two."""
 
+import os
+
+import av
 import pytest
+from PIL import Image
 
 from tests.webconsole.conftest import served
 from tests.webconsole.recorded_scene import write_scene
@@ -122,4 +126,33 @@ def test_the_log_follows_the_instant_and_can_be_filtered_and_resized(person):
     assert one.page.evaluate(height) == pytest.approx(before + 117, abs=2)
     one.page.reload()
     one.sees(f"{height} > {before} + 100")
+    assert one.errors == []
+
+
+def test_a_picture_and_a_film_of_the_scene_are_saved(person, tmp_path):
+    """The picture has every pixel of the screen, and the film ends with the recording."""
+    one = person(device_scale_factor=2)
+    one.page.get_by_role("slider", name="Instant of the recording").fill("0.5")
+    one.sees("trocar.framed === 0.5")
+    with one.page.expect_download() as saved:
+        one.page.get_by_role("button", name="Picture").click()
+    assert saved.value.suggested_filename == "palpation-0.500s.png"
+    saved.value.save_as(tmp_path / "scene.png")
+    size = one.page.evaluate("[trocar.scene.canvas.clientWidth, trocar.scene.canvas.clientHeight]")
+    with Image.open(tmp_path / "scene.png") as picture:
+        assert picture.size == (2 * size[0], 2 * size[1])
+        assert len(picture.convert("RGB").resize((64, 64)).getcolors(4096)) > 100
+    with one.page.expect_download() as saved:
+        one.page.get_by_role("button", name="Film").click()
+        one.page.get_by_role("button", name="End film").wait_for()
+    assert saved.value.suggested_filename.startswith("palpation-0.500s-0.960s.")
+    saved.value.save_as(tmp_path / "film")
+    with av.open(str(tmp_path / "film")) as film:
+        pictures = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    assert len(pictures) > 1
+    assert pictures[0].shape[1] == size[0] * 2
+    if place := os.environ.get("TROCAR_SCREENSHOTS"):
+        Image.fromarray(pictures[-1]).save(f"{place}/film.png")
+    assert pictures[-1][-60:, -240:].max() > 240, "the time, in white"
+    one.page.get_by_role("button", name="Film").wait_for()
     assert one.errors == []

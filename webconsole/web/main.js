@@ -3,6 +3,7 @@
 import { ARROWS, FELT, Link, nodesOf, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
 import { compared, pathTo, shown } from "./address.js"
 import { Alerts } from "./alerts.js"
+import { Capture } from "./capture.js"
 import { Comparison } from "./compare.js"
 import { Depths } from "./depth.js"
 import { Eyes } from "./eyes.js"
@@ -84,6 +85,8 @@ const timeline = new Timeline((time) => {
 })
 const comparison = compared == null ? null
   : new Comparison($("compare"), timeline, () => { dirty = true }, (text) => said(compared, text))
+const capture = new Capture($("view").querySelector(".tools"), timeline,
+  () => ({ session: $("session").textContent, time: (timeline.past ? timeline.time : lastTime) ?? 0, framed }))
 const started = new Started(link, [...document.querySelectorAll(".started")])
 const forks = new Forks(link, timeline, started), start = new Start(link, started)
 const recordings = new Recordings()
@@ -148,6 +151,7 @@ async function makeScene() {
     const { Scene } = await import("./scene.js")
     scene = new Scene($("canvas"), () => { dirty = true })
     scene.chosen = showCameras
+    capture.begin(scene)
   } catch (error) {
     refused = true
     $("no-scene").hidden = false
@@ -210,19 +214,22 @@ function draw(now) {
   if (!headset.worn) takeFrames()
   if (dirty && !headset.worn) {
     dirty = false
-    if (drawing) scene?.pace(now - last)
+    if (capture.recorder) scene.sharpen() // fewer pictures rather than coarse ones
+    else if (drawing) scene?.pace(now - last)
     else scene?.resume()
     if (moved && scene && $("pictures").checked) eyes.look((side, canvas) => scene.look(side, canvas))
     moved = false
     scene?.draw()
+    capture.take()
     drawn++
     drawing = true
     drawnAt = now
   } else if (!headset.worn) {
     drawing = false
-    if (now - drawnAt > STILL_MS) scene?.settle(session?.kind !== "recording")
+    if (now - drawnAt > STILL_MS && !capture.recorder) scene?.settle(session?.kind !== "recording")
   }
   last = now
+  capture.tick(now)
   if (now - refreshed > REFRESH_MS) { refreshed = now; plots.refresh(); depths.refresh() }
   if (now - since > 1000) {
     $("fps").textContent = String(Math.round((counted * 1000) / (now - since)))

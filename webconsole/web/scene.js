@@ -289,6 +289,9 @@ export class Scene {
     this.renderer.setPixelRatio(ratio)
   }
 
+  // Every pixel of the screen, however long drawing takes.
+  sharpen() { this.renderer.setPixelRatio(this.finest) }
+
   // It moves again: the many pixels of what stood still would delay the first picture.
   resume() { this.renderer.setPixelRatio(this.ratio) }
 
