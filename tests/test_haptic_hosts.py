@@ -107,9 +107,10 @@ def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(
     SCENARIO["participants"]["stylus"]["library"] = str(library)
     file.write_text(json.dumps(SCENARIO))
     endpoint = free_endpoint()
-    hub = start("run", str(file), "--listen", endpoint)
+    own = {"TMPDIR": str(tmp_path)}  # where hubs of this test alone are found
+    hub = start("run", str(file), "--listen", endpoint, **own)
     hand.until(lambda: _listens(endpoint), "the hub listens")
-    start("device", "stylus", "--connect", endpoint, **{VARIABLE: str(world.file)})
+    start("device", "stylus", **own, **{VARIABLE: str(world.file)})  # without certificates
     hand.until(lambda: len(world.rows()) > 0, "the servo runs")
     hand.until(lambda: _presses(hand), "the hand feels the table")
     hub.kill()
@@ -121,7 +122,7 @@ def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(
     assert len(rows) > 100
     # a tick may come late on a busy machine
     assert len(pushing) == 0 or pushing[-1, Row.TIME] - killed < 0.15 + rows[:, Row.GAP].max()
-    start("run", str(file), "--listen", endpoint)
+    start("run", str(file), "--listen", endpoint, **own)
     hand.until(lambda: _presses(hand), "the hand feels the table of the next session")
     forces = np.linalg.norm(world.rows()[:, Row.FORCE], axis=1)
     assert 0.5 < forces.max() <= 1.98 + 1e-9

@@ -15,8 +15,9 @@ from dataclasses import asdict, dataclass
 
 from hub.transport.endpoints import address
 from hub.transport.session_secret import private_directory
+from schemas.errors import ConnectError
 
-__all__ = ["HubFile", "hub_file", "running_hubs"]
+__all__ = ["HubFile", "hub_file", "only_hub", "running_hubs"]
 
 _PROBE_S = 1.0
 
@@ -61,3 +62,20 @@ def running_hubs() -> list[HubFile]:
             pass
         found.append(hub)
     return found
+
+
+def only_hub() -> str:
+    """Return where the only hub of this user listens on loopback.
+
+    Raises ConnectError if none runs on this machine, or several do.
+    """
+    hubs = running_hubs()
+    if not hubs:
+        raise ConnectError(
+            "no hub of this user runs on this machine: start the session first, or say where it is with"
+            " --connect"
+        )
+    if len(hubs) > 1:
+        endpoints = ", ".join(hub.endpoint for hub in hubs)
+        raise ConnectError(f"{len(hubs)} hubs run on this machine: choose one with --connect: {endpoints}")
+    return hubs[0].endpoint

@@ -3,7 +3,8 @@ import tempfile
 
 import pytest
 
-from hub.transport.hub_files import HubFile, hub_file, running_hubs
+from hub.transport.hub_files import HubFile, hub_file, only_hub, running_hubs
+from schemas.errors import ConnectError
 
 
 @pytest.fixture
@@ -43,3 +44,12 @@ def test_something_else_among_the_files_is_ignored(home, listener):
         (file,) = home.rglob("*.json")
         (file.parent / "other.json").write_text("{")
         assert [hub.endpoint for hub in running_hubs()] == [_endpoint(listener)]
+
+
+def test_a_device_of_this_machine_finds_the_only_hub(home, listener):
+    with pytest.raises(ConnectError, match="no hub of this user runs on this machine"):
+        only_hub()
+    with socket.create_server(("127.0.0.1", 0)) as other, hub_file(_endpoint(other), []):
+        assert only_hub() == _endpoint(other)
+        with hub_file(_endpoint(listener), []), pytest.raises(ConnectError, match=r"2 hubs run .*--connect"):
+            only_hub()
