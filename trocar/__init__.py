@@ -7,14 +7,16 @@
     joints.time, joints["position"]     # (n,) s of simulated time, (n, 6) rad and m
 
 What is in `__all__` here, in `trocar.messages` (ROS 2 messages), in `trocar.quantities` (parameters with
-units), in `trocar.records` (state with named fields), in `trocar.tasks` (training tasks), in
-`trocar.haptics` (haptic devices), in `trocar.testing` (a driver of one participant) and in
-`trocar.environments` (environments for Gymnasium; the former name `learning.environments` works in this
-release) is public. All other modules of the distribution (`schemas`, `robots`, `hub`, `engines`,
-`controllers`, `devices`, `tasks`, `learning`, `configs`) are private, and may change in any release.
+units), in `trocar.programs` (programs that lead arms), in `trocar.records` (state with named fields), in
+`trocar.tasks` (training tasks), in `trocar.haptics` (haptic devices), in `trocar.testing` (a driver of one
+participant) and in `trocar.environments` (environments for Gymnasium; the former name `learning.environments`
+works in this release) is public. All other modules of the distribution (`schemas`, `robots`, `hub`,
+`engines`, `controllers`, `devices`, `tasks`, `learning`, `configs`) are private, and may change in any
+release.
 `python -m trocar` is the command line.
 
 Sessions          `run`, `verify`, `fork`, `load_scenario`, `run_in_process`, `SteppedSession`
+Leading an arm    `connect`: arms and cameras of a running session, for a program of its own
 Results           `Recording`, `Series`, `Reading`, `Summary`, `VerifySummary`; `recover` for a recording
                   cut short; `write_bag` for samples to play
 Participants      `Stepped`, `Controller`, `Device`, `Params`, `Setup`, `Port`, `Inputs`, `Outputs`,
@@ -67,6 +69,7 @@ if TYPE_CHECKING:
     from robots.dvrk.inverse import inverse
     from schemas.errors import TrocarError
     from schemas.ports import BondSide, Port
+    from trocar.programs import connect
     from trocar.sessions import fork, load_scenario, run, verify
 
 __all__ = [
@@ -94,6 +97,7 @@ __all__ = [
     "chain",
     "check_device",
     "check_engine",
+    "connect",
     "event_in",
     "event_out",
     "fork",
@@ -144,6 +148,7 @@ _MODULES = {
     "robots.dvrk.inverse": ("inverse",),
     "schemas.errors": ("TrocarError",),
     "schemas.ports": ("BondSide", "Port"),
+    "trocar.programs": ("connect",),
     "trocar.sessions": ("fork", "load_scenario", "run", "verify"),
 }
 _ORIGINS = {name: module for module, names in _MODULES.items() for name in names}

@@ -118,7 +118,7 @@ class HostRun:
         clock = self._stack.enter_context(ClockSync(self._run.session, self._run.keys))
         for name, device in devices.items():
             if isinstance(device, RouterClient):
-                device.learn_hub(_to_programs(reply) or connect)
+                device.learn_hub(connect if device.demands_secret else _to_programs(reply) or connect)
             planned = reply.plan.participants[name]
             thread = DeviceThread(name, device, planned.read_ns, failed=self._report_failure)
             uplink = DeviceUplink(planned, self._run, thread, clock.offset)

@@ -32,7 +32,7 @@ class OuterRouter:
     """A router beside the router of a hub.
 
     Args:
-        port: Port for programs; None: no device of the session shares keys.
+        port: Port for programs; None: no device shares keys with programs without the session's secret.
         foreign_keys: Keys shared with programs by devices.
         gated: The hub has a gate.
     """
@@ -44,7 +44,7 @@ class OuterRouter:
 
     @property
     def programs(self) -> str:
-        """Endpoint for programs; empty: no device shares keys."""
+        """Endpoint for programs; empty without a port."""
         return "" if self._port is None else self._port.endpoint
 
     @contextmanager

@@ -103,6 +103,9 @@ def launch(
         endpoint=endpoint,
         gate=gate,
         foreign_keys=[key for keys in foreign.values() for key in keys],
+        open_to_programs=any(
+            isinstance(p, RouterClient) and not p.demands_secret for p in participants.values()
+        ),
         record=record,
         attachments=attachments,
         past=None if continuation is None else continuation.past,

@@ -43,6 +43,7 @@ from hub.transport.host_link import HubLink, has_link
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
 from hub.transport.run_connection import RunConnection
+from hub.transport.session_secret import secret_of
 from hub.transport.wire import Wire
 from hub.transport.zenoh_session import open_session
 from schemas.files import Files
@@ -205,13 +206,22 @@ class Run:
 
     def _devices(self) -> SessionDevices:
         """Return the devices of the session; devices of this process are not yet open."""
-        endpoint, devices = self.spec.programs_endpoint, self.spec.devices
+        devices = self.spec.devices
         for device in devices.values():
             if isinstance(device, RouterClient):
-                device.learn_hub(lambda: open_session("client", connect=[endpoint]))
+                device.learn_hub(self._connect if device.demands_secret else self._connect_as_program)
         return SessionDevices(
             self.connection, devices, self.host.device_inputs, self.monitor, self.failure.report
         )
+
+    def _connect(self) -> zenoh.Session:
+        """Open a further Zenoh session with this hub, for a device of this process."""
+        endpoint = self.spec.endpoint
+        return open_session("client", connect=[endpoint], security=secret_of(endpoint))
+
+    def _connect_as_program(self) -> zenoh.Session:
+        """Open a Zenoh session with the router of programs."""
+        return open_session("client", connect=[self.spec.programs_endpoint])
 
     def _joined_hosts(self, ack_keys: Mapping[str, bytes]) -> JoinedHosts:
         spec, run = self.spec, self.connection

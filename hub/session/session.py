@@ -43,7 +43,8 @@ class Session:
         directory: Base of relative paths of the scenario.
         endpoint: The hub's endpoint on loopback; by default at a free port.
         gate: The gate for remote machines.
-        foreign_keys: Keys shared by devices and programs; these programs connect to a separate router.
+        foreign_keys: Keys shared by devices and programs.
+        open_to_programs: Programs without the secret of the session connect to a separate router.
         record: The directory of the recording.
         attachments: Contents of the recording beside the messages, by name.
         past: The recorded part of this run, to be simulated again before the run goes on, or instead.
@@ -63,6 +64,7 @@ class Session:
         endpoint: str | LoopbackPort | None = None,
         gate: Gate | None = None,
         foreign_keys: Sequence[str] = (),
+        open_to_programs: bool = False,
         record: Path | None = None,
         attachments: Mapping[str, bytes] | None = None,
         past: Past | None = None,
@@ -75,7 +77,7 @@ class Session:
         self.plan = plan
         self._port = endpoint if isinstance(endpoint, LoopbackPort) else LoopbackPort(endpoint)
         programs = None
-        if foreign_keys:
+        if open_to_programs:
             # programs look for the first port; one that was given is the hub's
             programs, given = self._port.another(), self._port
             if not given.given:
@@ -101,7 +103,7 @@ class Session:
 
     @property
     def programs_endpoint(self) -> str:
-        """Endpoint for ROS programs and the like; empty if no device has keys for such programs."""
+        """Endpoint for ROS programs and the like; empty if no device is open to programs without a secret."""
         return self._outer.programs
 
     def run(self, progress: Callable[[Progress], None] | None = None) -> Summary:
@@ -119,7 +121,12 @@ class Session:
                 with (
                     self._outer.opened(),
                     listen_with_secret(self._port, connect=self._outer.inside) as session,
-                    hub_file(self.endpoint, self.gate.endpoints if self.gate is not None else ()),
+                    hub_file(
+                        self.endpoint,
+                        self.gate.endpoints if self.gate is not None else (),
+                        session=self.scenario.name,
+                        programs=self.programs_endpoint,
+                    ),
                     ExitStack() as stack,
                 ):
                     spec = SessionSpec(

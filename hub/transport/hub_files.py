@@ -31,13 +31,22 @@ class HubFile:
     outside: tuple[str, ...]
     """Endpoints of the gate for remote machines."""
     pid: int
+    session: str = ""
+    programs: str = ""
+    """Where programs without the secret of the session connect; empty: nowhere."""
 
 
 @contextmanager
-def hub_file(endpoint: str, outside: Sequence[str]) -> Generator[None]:
-    """Keep the file of a hub of this process, listening at `endpoint` and at `outside`."""
+def hub_file(
+    endpoint: str, outside: Sequence[str], *, session: str = "", programs: str = ""
+) -> Generator[None]:
+    """Keep the file of a hub of this process, listening at `endpoint` and at `outside`.
+
+    `session`, `programs`: as in `HubFile`.
+    """
+    content = HubFile(endpoint, tuple(outside), os.getpid(), session, programs)
     file = private_directory() / f"{address(endpoint)[1]}.json"
-    file.write_text(json.dumps(asdict(HubFile(endpoint, tuple(outside), os.getpid()))), encoding="utf-8")
+    file.write_text(json.dumps(asdict(content)), encoding="utf-8")
     try:
         yield
     finally:
@@ -50,7 +59,7 @@ def running_hubs() -> list[HubFile]:
     for file in sorted(private_directory().glob("*.json")):
         try:
             said = json.loads(file.read_text(encoding="utf-8"))
-            hub = HubFile(said["endpoint"], tuple(said["outside"]), said["pid"])
+            hub = HubFile(**said | {"outside": tuple(said["outside"])})
         except (OSError, ValueError, KeyError, TypeError):  # being written, or just deleted, or not ours
             continue
         try:

@@ -22,6 +22,14 @@ class RouterClient(Protocol):
         """
         ...
 
+    @property
+    def demands_secret(self) -> bool:
+        """Whether programs of this machine need the secret of the session, as hosts do.
+
+        If not, every user of this machine may use the keys, at a separate router.
+        """
+        ...
+
     def learn_hub(self, connect: Callable[[], zenoh.Session]) -> None:
         """Receive, before `open`, a function to open a Zenoh session of the device's own with the hub."""
         ...

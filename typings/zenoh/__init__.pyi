@@ -120,6 +120,7 @@ class Liveliness:
     def declare_subscriber(
         self, key_expr: str, handler: Callback[Sample], *, history: bool | None = None
     ) -> Subscriber[None]: ...
+    def get(self, key_expr: str, *, timeout: float | None = None) -> Handler[Reply]: ...
 
 class Link:
     @property

@@ -1,6 +1,7 @@
 """What Trocar uses of zenoh.ext."""
 
-from zenoh import CongestionControl, Encoding, Priority, Session
+from zenoh import CongestionControl, Encoding, Priority, Sample, Session
+from zenoh.handlers import Callback
 
 class CacheConfig:
     def __init__(self, max_samples: int | None = None) -> None: ...
@@ -24,3 +25,23 @@ def declare_advanced_publisher(
     sample_miss_detection: MissDetectionConfig | None = None,
     publisher_detection: bool | None = None,
 ) -> AdvancedPublisher: ...
+
+class HistoryConfig:
+    def __init__(
+        self, *, detect_late_publishers: bool | None = None, max_samples: int | None = None
+    ) -> None: ...
+
+class RecoveryConfig:
+    def __init__(self, *, heartbeat: bool | None = None) -> None: ...
+
+class AdvancedSubscriber:
+    def undeclare(self) -> None: ...
+
+def declare_advanced_subscriber(
+    session: Session,
+    key_expr: str,
+    handler: Callback[Sample],
+    *,
+    history: HistoryConfig | None = None,
+    recovery: RecoveryConfig | None = None,
+) -> AdvancedSubscriber: ...

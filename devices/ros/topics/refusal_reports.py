@@ -1,4 +1,7 @@
-"""Reports on an arm's `error` and `warning` why a message was refused: at once, then every two seconds."""
+"""Reports on an arm's `error` and `warning` why a message was refused: at once, then every two seconds.
+
+Every refused move is reported, as by the motion controller: a program waits for the answer.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ from time import monotonic_ns
 import numpy as np
 
 from devices.ros.topics.row import Row
+from hub.participant.token_bucket import TokenBucket
+from robots.dvrk.crtk import is_move
 from robots.dvrk.repeats import is_recent, refusals_to_report
 from schemas.ros import StringMessage
 from schemas.vectors import Vector
@@ -20,6 +25,8 @@ log = logging.getLogger(__name__)
 
 _MOST = 8
 """Most different texts reported per topic within the period: a client may send a new error each time."""
+_MOVES_PER_S, _MOVES_AT_ONCE = 50, 50
+"""Limits of reports on equal refused moves, per gateway."""
 
 
 class RefusalReports:
@@ -30,6 +37,7 @@ class RefusalReports:
         self._name, self._publish = name, publish
         self._recent: dict[str, dict[str, Vector]] = {}
         """Last report of a refusal, in the form of `refusals_to_report`, by topic and words."""
+        self._moves = TokenBucket(_MOVES_PER_S, _MOVES_AT_ONCE)
         self._counting = threading.Lock()
 
     def report(self, row: Row, level: str, reason: str) -> None:
@@ -54,4 +62,5 @@ class RefusalReports:
             if len(recent) >= _MOST:
                 return 0
             recent[words] = np.zeros(3)
-        return refusals_to_report(recent[words], words, now_ns)
+        count = refusals_to_report(recent[words], words, now_ns)
+        return count or int(is_move(row.name) and self._moves.spend(now_ns))

@@ -33,6 +33,7 @@ class ZenohGateway(Gateway):
 
     kind = "ros2-zenoh"
     params_model = ZenohParams
+    demands_secret = False
 
     def __init__(self, name: str, params: ZenohParams) -> None:
         super().__init__(name, params)

@@ -50,17 +50,33 @@ class _Publisher:
 
 
 class ZenohTransport(Transport):
-    """Publishes, listens and answers under rmw_zenoh's keys, as one node.
+    """Publishes, listens and answers under rmw_zenoh's keys, as one node of a gateway or of a program.
 
-    Publishing never waits for a reader: messages unread by a program are dropped for this program, and the
-    program queries the last message of a latched topic again. States and events have separate queues, and
-    pictures a session of their own: for a program not reading, the router tries for 50 ms before dropping the
-    rest of a picture, and reads nothing else of the session meanwhile.
+    A gateway's publishing never waits for a reader: messages unread by a program are dropped for this
+    program, and the program queries the last message of a latched topic again. States and events have
+    separate queues, and pictures a session of their own: for a program not reading, the router tries for
+    50 ms before dropping the rest of a picture, and reads nothing else of the session meanwhile.
     """
 
-    def __init__(self, connect: Callable[[], zenoh.Session], domain: int) -> None:
-        """Join the graph of `domain` with sessions opened by `connect`."""
-        self._session, self._pictures = connect(), connect()
+    def __init__(
+        self,
+        connect: Callable[[], zenoh.Session],
+        domain: int,
+        *,
+        node: str = NODE,
+        congestion: zenoh.CongestionControl = zenoh.CongestionControl.DROP,
+    ) -> None:
+        """Join the graph.
+
+        Args:
+            connect: opens a Zenoh session.
+            domain: the ROS domain.
+            node: name of the node.
+            congestion: how messages are sent while the router is busy.
+        """
+        self._session = connect()
+        self._connect_pictures, self._pictures = connect, None
+        self._node, self._congestion = node, congestion
         self._domain, self._id = domain, str(self._session.zid())
         self._graph = Graph(self._id)
         self._topics: set[str] = set()
@@ -68,6 +84,7 @@ class ZenohTransport(Transport):
             ext.AdvancedPublisher
             | zenoh.Publisher
             | zenoh.Subscriber[None]
+            | ext.AdvancedSubscriber
             | zenoh.Queryable[None]
             | zenoh.LivelinessToken
             | zenoh.MatchingListener
@@ -78,34 +95,38 @@ class ZenohTransport(Transport):
         watch = Callback(self._token_changed, indirect=False)
         liveliness = self._session.liveliness()
         self._entities.append(liveliness.declare_subscriber(graph_key(domain), watch, history=True))
-        self._entities.append(liveliness.declare_token(GraphToken(self._id, 0, "NN", NODE).key(domain)))
+        self._entities.append(liveliness.declare_token(GraphToken(self._id, 0, "NN", node).key(domain)))
 
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
         address, cdr = key(self._domain, row.topic, row.type), zenoh.Encoding.APPLICATION_CDR
-        drop = zenoh.CongestionControl.DROP
         priority = zenoh.Priority.REAL_TIME if row.periodic else zenoh.Priority.INTERACTIVE_HIGH
         if row.latched:
             publisher = ext.declare_advanced_publisher(
                 self._session,
                 address,
                 encoding=cdr,
-                congestion_control=drop,
+                congestion_control=self._congestion,
                 priority=priority,
                 cache=ext.CacheConfig(max_samples=1),
                 sample_miss_detection=ext.MissDetectionConfig(heartbeat=_HEARTBEAT_S),
                 publisher_detection=True,
             )
         else:
-            session = self._pictures if row.is_picture else self._session
+            session = self._session_of_pictures() if row.is_picture else self._session
             publisher = session.declare_publisher(
-                address, encoding=cdr, congestion_control=drop, priority=priority
+                address, encoding=cdr, congestion_control=self._congestion, priority=priority
             )
         self._entities.append(publisher)
         gid = gid_of(self._announce_entity("MP", row, LATCHED if row.latched else VOLATILE))
         advertised = _Publisher(publisher, gid)
-        if isinstance(publisher, zenoh.Publisher) and (row.periodic or row.is_picture):
+        if isinstance(publisher, zenoh.Publisher):
             self._watch(publisher, advertised)
         return advertised
+
+    def _session_of_pictures(self) -> zenoh.Session:
+        if self._pictures is None:
+            self._pictures = self._connect_pictures()
+        return self._pictures
 
     def _watch(self, publisher: zenoh.Publisher, advertised: _Publisher) -> None:
         """Keep up to date whether `advertised` is wanted."""
@@ -133,12 +154,19 @@ class ZenohTransport(Transport):
                 return
             receive(sample.payload.to_bytes(), self._graph.sender(topic, attached.gid))
 
-        self._entities.append(
-            self._session.declare_subscriber(
-                key(self._domain, topic, row.type), Callback(on_sample, indirect=False)
+        address, callback = key(self._domain, topic, row.type), Callback(on_sample, indirect=False)
+        if row.latched:
+            subscriber = ext.declare_advanced_subscriber(
+                self._session,
+                address,
+                callback,
+                history=ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
+                recovery=ext.RecoveryConfig(heartbeat=True),
             )
-        )
-        self._announce_entity("MS", row, VOLATILE)
+        else:
+            subscriber = self._session.declare_subscriber(address, callback)
+        self._entities.append(subscriber)
+        self._announce_entity("MS", row, LATCHED if row.latched else VOLATILE)
 
     def serve(self, row: Row, handle: ServiceHandler) -> None:  # noqa: D102
         address = key(self._domain, row.topic, row.type)
@@ -169,14 +197,15 @@ class ZenohTransport(Transport):
             for entity in self._entities:
                 entity.undeclare()
             self._session.close()
-            self._pictures.close()
+            if self._pictures is not None:
+                self._pictures.close()
 
     def _announce_entity(self, kind: EntityKind, row: Row, quality: str) -> str:
         """Declare the liveliness token of a publisher, subscriber or server; return the token's key."""
         self._number += 1
         self._topics.add(row.topic)
         token = GraphToken(
-            self._id, self._number, kind, NODE, row.topic, row.type, type_hash(row.type), quality
+            self._id, self._number, kind, self._node, row.topic, row.type, type_hash(row.type), quality
         ).key(self._domain)
         self._entities.append(self._session.liveliness().declare_token(token))
         return token
