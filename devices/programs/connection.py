@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections import defaultdict
 from collections.abc import Callable, Mapping
 from time import monotonic
 from typing import Generic, TypeVar
@@ -13,7 +12,7 @@ from zenoh.handlers import Callback
 
 from devices.ros.topics.row import Row
 from devices.ros.transport import NODE, Publisher
-from devices.ros.zenoh.layout import GraphToken, graph_key
+from devices.ros.zenoh.layout import GraphToken, graph_key, ready_key
 from devices.ros.zenoh.transport import ZenohTransport
 from schemas.codec import decode, encode
 from schemas.errors import ConnectError, SessionError, did_you_mean
@@ -31,21 +30,36 @@ _MAX_AGE_S = 1.0
 """Age of the oldest state in use, as of a CRTK client; the gateway publishes no older state either."""
 
 
-def find_gateway(session: zenoh.Session, domain: int) -> dict[str, list[GraphToken]]:
-    """Return the tokens of gateways in `domain`, by the id of the gateway's Zenoh session."""
-    found: defaultdict[str, list[GraphToken]] = defaultdict(list)
-    for reply in session.liveliness().get(graph_key(domain), timeout=_ANSWER_S):
-        token = None if reply.ok is None else GraphToken.parse_token(str(reply.ok.key_expr))
-        if token is not None and token.node == NODE:
-            found[token.session].append(token)
-    return found
+def find_gateway(session: zenoh.Session, domain: int) -> list[GraphToken]:
+    """Return the tokens of a gateway in `domain`; empty: no gateway, or not all tokens are here yet."""
+    for ready in session.liveliness().get(ready_key(domain), timeout=_ANSWER_S):
+        if ready.ok is None:
+            continue
+        *_, gateway, count = str(ready.ok.key_expr).split("/")
+        replies = session.liveliness().get(graph_key(domain), timeout=_ANSWER_S)
+        tokens = [
+            token
+            for reply in replies
+            if reply.ok is not None
+            and (token := GraphToken.parse_token(str(reply.ok.key_expr))) is not None
+            and token.session == gateway
+        ]
+        if sum(token.kind != "NN" for token in tokens) == int(count):
+            return tokens
+    return []
 
 
 class Connection:
     """A program's connection to one gateway. Messages arrive in Zenoh's threads."""
 
     def __init__(
-        self, session: zenoh.Session, label: str, node: str, domain: int, tokens: list[GraphToken]
+        self,
+        session: zenoh.Session,
+        label: str,
+        node: str,
+        domain: int,
+        tokens: list[GraphToken],
+        start_s: float,
     ) -> None:
         """Join the graph.
 
@@ -55,8 +69,9 @@ class Connection:
             node: name of this program in the graph, with a leading slash.
             domain: the ROS domain.
             tokens: tokens of the gateway.
+            start_s: longest wait for the session to start.
         """
-        self.label, self.node = label, node
+        self.label, self.node, self.start_s = label, node, start_s
         self.published: Mapping[str, str] = _types(tokens, "MP")
         """Types of the published topics, by name."""
         self.commands: Mapping[str, str] = _types(tokens, "MS")

@@ -27,8 +27,6 @@ _KEPT = 1000
 """Events kept for handles that look rarely."""
 _GRACE_S = 0.3
 """Wait for further events of the same step: each topic is a stream of its own."""
-_ANSWER_S = 30.0
-"""Longest wait for the first operating state, published when all hosts of a session have joined."""
 _REFUSED = re.compile(r"[^:]+: (\S+) refused: (.*)", re.DOTALL)
 _PROGRAM = re.compile(r"(?:^|from |by )(/\w+)")
 """Name of the refused program in a refusal by the gateway; a refusal by the arm has none."""
@@ -49,10 +47,10 @@ class ArmEvents:
         connection.listen(f"/{arm}/warning", self._receive_text)
         connection.listen(f"/{arm}/goal_reached", lambda p: self._add(decode(BoolMessage, p).data))
         connection.listen(f"/{arm}/operating_state", self._receive_state, latched=True)
-        if not connection.wait_for(lambda: self._state is not None, _ANSWER_S):
+        if not connection.wait_for(lambda: self._state is not None, connection.start_s):
             raise ConnectError(
-                f"{arm} has no operating state within {_ANSWER_S:g} s: no controller of kind motion is"
-                f" connected to the gateway of {connection.label}"
+                f"{arm} has no operating state within {connection.start_s:g} s: {connection.label} has not"
+                " started, or has no controller of kind motion that is connected to its gateway"
             )
 
     @property

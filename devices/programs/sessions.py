@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from pathlib import Path
 from time import monotonic, sleep
@@ -14,7 +13,6 @@ import zenoh
 
 from devices.programs.client import Client
 from devices.programs.connection import Connection, find_gateway
-from devices.ros.zenoh.layout import GraphToken
 from hub.remote.hub_connection import reach
 from hub.security.credentials import CONSOLE
 from hub.transport.endpoints import is_loopback
@@ -26,16 +24,15 @@ from schemas.errors import ConnectError
 __all__ = ["connect"]
 
 _POLL_S = 0.2
+_ABSENT_S = 5.0
+"""Longest wait for a session that is not there."""
 _numbers = count(1)
 
 
-@dataclass(frozen=True)
-class _Gateway:
-    """A gateway that was found, with the Zenoh session to it."""
-
-    session: zenoh.Session
-    label: str
-    tokens: list[GraphToken]
+_REMEDY = (
+    "Start it with: trocar run NAME --programs. In a scenario of your own the participant `programs: {kind:"
+    " programs}` and the connections `programs.* -> motion.*` and `motion.* -> programs.*` do the same"
+)
 
 
 def connect(
@@ -44,91 +41,71 @@ def connect(
     endpoint: str = "",
     certificates: Path | None = None,
     domain: int = 0,
-    timeout_s: float = 10.0,
+    timeout_s: float = 60.0,
 ) -> Client:
     """Connect this program to a running session, whose arms it may then lead; the session goes on after it.
 
     Args:
-        session: name of a session of this user on this machine; empty: the only one there is.
+        session: name of a session of this user on this machine; empty: the only session open to programs.
         endpoint: where the hub listens, such as tls/hub.lab:7447, for a session on another machine; this
             machine then needs the certificate `console` (`trocar certs issue console`).
         certificates: directory or file of the certificate; by default this user's directory.
         domain: `domain` of the gateway in the scenario.
-        timeout_s: longest wait for the session to start.
+        timeout_s: longest wait for the session to start, from its first process on.
 
-    Raises ConnectError if there is no such session, several, or a session without a gateway to programs.
+    Raises ConnectError if there is no such session, if it is not open to programs, or if there are several.
     """
+    if endpoint:
+        open_session_there, label = _at_endpoint(endpoint, certificates), f"the session at {endpoint}"
+    else:
+        hub = _find_hub(session, min(timeout_s, _ABSENT_S))
+        open_session_there, label = partial(_open, hub), f"session '{hub.session}'"
     deadline = monotonic() + timeout_s
-    find = _remote(endpoint, certificates, domain) if endpoint else lambda: _local(session, domain)
     while True:
-        gateways = find()
-        if len(gateways) == 1:
-            gateway = gateways[0]
+        there = open_session_there()
+        if tokens := find_gateway(there, domain):
             node = f"/python_{os.getpid()}_{next(_numbers)}"
-            return Client(Connection(gateway.session, gateway.label, node, domain, gateway.tokens))
-        for gateway in gateways:
-            gateway.session.close()
-        if gateways:
-            labels = ", ".join(gateway.label for gateway in gateways)
-            raise ConnectError(
-                f"several sessions may be led by programs: {labels}. Name one: connect('NAME')"
-            )
+            return Client(Connection(there, label, node, domain, tokens, timeout_s))
+        there.close()
         if monotonic() > deadline:
-            raise ConnectError(_absence(session, endpoint))
+            raise ConnectError(f"{label} has no gateway of domain {domain} within {timeout_s:g} s. {_REMEDY}")
         sleep(_POLL_S)
 
 
-def _local(name: str, domain: int) -> list[_Gateway]:
-    """Return the gateways of this user's sessions on this machine."""
-    found: list[_Gateway] = []
-    for hub in running_hubs():
-        if name in ("", hub.session):
-            with suppress(ConnectError):  # the session has just ended, or is about to listen
-                found += _gateways(_open(hub), f"session '{hub.session}'", domain)
-    return found
+def _find_hub(name: str, timeout_s: float) -> HubFile:
+    """Return the hub of the session `name` of this user on this machine, or of the only session."""
+    deadline = monotonic() + timeout_s
+    while True:
+        hubs = running_hubs()
+        named = [hub for hub in hubs if name in ("", hub.session)]
+        if len(found := [hub for hub in named if hub.programs]) == 1:
+            return found[0]
+        if found:
+            names = ", ".join(f"'{hub.session}' at {hub.programs}" for hub in found)
+            raise ConnectError(
+                f"several sessions are open to programs: {names}. State the name or the endpoint:"
+                " trocar.connect('NAME'), trocar.connect(endpoint='ENDPOINT')"
+            )
+        if named:
+            names = ", ".join(f"'{hub.session}'" for hub in named)
+            raise ConnectError(f"session {names} is not open to programs. {_REMEDY}")
+        if monotonic() > deadline:
+            others = f"; running are: {', '.join(hub.session for hub in hubs)}" if hubs else ""
+            what = f"session '{name}'" if name else "session"
+            raise ConnectError(
+                f"no {what} of this user runs on this machine{others}. Start one: trocar run {name or 'psm'}"
+            )
+        sleep(_POLL_S)
 
 
 def _open(hub: HubFile) -> zenoh.Session:
-    if hub.programs:
-        return open_session("client", connect=[hub.programs])
-    return open_session("client", connect=[hub.endpoint], security=secret_of(hub.endpoint))
+    security = secret_of(hub.endpoint) if hub.programs == hub.endpoint else None
+    return open_session("client", connect=[hub.programs], security=security)
 
 
-def _remote(endpoint: str, certificates: Path | None, domain: int) -> Callable[[], list[_Gateway]]:
-    open_to_all = is_loopback(endpoint) and any(hub.programs == endpoint for hub in running_hubs())
-
-    def find() -> list[_Gateway]:
-        session = (
-            open_session("client", connect=[endpoint])
-            if open_to_all
-            else reach(endpoint, CONSOLE, certificates)
-        )
-        return _gateways(session, f"the session at {endpoint}", domain)
-
-    return find
-
-
-def _gateways(session: zenoh.Session, label: str, domain: int) -> list[_Gateway]:
-    """Return the gateway at the router of `session`; close `session` if there is none."""
-    tokens = [its for its in find_gateway(session, domain).values() if len(its) > 1]
-    if not tokens:
-        session.close()
-        return []
-    return [_Gateway(session, label, tokens[0])]
-
-
-def _absence(name: str, endpoint: str) -> str:
-    """Return why there is no gateway, and what to do."""
-    remedy = (
-        "To be led by programs, a scenario has `programs: {kind: programs}` among its participants, and the"
-        " connections `programs.* -> motion.*` and `motion.* -> programs.*`; `trocar run psm` has them"
-    )
-    if endpoint:
-        return f"the session at {endpoint} has no arm for programs. {remedy}"
-    running = [hub.session for hub in running_hubs()]
-    if name and name not in running:
-        others = f"; running are: {', '.join(running)}" if running else ""
-        return f"no session '{name}' of this user runs on this machine{others}. Start one: trocar run {name}"
-    if not running:
-        return "no session of this user runs on this machine. Start one: trocar run psm"
-    return f"no arm of the running session {', '.join(map(repr, running))} is for programs. {remedy}"
+def _at_endpoint(endpoint: str, certificates: Path | None) -> Callable[[], zenoh.Session]:
+    """Return a function to connect to `endpoint`, on this machine or on another."""
+    for hub in running_hubs() if is_loopback(endpoint) else ():
+        if hub.programs == endpoint:
+            return partial(_open, hub)
+    return partial(reach, endpoint, CONSOLE, certificates)

@@ -93,7 +93,9 @@ class Gateway(Device):
         self._has_changed = True
         """Whether programs have subscribed, or have ceased to."""
         self._events: dict[str, EventTopic] = {}
-        self._arbiters: defaultdict[str, CommandArbiter] = defaultdict(CommandArbiter)
+        self._arbiters: defaultdict[str, CommandArbiter] = defaultdict(
+            lambda: CommandArbiter(self._is_connected)
+        )
         self._refusals = RefusalReports(self.name, self._publish_text)
         self._refused_moves = RefusedMoves(self._publish)
         self._received: deque[Sample] = deque()
@@ -139,6 +141,7 @@ class Gateway(Device):
                 transport.subscribe(row, topic.receive)
             elif row.way == "serve":
                 transport.serve(row, self._service_handler(row))
+        transport.announce_ready()
 
     def _advertise_all(self, transport: Transport) -> list[PeriodicTopic]:
         """Advertise all published rows; return the rows published at the gateway's period."""
@@ -181,6 +184,9 @@ class Gateway(Device):
             self._refused_moves.accepted(row)
             self._received.append(Sample(row.port.name, message))
             self._is_new.set()
+
+    def _is_connected(self, client: str) -> bool:
+        return self._transport is not None and self._transport.is_connected(client)
 
     def _refuse(self, row: Row, level: str, reason: str) -> None:
         self._refusals.report(row, level, reason)

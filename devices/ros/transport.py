@@ -103,6 +103,13 @@ class Transport(ABC):
         Called once a second: must be cheap.
         """
 
+    def announce_ready(self) -> None:  # noqa: B027 - a middleware may have no use for it
+        """Note that all rows are advertised, subscribed to or served."""
+
+    def is_connected(self, client: str) -> bool:  # noqa: ARG002
+        """Return whether a program is still there; a middleware without this knowledge returns True."""
+        return True
+
     @abstractmethod
     def close(self) -> None:
         """Leave the graph. May be called twice."""

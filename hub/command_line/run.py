@@ -59,6 +59,13 @@ def run(
     pace: Annotated[
         Literal["fast", "realtime"] | None, typer.Option(help="Replace the pace of the scenario.")
     ] = None,
+    programs: Annotated[
+        bool,
+        typer.Option(
+            "--programs",
+            help="Let programs lead the arms (trocar.connect), in real time unless --pace is given.",
+        ),
+    ] = False,
     listen: Listening = None,
     certs: Certificates = None,
     one_host: OneHost = False,
@@ -81,7 +88,8 @@ def run(
         return
     name = Path(scenario).stem
     directory = recording_directory(record, name, overwrite=overwrite)
-    file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())])
+    pace = pace or ("realtime" if programs else None)
+    file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())], programs=programs)
     inside, outside = listening_ports(listen or ())
     with with_places(file.source):
         session = launch(

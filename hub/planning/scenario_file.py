@@ -19,6 +19,7 @@ from hub.planning import registry
 from hub.planning.contacts import add_contacts
 from hub.planning.foreign_code import foreign_code
 from hub.planning.limits import MAX_PARTICIPANTS, MAX_PROBLEMS, safe_text
+from hub.planning.programs import admit_programs
 from hub.planning.renamed import SCENARIOS, replace_old_names
 from hub.planning.scenario_source import Location, Source, read
 from hub.planning.scene import spread_scene
@@ -58,21 +59,23 @@ def scenario_families() -> dict[str, list[str]]:
     return tomllib.loads((files("configs") / "families.toml").read_text("utf-8"))
 
 
-def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
+def load(name_or_path: str, overrides: Sequence[str] = (), *, programs: bool = False) -> ScenarioFile:
     """Return the installed scenario of a name, or a scenario file, with overrides `a.b.c=value` applied.
 
-    Raises ScenarioError with a line for each problem.
+    `programs`: open the scenario to programs. Raises ScenarioError with a line for each problem.
     """
-    return validate_source(read(_find(name_or_path)), overrides)
+    return validate_source(read(_find(name_or_path)), overrides, programs=programs)
 
 
-def validate_source(source: Source, overrides: Sequence[str] = ()) -> ScenarioFile:
+def validate_source(source: Source, overrides: Sequence[str] = (), *, programs: bool = False) -> ScenarioFile:
     """Return the scenario in `source`, with overrides `a.b.c=value` applied.
 
-    Raises ScenarioError with a line for each problem.
+    `programs`: open the scenario to programs. Raises ScenarioError with a line for each problem.
     """
     for override in overrides:
         source.override(override)
+    if programs:
+        admit_programs(source)
     _check_number(source)
     replace_old_names(source)
     _log_code(source)

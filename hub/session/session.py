@@ -82,6 +82,7 @@ class Session:
             programs, given = self._port.another(), self._port
             if not given.given:
                 programs, self._port = given, programs
+        self._shares_keys = bool(foreign_keys)
         self._outer = OuterRouter(programs, foreign_keys, gated=gate is not None)
         self.gate = gate
         self.state = RunState()
@@ -125,7 +126,7 @@ class Session:
                         self.endpoint,
                         self.gate.endpoints if self.gate is not None else (),
                         session=self.scenario.name,
-                        programs=self.programs_endpoint,
+                        programs=self.programs_endpoint or (self.endpoint if self._shares_keys else ""),
                     ),
                     ExitStack() as stack,
                 ):

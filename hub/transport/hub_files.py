@@ -33,7 +33,7 @@ class HubFile:
     pid: int
     session: str = ""
     programs: str = ""
-    """Where programs without the secret of the session connect; empty: nowhere."""
+    """Where programs connect, with the secret of the session if at `endpoint`; empty: nowhere."""
 
 
 @contextmanager

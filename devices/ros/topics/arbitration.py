@@ -1,13 +1,14 @@
 """Arbitration of an arm between programs: one program at a time.
 
 The real system obeys every program at once, so two programs drag an arm to and fro. Here the first program
-keeps the arm during its move and for a second after its last command. Every program may always stop an arm:
-`hold`, `free` and `state_command` are accepted from all.
+keeps the arm during its move and, unless it leaves, for a second after its last command. Every program may
+always stop an arm: `hold`, `free` and `state_command` are accepted from all.
 """
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from time import monotonic_ns
 
 __all__ = ["CommandArbiter"]
@@ -19,7 +20,9 @@ _KEPT_NS = 1_000_000_000
 class CommandArbiter:
     """Grants an arm to one program at a time; for use from any thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, is_connected: Callable[[str], bool] = lambda _: True) -> None:
+        """`is_connected`: returns whether a program is still there."""
+        self._is_connected = is_connected
         self.busy = False
         """Whether the arm is moving, from the operating state."""
         self._client, self._until_ns = "", 0
@@ -29,7 +32,8 @@ class CommandArbiter:
         """Give the arm to `client` and return None, or return why not while another program has the arm."""
         with self._deciding:
             now_ns = monotonic_ns()
-            if client != self._client and self._client and (self.busy or now_ns < self._until_ns):
+            kept = self.busy or (now_ns < self._until_ns and self._is_connected(self._client))
+            if client != self._client and self._client and kept:
                 return (
                     f"{client} may not move the arm while {self._client} commands it; hold, free and"
                     " state_command are accepted"

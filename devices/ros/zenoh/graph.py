@@ -79,6 +79,11 @@ class Graph:
                 self._senders[gid] = key
             return self._names[self._tokens[key].session]
 
+    def is_connected(self, name: str) -> bool:
+        """Return whether the sender `name` is there; a publisher without a program always is."""
+        with self._changing:
+            return not name.startswith("/") or name in self._names.values()
+
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
         """Return the programs with a publisher, subscriber, server or client of any of `topics`."""
         with self._changing:

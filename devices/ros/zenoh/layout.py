@@ -25,6 +25,7 @@ __all__ = [
     "graph_key",
     "key",
     "packed_attachment",
+    "ready_key",
     "type_hash",
 ]
 
@@ -49,6 +50,17 @@ def key(domain: int, topic: str, type_: str) -> str:
 def graph_key(domain: int) -> str:
     """Return the key expression of all tokens."""
     return f"@ros2_lv/{domain}/**"
+
+
+def ready_key(domain: int, session: str = "*", entities: int | None = None) -> str:
+    """Return the key of our own token of a complete gateway; by default the expression of all such keys.
+
+    Args:
+        domain: the ROS domain.
+        session: Zenoh's id of the gateway's session.
+        entities: number of the gateway's publishers, subscribers and servers.
+    """
+    return f"{domain}/trocar/gateway/{session}/{'*' if entities is None else entities}"
 
 
 def type_hash(type_: str) -> str:

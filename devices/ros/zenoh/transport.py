@@ -22,6 +22,7 @@ from devices.ros.zenoh.layout import (
     graph_key,
     key,
     packed_attachment,
+    ready_key,
     type_hash,
 )
 from schemas.errors import MessageError
@@ -190,6 +191,13 @@ class ZenohTransport(Transport):
 
     def clients(self) -> tuple[Client, ...]:  # noqa: D102
         return self._graph.clients(self._topics)
+
+    def announce_ready(self) -> None:  # noqa: D102
+        token = ready_key(self._domain, self._id, self._number)
+        self._entities.append(self._session.liveliness().declare_token(token))
+
+    def is_connected(self, client: str) -> bool:  # noqa: D102
+        return self._graph.is_connected(client)
 
     def close(self) -> None:  # noqa: D102
         if not self._closed:
