@@ -2,6 +2,7 @@
 
 import json
 import os
+import runpy
 import socket
 import subprocess
 import sys
@@ -17,7 +18,7 @@ import trocar
 from hub.transport.hub_files import hub_file, running_hubs
 from tests.hub.authorities import Authority, free_port
 from tests.waiting import LIMIT_S, until
-from trocar.programs import ConnectError, MotionError, Pose, SessionError
+from trocar.programs import ConnectError, MotionError, Pose, SessionError, connect
 
 pytest.importorskip("ruckig")
 pytest.importorskip("mujoco")
@@ -39,7 +40,7 @@ class Running:
 
     def connect(self):
         until(lambda: any(hub.session == self.name for hub in running_hubs()))
-        return trocar.connect(self.name, timeout_s=LIMIT_S)
+        return connect(self.name, timeout_s=LIMIT_S)
 
     def end(self):
         self.process.terminate()
@@ -250,3 +251,21 @@ def test_a_program_loads_no_engine():
     loaded = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
     engines = {"mujoco", "pybullet", "ruckig", "fmpy", "PIL", "matplotlib"}
     assert not engines & set(json.loads(loaded.stdout))
+
+
+def test_the_script_and_the_notebook_of_the_documentation_run(running, monkeypatch, capsys):
+    monkeypatch.setattr(trocar, "connect", lambda endpoint="": running.connect())
+    runpy.run_path(str(ROOT / "examples" / "lead_psm1.py"))["main"]()
+    written = capsys.readouterr().out
+    assert written.count("mm from the corner") == 4
+    assert "move_jp refused: joint yaw at 2 rad" in written
+    assert "picture of 320 x 288 pixels" in written
+    notebook = json.loads((ROOT / "examples" / "lead_psm1.ipynb").read_text())
+    assert len(json.dumps(notebook)) < 5000
+    names = {}
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            assert not cell["outputs"]
+            exec("".join(cell["source"]), names)
+    assert "PSM1: move_jp refused" in capsys.readouterr().out
+    assert names["picture"].pixels.shape == (288, 320, 3)
