@@ -1,1 +1,1 @@
-"""Programs in plain Python that lead arms: the gateway `programs`, and its client, `trocar.connect`."""
+"""Programs in plain Python: the gateway `programs`, and the client, `trocar.connect`."""

@@ -17,7 +17,7 @@ __all__ = ["Client"]
 class Client:
     """A running session, led by a program: `with trocar.connect() as s: s.PSM1.move_jp(q).wait()`.
 
-    Arms and cameras are attributes with the names that the gateway of the session states. For one thread.
+    Arms and cameras are attributes, by the names in the session. For one thread.
     """
 
     if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Client:
         return arm
 
     def close(self) -> None:
-        """Leave the session, which goes on; arms finish their moves."""
+        """Leave the session; the session goes on, and arms finish their moves."""
         self._connection.close()
 
     def __getattr__(self, name: str) -> Arm | Camera:

@@ -1,4 +1,4 @@
-"""Finding the session that a program leads: on this machine by its name, elsewhere by its endpoint."""
+"""Finding a session for a program: on this machine by name, elsewhere by endpoint."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["connect"]
 
 _POLL_S = 0.2
 _ABSENT_S = 5.0
-"""Longest wait for a session that is not there."""
+"""Longest wait for a missing session."""
 _numbers = count(1)
 
 
@@ -43,7 +43,7 @@ def connect(
     domain: int = 0,
     timeout_s: float = 60.0,
 ) -> Client:
-    """Connect this program to a running session, whose arms it may then lead; the session goes on after it.
+    """Connect this program to a running session, to lead arms; the session outlives the connection.
 
     Args:
         session: name of a session of this user on this machine; empty: the only session open to programs.
@@ -53,7 +53,7 @@ def connect(
         domain: `domain` of the gateway in the scenario.
         timeout_s: longest wait for the session to start, from its first process on.
 
-    Raises ConnectError if there is no such session, if it is not open to programs, or if there are several.
+    Raises ConnectError for a missing session, a session closed to programs, or several sessions.
     """
     if endpoint:
         open_session_there, label = _at_endpoint(endpoint, certificates), f"the session at {endpoint}"
