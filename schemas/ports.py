@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from schemas.errors import MessageError
 from schemas.ros import Float64MultiArray, PoseStamped, TwistStamped, WrenchStamped
 
 __all__ = ["BondSide", "Port", "bond_ports"]
@@ -45,11 +46,36 @@ class Port(BaseModel):
     """An output is produced at this period, a multiple of the step; 0: whenever the participant steps."""
     start: tuple[float, ...] | None = None
     """Value of an input while nothing is connected (FMI's word); None: the input must be connected."""
+    limits: tuple[float, float] | None = None
+    """Least and greatest value of a tunable parameter; None: the port is no tunable parameter.
+
+    A tunable parameter is a signal of one number without a connection, for people to change while the session
+    runs; `start` is the value at the start.
+    """
     max_age_ns: int = Field(default=0, ge=0)
     """A stream inlet is marked stale when its last sample is older, and before the first; 0: never older."""
     clock: Literal["simulated", "wall"] = "simulated"
     """The clock of the stamps."""
     description: str = ""
+
+    @model_validator(mode="after")
+    def _starts_within_limits(self) -> Port:
+        if self.limits is None:
+            return self
+        if (self.causality, self.variability, self.size) != ("input", "signal", 1) or self.start is None:
+            raise ValueError(f"port '{self.name}': limits are for an input signal of one number with a start")
+        least, most = self.limits
+        if not least <= self.start[0] <= most:
+            raise ValueError(f"port '{self.name}' starts at {self.start[0]:g}, outside {least:g} to {most:g}")
+        return self
+
+    def check_limits(self, value: float) -> None:
+        """Raise MessageError if `value` is outside the limits of this tunable parameter."""
+        if self.limits is not None and not self.limits[0] <= value <= self.limits[1]:
+            least, most = self.limits
+            raise MessageError(
+                f"'{self.name}' = {value:g} is outside its limits: {least:g} to {most:g} {self.unit}".rstrip()
+            )
 
     def filled_from(self, other: Port) -> Port:
         """Return this port with the open frame and joint names filled from `other`."""

@@ -24,6 +24,7 @@ __all__ = [
     "Say",
     "Show",
     "Start",
+    "Tune",
     "Watch",
     "command",
     "command_name",
@@ -86,6 +87,16 @@ class Network(_Command):
     """Largest additional delay of a message, s."""
     loss: Annotated[float, Field(allow_inf_nan=False, ge=0.0, lt=1.0)] | None = None
     """Share of the messages."""
+
+
+class Tune(_Command):
+    """Change a parameter of the running session."""
+
+    do: Literal["tune"]
+    name: Name
+    """`participant.port`."""
+    value: Finite
+    """In the unit of the port."""
 
 
 class Watch(_Command):
@@ -207,6 +218,7 @@ Command = Annotated[
     | At
     | Control
     | Network
+    | Tune
     | Watch
     | Invite
     | Prepare

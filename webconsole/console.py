@@ -14,7 +14,7 @@ from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError, ScenarioError
 from schemas.trocar_msgs import ScoreCard
 from webconsole.changes import wrong_fields
-from webconsole.commands import Control, Fork, Network, Pick, Say, Start
+from webconsole.commands import Control, Fork, Network, Pick, Say, Start, Tune
 from webconsole.fork import fork_arguments, fork_modules
 from webconsole.frame import Section, SectionKind, pose_content
 from webconsole.guide import guide_request
@@ -116,6 +116,10 @@ class Console:
         whole_ns = {key: f"{given[key] * 1e9:.0f} ns" for key in ("delay", "jitter") if key in given}
         request = NetworkLinkRequest.model_validate(given | whole_ns)
         await asyncio.to_thread(live.change_link, request)
+
+    async def tune(self, order: Tune) -> None:
+        """Change a parameter of the running session; raises MessageError or ConnectError."""
+        await asyncio.to_thread(self.live_source().tune, order)
 
     async def guide(self, order: Pick | Say) -> None:
         """Pass on a person's pick or word; raises MessageError or ConnectError."""

@@ -40,11 +40,13 @@ from schemas.keys import Keys, topic
 from schemas.network_link import NetworkLinkSpec
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import ScoreCard, SessionStatus
+from webconsole.commands import Tune
 from webconsole.gauges import HUB, hub_outlets
 from webconsole.guide import guided_participant
 from webconsole.log import LOGGED, Entries, Entry
 from webconsole.past import Past
 from webconsole.source import Outlet, Value
+from webconsole.tunables import TunableParameters
 
 __all__ = ["Live"]
 
@@ -80,6 +82,7 @@ class Live:
         self.past: Past | None = None
         """None if the session is not recorded on this machine."""
         self._links: dict[str, NetworkLinkSpec] = {}
+        self._tunables = TunableParameters()
         self._entries: deque[tuple[int, Entry]] = deque(maxlen=_ENTRIES_KEPT)
         self._numbered = 0
         self._lines = Entries()
@@ -144,6 +147,7 @@ class Live:
                 }
                 for name, link in self._links.items()
             ],
+            "tunables": self._tunables.as_json(),
         }
 
     def _span(self) -> dict[str, float]:
@@ -184,6 +188,14 @@ class Live:
         status = self._status
         at = 0.0 if status is None else status.sim_time_ns / 1e9
         self._note_entry(Entry(at, "info", reply.device, f"network link: {reply.description or 'none'}"))
+
+    def tune(self, order: Tune) -> None:
+        """Change a parameter of the running session; raises ConnectError or MessageError."""
+        request = self._tunables.request(order)
+        self.ask("set", request, Empty)
+        status = self._status
+        at = 0.0 if status is None else status.sim_time_ns / 1e9
+        self._note_entry(Entry(at, "info", request.participant, self._tunables.change_value(order)))
 
     def entries_after(self, number: int) -> tuple[int, list[Entry]]:
         """Return the lines of the log after the line with this number, and the number of the last."""
@@ -295,6 +307,7 @@ class Live:
             name: described.plan.participants[name].network_link or NetworkLinkSpec()
             for name in sorted(self._device_keys)
         }
+        self._tunables = TunableParameters(described.plan, described.tuned)
         self._session = session
         self._trouble = f"session '{described.session}' gives no status yet"
         self.generation += 1

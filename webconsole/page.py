@@ -29,6 +29,7 @@ from webconsole.commands import (
     Say,
     Show,
     Start,
+    Tune,
     Watch,
     command,
     command_name,
@@ -164,6 +165,9 @@ class Page:
                 return {}
             case Network():
                 await self._console.network(order)
+                return {}
+            case Tune():
+                await self._console.tune(order)
                 return {}
             case Pick() | Say():
                 await self._console.guide(order)

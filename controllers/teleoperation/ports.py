@@ -22,6 +22,8 @@ from schemas.trocar_msgs import ContactModel
 
 __all__ = ["NO_GRIPPER", "teleoperation_ports"]
 
+_LEAST_SCALE = 0.05
+"""Least scale offered to people while the session runs."""
 NO_GRIPPER = -1.0
 """Value of an unconnected `gripper`: the button leads the jaw."""
 
@@ -43,7 +45,7 @@ def _hand(p: TeleoperationParams) -> tuple[Port, ...]:
         signal_in("master_twist", TwistStamped, twist, max_age_ns=p.max_age, start=still),
         event_in("buttons", Joy, buttons),
         signal_in("gripper", Float64Message, gripper, start=(NO_GRIPPER,)),
-        signal_in("scale", Float64Message, scale, start=(p.scale,)),
+        signal_in("scale", Float64Message, scale, start=(p.scale,), limits=(min(_LEAST_SCALE, p.scale), 1.0)),
         *(
             event_in(f"lock_{what}", BoolMessage, f"whether the tip keeps its {kept}")
             for what, kept in (("rotation", "orientation"), ("translation", "position"))

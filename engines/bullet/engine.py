@@ -19,7 +19,19 @@ from engines.bullet.probes.probe import Probe
 from engines.bullet.probes.sub_grid import SubGrid, Surface
 from engines.bullet.warn_once import warn_once
 from engines.bullet.world import add_rigid, connect, disconnect
-from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, signal_out, state_hash
+from hub.participant import (
+    BondPlan,
+    Inputs,
+    Outputs,
+    Params,
+    Setup,
+    Stepped,
+    Tunables,
+    Value,
+    signal_out,
+    state_hash,
+    tunable_in,
+)
 from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port
 from schemas.ros import Header, Time
@@ -67,15 +79,26 @@ class BulletEngine(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The nodes of every organ; for every probe with fingers, the grasp."""
+        """The nodes of every organ; of every probe the stiffness and, with fingers, the grasp."""
         period_ns = self.params.node_period
         meaning = "positions of the nodes; the surface triangles come with the first"
         nodes = tuple(
             signal_out(f"{organ}/nodes", SoftBodyState, meaning, frame="world", period_ns=period_ns)
             for organ in self.params.organs
         )
-        return nodes + tuple(
+        couplings = tuple(self._stiffness_port(name) for name in self.params.probes)
+        return (*nodes, *couplings) + tuple(
             port for name, probe in self.params.probes.items() if probe.grasp for port in grasp_ports(name)
+        )
+
+    def _stiffness_port(self, probe: str) -> Port:
+        coupling = self._coupling(probe)
+        return tunable_in(
+            f"{probe}/stiffness",
+            coupling.stiffness,
+            (coupling.least_stiffness, coupling.stiffness),
+            "of the virtual coupling between the probe's proxies and the instrument",
+            unit="N/m",
         )
 
     @property
@@ -117,6 +140,7 @@ class BulletEngine(Stepped):
                 self._probes.append(
                     Probe(probe, self._coupling(bond.name), bond, plan, self.params.gravity, self._client)
                 )
+        self._tunables = Tunables(self.ports)
         self._add_sub_grid()
         for tissue in self._tissues:
             tissue.advance()
@@ -141,6 +165,8 @@ class BulletEngine(Stepped):
         """Press the probes along their predicted motion; return their reactions, and the nodes when due."""
         seconds, dt, probes = h * 1e-9, self._dt, self._probes
         self._at_start = False
+        for name, value in self._tunables.changes(inputs):
+            self._set_stiffness(name, value)
         for probe in probes:
             probe.begin(inputs, seconds)
         for i in range(h // self.params.sub_step):
@@ -164,6 +190,11 @@ class BulletEngine(Stepped):
             grasp.update(end, looked=touch)
             outputs.update(grasp.outputs)
         return outputs
+
+    def _set_stiffness(self, port: str, stiffness: float) -> None:
+        for probe in self._probes:
+            if port == f"{probe.name}/stiffness":
+                probe.set_stiffness(stiffness)
 
     def state_hash(self) -> int:
         """Return 64 bits of the probes' positions, velocities and bonds, and of the nodes as last read."""
@@ -228,7 +259,7 @@ class BulletEngine(Stepped):
         """Give probes of a single sphere the spring in series, if all organs are anchored and small."""
         for probe in self._probes:
             if self.params.has_sub_grid(probe.name):
-                probe.sub_grid = SubGrid(float(probe.radii[0]), self._coupling(probe.name), self._surfaces)
+                probe.sub_grid = SubGrid(float(probe.radii[0]), probe.coupling, self._surfaces)
                 self._sub_grids.append((probe, probe.sub_grid))
 
     def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:

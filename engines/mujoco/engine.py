@@ -15,8 +15,19 @@ import numpy as np
 from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.pictures.opengl import import_mujoco
-from engines.mujoco.ports import WIRE, bond_sides, scene_ports
-from hub.participant import BondPlan, Inputs, MotionSide, Outputs, Params, Setup, Stepped, Value, state_hash
+from engines.mujoco.ports import GRAVITY, WIRE, bond_sides, scene_ports
+from hub.participant import (
+    BondPlan,
+    Inputs,
+    MotionSide,
+    Outputs,
+    Params,
+    Setup,
+    Stepped,
+    Tunables,
+    Value,
+    state_hash,
+)
 from robots.dvrk.mounted import MountedPsm
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
 from schemas.ports import BondSide, Port
@@ -83,6 +94,7 @@ class MujocoEngine(Stepped):
         import_mujoco()
         self._build_parts(setup.period_ns * 1e-9, self._build_model())
         self._build_contacts(setup.period_ns)
+        self._tunables = Tunables(self.ports)
         self._couple_bonds(setup)
         self._readings.refresh()
         self._holding.refresh()
@@ -234,6 +246,9 @@ class MujocoEngine(Stepped):
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance all arms by `h` nanoseconds. Raises SessionError if the simulation has become unstable."""
+        for name, value in self._tunables.changes(inputs):
+            if name == GRAVITY:
+                self._set_gravity(value)
         if not inputs.quiet:
             self._place(inputs)
         self._servos.begin(inputs)
@@ -252,6 +267,11 @@ class MujocoEngine(Stepped):
         if any(self._trouble):
             raise SessionError(self._diagnosis(t, inputs))
         return self._outputs
+
+    def _set_gravity(self, gravity: float) -> None:
+        """Let gravity (m/s^2, along -z) act from this step on: the last sub-step has prepared its forces."""
+        self._model.opt.gravity[2] = -gravity
+        self._mujoco.mj_step1(self._model, self._data)
 
     def _place(self, inputs: Inputs) -> None:
         """Put objects where events say."""
@@ -311,7 +331,8 @@ class MujocoEngine(Stepped):
             self._mujoco.mjtWarning.mjWARN_BADQPOS + list(map(bool, self._trouble)).index(True)
         )
         where = f"MuJoCo reports {bad.name} in the step from {t * 1e-9:g} s"
-        read = [p.name for p in self.ports if p.causality == "input" and p.variability == "signal"]
+        signals = (p for p in self.ports if (p.causality, p.variability) == ("input", "signal"))
+        read = [p.name for p in signals if p.limits is None]
         for port in read + [touching.motion.force_port for touching in self._touching]:
             if not np.isfinite(inputs[port]).all():
                 return f"{where}: input '{port}' is {inputs[port]}; every number must be finite"

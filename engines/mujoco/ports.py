@@ -7,14 +7,14 @@ from itertools import groupby
 
 from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import MujocoParams, SceneParams
-from hub.participant import event_in, signal_in, signal_out
+from hub.participant import event_in, signal_in, signal_out, tunable_in
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.linkage import LINKAGES
 from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message, JointState, PoseStamped, WrenchStamped
 
-__all__ = ["WIRE", "bond_sides", "position_count", "scene_ports"]
+__all__ = ["GRAVITY", "WIRE", "bond_sides", "position_count", "scene_ports"]
 
 _ALL = ("position", "velocity", "effort")
 _MODES = (
@@ -23,6 +23,11 @@ _MODES = (
 )
 WIRE = "wire"
 """Name of a needle's bond at three points of the wire."""
+GRAVITY = "gravity"
+_GRAVITY_M_PER_S2 = 9.81
+"""MuJoCo's default."""
+_MOST_GRAVITY_M_PER_S2 = 25.0
+"""A little more than on Jupiter."""
 _FREE_BODY = 7
 """Position and quaternion."""
 
@@ -37,6 +42,15 @@ def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
     ]
     meaning = "joint positions of the whole model, as MuJoCo has them"
     ports.append(signal_out("qpos", description=meaning, size=position_count(params), period_ns=slow))
+    ports.append(
+        tunable_in(
+            GRAVITY,
+            _GRAVITY_M_PER_S2,
+            (0.0, _MOST_GRAVITY_M_PER_S2),
+            "along -z of `world`, on objects and on arms without gravity compensation",
+            unit="m/s^2",
+        )
+    )
     if params.fixtures and params.rigid_wrench:
         ports += _collision_ports(slow)
     return (*ports, *(port for name in params.objects for port in _object_ports(name, slow)))

@@ -6,9 +6,10 @@ from hub.participant.contact import Surface, TissueParams, Tool, ToolParams
 from hub.participant.controller import Controller
 from hub.participant.device import Device, Sample, VectorSample
 from hub.participant.inputs import Inputs
-from hub.participant.ports import SignalFields, event_in, event_out, signal_in, signal_out
+from hub.participant.ports import SignalFields, event_in, event_out, signal_in, signal_out, tunable_in
 from hub.participant.state import Record, array, choice, flag, integer, number, restore_arrays, state_hash
 from hub.participant.stepped import BondPlan, Correction, Setup, Stepped
+from hub.participant.tunables import Tunables
 
 __all__ = [
     "BondPlan",
@@ -30,6 +31,7 @@ __all__ = [
     "TissueParams",
     "Tool",
     "ToolParams",
+    "Tunables",
     "Value",
     "VectorSample",
     "array",
@@ -43,4 +45,5 @@ __all__ = [
     "signal_in",
     "signal_out",
     "state_hash",
+    "tunable_in",
 ]

@@ -46,6 +46,10 @@ class ForceSide:
         self._duration = 0.0
         self._started = False
 
+    def set_stiffness(self, stiffness: float) -> None:
+        """Count the work of jumps with another stiffness (N/m) of the virtual coupling from now on."""
+        self._stiffness = stiffness
+
     def begin(self, inputs: Inputs, h: float) -> None:
         """Read the motion at the start of a step of `h` seconds.
 

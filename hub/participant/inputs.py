@@ -53,6 +53,12 @@ class Inputs:
         except KeyError:
             raise SessionError(f"no input port '{port}'.{did_you_mean(port, self._values)}") from None
 
+    def number(self, port: str, default: float) -> float:
+        """Return the number of a port; `default` if the session's plan, of an older version, has no such port.
+        """
+        value = self._values.get(port)
+        return default if value is None else float(value[0])
+
     def message(self, port: str) -> Message | None:
         """Return the newest message of a signal without a vector form; None before the first."""
         return cast("Message | None", self._values[port])

@@ -2,6 +2,7 @@
 
     signal_in("master", PoseStamped, "pose of the hand", max_age_ns=100_000_000)
     signal_in("torque", unit="N*m", start=(0.0,))          # an array of one number
+    tunable_in("gravity", 9.81, (0.0, 25.0), "along -z of the world", unit="m/s^2")
     signal_out("servo_jp", JointState, "command to the joints", names=("yaw", "pitch"))
     event_out("warning", StringMessage, "why the arm holds, and what to do")
 
@@ -16,7 +17,7 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import Float64MultiArray
 
-__all__ = ["EventFields", "MessageType", "SignalFields", "event_in", "event_out", "signal_in", "signal_out"]
+__all__ = ["EventFields", "MessageType", "SignalFields", "event_in", "event_out", "signal_in", "signal_out", "tunable_in"]
 
 MessageType = type[Message] | str
 """A message class, or the ROS name of a message such as `geometry_msgs/msg/PoseStamped`."""
@@ -39,6 +40,7 @@ class SignalFields(EventFields, total=False):
     fields: tuple[Literal["position", "velocity", "effort"], ...]
     period_ns: int
     start: tuple[float, ...] | None
+    limits: tuple[float, float] | None
     max_age_ns: int
 
 
@@ -47,6 +49,13 @@ def signal_in(
 ) -> Port:
     """Return an input with a single value at a time."""
     return Port(name=name, causality="input", type=_ros_type(type_), description=description, **fields)
+
+
+def tunable_in(name: str, start: float, limits: tuple[float, float], description: str, unit: str) -> Port:
+    """Return a parameter that people may change within limits while the session runs; see `Tunables`."""
+    return Port(
+        name=name, causality="input", start=(start,), limits=limits, description=description, unit=unit
+    )
 
 
 def signal_out(

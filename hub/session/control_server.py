@@ -84,6 +84,8 @@ class ControlServer:
     ) -> None:
         session, keys, self._refusals = run.session, run.keys, run.refusals
         self._inlets = inlets
+        self._tuned: dict[str, float] = {}
+        """Newest value set of each tunable parameter, by `participant.port`."""
         self._waiting: Queue[Callable[[], None] | None] = Queue(_MOST_WAITING)
         self._thread = Thread(target=self._run, name="control", daemon=True)
         self._thread.start()
@@ -91,7 +93,12 @@ class ControlServer:
             self._declare_queryable(
                 session, keys.join("**"), JoinRequest, joins.join, lambda request: keys.join(request.host)
             ),
-            self._declare_queryable(session, keys.control("describe"), Empty, lambda _: description),
+            self._declare_queryable(
+                session,
+                keys.control("describe"),
+                Empty,
+                lambda _: description.model_copy(update={"tuned": dict(self._tuned)}),
+            ),
             self._declare_queryable(
                 session, keys.control("pause"), Empty, lambda _: self._answer_done(state.pause())
             ),
@@ -176,9 +183,11 @@ class ControlServer:
         port = self._inlets.settable(request.participant, request.port)
         codec = PortCodec(port)
         if codec.vector is not None:
-            message = codec.vector.to_message(
-                codec.vector.check_vector(np.atleast_1d(np.asarray(request.value, np.float64))), 0
-            )
+            vector = codec.vector.check_vector(np.atleast_1d(np.asarray(request.value, np.float64)))
+            port.check_limits(vector[0])
+            message = codec.vector.to_message(vector, 0)
+            if port.limits is not None:
+                self._tuned[f"{request.participant}.{port.name}"] = float(vector[0])
         else:
             message = message_type(port.type).model_validate(request.value)
         self._inlets.offer(request.participant, request.port, encode(message), monotonic_ns())

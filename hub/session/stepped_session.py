@@ -156,6 +156,8 @@ class SteppedSession:
                 f"'{port}' is no input without a connection.{did_you_mean(port, self._codecs)}"
             )
         name, _, input_port = port.partition(".")
+        if codec.port.limits is not None:
+            codec.port.check_limits(np.asarray(value, np.float64).item())
         values = value if isinstance(value, tuple) else (value,)
         payloads = (codec.encode(one, self.time_ns) for one in values)
         return [

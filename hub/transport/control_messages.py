@@ -87,6 +87,8 @@ class DescribeReply(_Json):
     plan: Plan
     recording: str = ""
     """Directory of the recording; empty without a recording."""
+    tuned: dict[str, float] = {}
+    """Present value of each changed tunable parameter, by `participant.port`."""
 
 
 class JoinReply(_Json):

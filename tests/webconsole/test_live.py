@@ -12,7 +12,7 @@ import zenoh
 from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
 from hub.session.launch import launch
-from hub.transport.control_messages import Empty
+from hub.transport.control_messages import DescribeReply, Empty
 from hub.transport.envelope import Tag
 from hub.transport.page_feed import PageFeed
 from hub.transport.port_codec import PortCodec
@@ -23,7 +23,7 @@ from schemas.ports import Port
 from schemas.ros import Joy
 from schemas.trocar_msgs import SoftBodyState
 from tests.waiting import until
-from webconsole.commands import Network
+from webconsole.commands import Network, Tune
 from webconsole.console import Console
 from webconsole.live import Live
 from webconsole.pilot import Pilots
@@ -118,6 +118,55 @@ def test_a_network_link_is_changed_and_the_session_can_be_verified(tmp_path):
     recording = Recording(tmp_path / "table")
     assert summary.state_hash != launch(file, one_host=True).run().state_hash
     assert verify(recording).same
+
+
+@pytest.mark.parametrize(
+    ("scenario", "name", "value", "words"),
+    [
+        ("pick", "robot.gravity", 1.62, "gravity: 9.81 to 1.62 m/s^2"),
+        ("palpation", "tissue.probe/stiffness", None, "probe/stiffness"),
+    ],
+)
+def test_a_changed_parameter_enters_with_a_grant_and_the_session_can_be_verified(
+    tmp_path, scenario, name, value, words
+):
+    """A softer coupling changes only what is in contact, so the whole state hash may not tell; gravity does."""
+    file = load(scenario, ["duration=0.6 s", "participants.robot.looks=false", "pace=fast"])
+    session = launch(file, record=tmp_path / "tuned", one_host=True)
+    failed = []
+
+    def change():
+        live = Live(session.endpoint, file.scenario.name)
+        try:
+            live.start()
+            (shown,) = [one for one in until(lambda: live.state.get("tunables")) if one["name"] == name]
+            least, most = shown["limits"]
+            assert shown["value"] == shown["start"]
+            wanted = 0.5 * (least + most) if value is None else value
+            console = Console(live, Pilots())
+            with pytest.raises(MessageError, match="outside its limits"):
+                asyncio.run(console.tune(Tune(do="tune", name=name, value=2.0 * most)))
+            with pytest.raises(MessageError, match="no parameter that may change"):
+                asyncio.run(console.tune(Tune(do="tune", name="robot.gravitas", value=1.0)))
+            asyncio.run(console.tune(Tune(do="tune", name=name, value=wanted)))
+            assert words in live.entries_after(0)[1][-1].text
+            described = live.ask("describe", Empty(), DescribeReply)
+            assert described.tuned == {name: wanted}, "another page finds the value as it is"
+            live.ask("resume", Empty(), Empty)
+        except Exception as error:  # noqa: BLE001  # it is raised below, in the thread of the test
+            failed.append(error)
+            session.state.shutdown()
+        finally:
+            live.close()
+
+    session.state.pause()
+    changing = threading.Thread(target=change)
+    changing.start()
+    summary = session.run()
+    changing.join()
+    assert failed == []
+    assert verify(Recording(tmp_path / "tuned")).same
+    assert summary.state_hash != launch(file, one_host=True).run().state_hash
 
 
 def test_without_a_session_it_says_so_and_goes_on():

@@ -22,6 +22,7 @@ import { showCard } from "./card.js"
 import { Forks } from "./fork.js"
 import { Start } from "./start.js"
 import { Started } from "./started.js"
+import { Tune } from "./tune.js"
 
 const $ = (id) => document.getElementById(id)
 const REFRESH_MS = 100, STILL_MS = 400
@@ -47,6 +48,7 @@ const link = new Link({
     pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one),
       session?.role, state.state)
     network.show(state.links, session?.role)
+    tune.show(state.tunables, session?.role)
     started.show(state.started)
     if (session?.kind === "recording") timeline.begin(state.start, state.end)
     else if (session) timeline.grow(state, pilot.leading || headset.worn)
@@ -72,6 +74,7 @@ const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
   () => said("pictures", "a picture cannot be read"))
 const alerts = new Alerts($("alerts")), depths = new Depths($("depth-list"))
 const network = new Network($("network"), $("links"), link)
+const tune = new Tune($("tune"), $("tune-list"), link, (light) => { if (scene) scene.brightness = light; dirty = true })
 const notices = new Notices($("notice"), (text) => guide.read(text))
 let past = false // no samples for the plots: an instant of a recording, or of the running session's past
 const timeline = new Timeline((time) => {

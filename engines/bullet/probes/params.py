@@ -41,12 +41,18 @@ scheme of finite steps lags too.
 Radius = Annotated[Length, Field(ge=0.5e-3)]
 
 
-@dataclass(frozen=True)
+_SOFTEST_SHARE = 0.05
+"""Least stiffness to which people may soften a coupling while it runs, as a share of that at the start: with
+the default ratio the coupling then yields as much as the tissue.
+"""
+
+
+@dataclass
 class Coupling:
     """The spring and damper between each proxy and the instrument's sphere, and the proxy's mass."""
 
     stiffness: float
-    """k, N/m."""
+    """k, N/m; may change while the session runs."""
     mass: float
     """m, kg."""
     damping: float
@@ -57,6 +63,9 @@ class Coupling:
 
     None: a proportional spring, with a yield of force / k.
     """
+
+    least_stiffness: float
+    """Least k, N/m, to which the coupling may be softened: mass, damping and reset time stay passive."""
 
     @property
     def longest_step(self) -> float:
@@ -167,9 +176,13 @@ class ProbeParams(BaseModel):
         mass = self.mass or stiffness * (timestep / _STEP_SHARE) ** 2
         reset = _RESET_SHARE * sqrt(mass / stiffness)
         passive = reset <= _PASSIVE_SHARE * contact_damping * stiffness / contact_stiffness
+        least = _SOFTEST_SHARE * stiffness
+        if passive and not sub_grid:  # softened, the spring with reset stays passive
+            least = max(least, min(reset * contact_stiffness / (_PASSIVE_SHARE * contact_damping), stiffness))
         return Coupling(
             stiffness,
             mass,
             self.damping or 2.0 * sqrt(stiffness * mass),
             reset if passive and not sub_grid else None,
+            least,
         )

@@ -119,6 +119,11 @@ class Probe:
         if not self._placed:
             self._place()
 
+    def set_stiffness(self, stiffness: float) -> None:
+        """Change the stiffness (N/m) of the coupling from this step on."""
+        self.coupling.stiffness = stiffness
+        self._side.set_stiffness(stiffness)
+
     def push(self, tau: float, dt: float) -> None:
         """Apply the coupling forces of the sub-step of `dt` seconds around `tau`, evaluated at the middle."""
         self._stretch(tau, 0.5 * dt)
