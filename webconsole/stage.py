@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hub.participant import Params
 from hub.participant.view import Rgb, Scene
 from schemas.codec import decode
+from schemas.errors import TrocarError
 from schemas.message import Message
 from schemas.ros import CompressedImage
 from schemas.scenario import Scenario
@@ -24,6 +25,7 @@ from schemas.trocar_msgs import ShownMarkers, SoftBodyState
 from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
 from webconsole.bond_history import BondHistory
+from webconsole.drag import DraggedTip, dragged_tips
 from webconsole.felt import felt_wrenches
 from webconsole.followers import find_followers
 from webconsole.frame import Section, SectionKind, node_content
@@ -80,6 +82,8 @@ class Stage:
         self.followers = find_followers(scenario, self._outlets)
         """Controllers that follow a device led from pages, by device."""
         of_followers = (name for found in self.followers.values() for one in found for name in one.outlets)
+        self.dragged, self.undragged = _dragged_tips(scenario, params)
+        self.room = _room_view(scenario, params)
         of_hands = (name for names in self.felt.values() for name in names)
         of_arrows = (name for bond in self.arrows for name in bond)
         self.shown = frozenset(
@@ -183,6 +187,9 @@ class Stage:
             "surfaces": [{"name": name, "colour": rgb} for name, rgb in self.surfaces.items()],
             "pictures": list(self.pictures),
             "felt": list(self.felt),
+            "dragged": [tip._asdict() for tip in self.dragged],
+            "undragged": self.undragged,
+            "room": self.room,
             "numbers": [
                 {
                     "name": name,
@@ -248,6 +255,26 @@ class Stage:
         text = json.dumps(described, separators=(",", ":")).encode()
         text += b" " * (-(len(text) + _LENGTH.size) % 4)
         return _LENGTH.pack(len(text)) + text + bytes(blob)
+
+
+def _dragged_tips(
+    scenario: Scenario, params: Callable[[str], Params]
+) -> tuple[tuple[DraggedTip, ...], tuple[str, ...]]:
+    try:
+        return dragged_tips(scenario, params)
+    except TrocarError as error:
+        return (), (str(error),)
+
+
+def _room_view(scenario: Scenario, params: Callable[[str], Params]) -> dict[str, Any] | None:
+    """Return position and target (m, in the world) of the scenario's camera in the room; None without one."""
+    for name, spec in scenario.participants.items():
+        if spec.kind == "endoscope" and spec.params.get("view") is not None:
+            try:
+                return params(name).model_dump(include={"view"})["view"]
+            except TrocarError as error:
+                log.warning("the camera in the room is not offered: %s", error)
+    return None
 
 
 def _of_type(outlets: Iterable[Outlet], message: type[Message]) -> tuple[str, ...]:

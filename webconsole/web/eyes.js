@@ -1,5 +1,7 @@
 // The pictures of the endoscope: side by side, or both eyes' in one for glasses of red (left) and cyan (right).
 
+import { enlargeable } from "./enlarge.js"
+
 const SIDES = ["left", "right"], GLASSES = ["#f00", "#0ff"]
 
 // The picture of each eye, of those that have been drawn; null if there is no pair.
@@ -24,6 +26,8 @@ export class Eyes {
     this.all = names.map((name) => ({ name, ...figure(drawn ? `${name} eye, drawn by this page` : name.replace("/image_raw/compressed", "")), drawn: 0 }))
     for (const eye of drawn ? [] : this.all) eye.canvas.onclick = (event) => this.pick(eye, event)
     this.both = figure("both eyes, for red and cyan glasses")
+    const picks = () => Boolean(this.picking)
+    for (const eye of [...this.all, this.both]) enlargeable(eye.figure, picks)
     this.row.replaceChildren(...this.all.map((eye) => eye.figure), this.both.figure)
     this.mode.hidden = !SIDES.every((side) => names.some((name) => name.includes(side)))
     this.show()

@@ -9,6 +9,7 @@ export class Guide {
   // `past` says whether the page shows an instant that is over: its pictures pick nothing.
   constructor(section, link, eyes, past) {
     this.section = section
+    this.eyes = eyes
     eyes.clicked = (picture, x, y) => this.active && !past() && link.send({ do: "pick", picture, x, y })
     const buttons = WORDS.map((word) => make("button", {
       textContent: word[0].toUpperCase() + word.slice(1), onclick: () => link.send({ do: "say", word: this.said(word) }),
@@ -28,6 +29,7 @@ export class Guide {
     this.proposal = null
     this.active = Boolean(guided) && role === "operator"
     this.section.hidden = !this.active
+    this.eyes.picking = this.active
     document.body.classList.toggle("guiding", this.active)
   }
 }

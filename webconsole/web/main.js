@@ -9,6 +9,7 @@ import { Depths } from "./depth.js"
 import { Eyes } from "./eyes.js"
 import { Feel } from "./feel.js"
 import { Guide } from "./guide.js"
+import { foldable } from "./fold.js"
 import { Head } from "./head.js"
 import { Headset } from "./headset.js"
 import { Log } from "./log.js"
@@ -23,6 +24,7 @@ import { Forks } from "./fork.js"
 import { Start } from "./start.js"
 import { Started } from "./started.js"
 import { Tune } from "./tune.js"
+import { cameraButtons } from "./views.js"
 
 const $ = (id) => document.getElementById(id)
 const REFRESH_MS = 100, STILL_MS = 400
@@ -47,6 +49,7 @@ const link = new Link({
     headset.show(state.pilots, session?.role)
     pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one),
       session?.role, state.state)
+    pilot.gizmo?.show(session?.dragged?.find(({ device }) => device === pilot.device) ?? null)
     network.show(state.links, session?.role)
     tune.show(state.tunables, session?.role)
     started.show(state.started)
@@ -96,6 +99,7 @@ const recordings = new Recordings()
 timeline.found = (events) => log.add(events, true)
 const guide = new Guide($("guide"), link, eyes, () => past)
 const plots = new Plots($("plot-list"), $("add"), $("ports"), ask, comparison?.other)
+foldable($("eyes"), $("plots"), $("log"))
 $("pictures").onchange = ask
 $("frames").onchange = () => scene?.frames($("frames").checked)
 
@@ -133,12 +137,23 @@ async function begin(described) {
   if (timeline.begun && !timeline.live) timeline.go(timeline.time)
 }
 
+// Which tip can be dragged, or why none can.
+function sayDragged({ kind, role, dragged = [], undragged = [] }) {
+  $("undragged").hidden = kind === "recording" || role === "viewer"
+  $("undragged").textContent = dragged.length
+    ? dragged.map(({ device, arm }) => `Lead ${device}, and drag the handle on the tip of ${arm}.`).join(" ")
+    : `No tip can be dragged: ${undragged.join("; ")}.`
+}
+
 async function stage(described) {
   if (!scene && !refused) await makeScene()
   if (!scene) return
   const answer = await fetch(pathTo("/scene"))
   if (!answer.ok) return
   scene.load(await answer.arrayBuffer(), described.surfaces)
+  scene.room = described.room
+  tree.begin(scene, described.surfaces)
+  sayDragged(described)
   scene.frames($("frames").checked)
   comparison?.stage(scene)
   const empty = described.scenes.length + described.surfaces.length === 0
@@ -148,6 +163,7 @@ async function stage(described) {
   dirty = true
 }
 
+let tree = null
 let refused = false // the browser has no WebGL
 async function makeScene() {
   try {
@@ -155,6 +171,12 @@ async function makeScene() {
     scene = new Scene($("canvas"), () => { dirty = true })
     scene.chosen = showCameras
     capture.begin(scene)
+    scene.brightness = tune.light
+    const [{ Gizmo }, { Tree }] = await Promise.all([import("./gizmo.js"), import("./tree.js")])
+    tree = new Tree($("bodies"))
+    pilot.gizmo = new Gizmo(scene)
+    pilot.gizmo.moved = () => pilot.send()
+    scene.before = () => pilot.gizmo.place()
   } catch (error) {
     refused = true
     $("no-scene").hidden = false
@@ -163,17 +185,7 @@ async function makeScene() {
   }
 }
 
-function showCameras() {
-  const buttons = scene.choices.map((name) => {
-    const button = document.createElement("button")
-    button.textContent = name[0].toUpperCase() + name.slice(1)
-    button.setAttribute("role", "radio")
-    button.setAttribute("aria-checked", String(scene.choice === name))
-    button.onclick = () => scene.choose(name)
-    return button
-  })
-  $("cameras").replaceChildren(...buttons)
-}
+function showCameras() { $("cameras").replaceChildren(...cameraButtons(scene)) }
 
 function apply(frame) {
   lastTime = framed = frame.time
@@ -233,7 +245,7 @@ function draw(now) {
   }
   last = now
   capture.tick(now)
-  if (now - refreshed > REFRESH_MS) { refreshed = now; plots.refresh(); depths.refresh() }
+  if (now - refreshed > REFRESH_MS) { refreshed = now; plots.refresh(); depths.refresh(); tree?.refresh() }
   if (now - since > 1000) {
     $("fps").textContent = String(Math.round((counted * 1000) / (now - since)))
     counted = 0

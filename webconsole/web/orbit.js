@@ -31,6 +31,16 @@ export class Orbit {
     this.changed()
   }
 
+  face(azimuth, elevation) {
+    Object.assign(this, { azimuth, elevation })
+    this.changed()
+  }
+
+  set({ target, distance, azimuth, elevation }) {
+    this.face(azimuth, elevation)
+    this.look(target, distance)
+  }
+
   zoom(factor) {
     this.distance = Math.min(Math.max(this.distance * factor, NEAREST), FARTHEST)
     this.changed(true)

@@ -146,6 +146,7 @@ export class Pilot {
     if (!this.leading) return
     this.held.clear()
     this.dragging = false
+    this.gizmo?.letGo()
     this.send(true)
   }
 
@@ -168,6 +169,7 @@ export class Pilot {
     for (const key of this.held) add(KEYS[key][1])
     const pad = this.pad()
     if (pad) add(gamepad(pad))
+    if (this.gizmo) add(this.gizmo.wish())
     const limit = (share) => Math.min(Math.max(share, -1), 1)
     return { ...wish, linear: wish.linear.map(limit), angular: wish.angular.map(limit), gripper: limit(wish.gripper) }
   }

@@ -4,9 +4,11 @@ import * as THREE from "./vendor/three.module.js"
 import { Orbit } from "./orbit.js"
 import { Markers } from "./markers.js"
 import { Contents } from "./contents.js"
+import { DIRECTIONS, orbitFrom } from "./views.js"
 
 const ASIDE_M = 0.1, ASIDE_RAD = 0.5
 const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5, SMOOTH = 2
+const SKY = 1.5, LAMP = 2
 const FORCE = 0xf2b705, M_PER_N = 0.05, LONGEST_M = 0.1, LEAST_N = 0.005
 export const FORCES = 3 // layer of what no endoscope sees; 1 and 2 are the eyes of a headset
 const PICTURE = [320, 256] // of an eye that the page draws itself: the field of view of 5:4, as on the page
@@ -18,7 +20,7 @@ export class Scene {
   constructor(canvas, dirty) {
     this.canvas = canvas
     this.dirty = dirty
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: "low-power" })
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "low-power" })
     this.finest = this.ratio = Math.min(devicePixelRatio, 2)
     this.renderer.setPixelRatio(this.ratio)
     this.interval = 0
@@ -28,12 +30,16 @@ export class Scene {
     this.orbit = new Orbit(canvas, (moved) => {
       this.touched ||= moved
       if (moved && this.choice === "endoscope") this.choose("work")
+      else if (moved && (this.choice in DIRECTIONS || this.choice === "overview")) {
+        this.choice = "" // from nowhere in particular
+        this.chosen?.("")
+      }
       this.dirty()
     })
     this.world = new THREE.Scene()
-    this.world.add(new THREE.HemisphereLight(0xffffff, 0x6f7f8c, 1.5))
-    this.lamp = new THREE.DirectionalLight(0xffffff, 2)
-    this.world.add(this.lamp, this.lamp.target)
+    this.sky = new THREE.HemisphereLight(0xffffff, 0x6f7f8c, SKY)
+    this.lamp = new THREE.DirectionalLight(0xffffff, LAMP)
+    this.world.add(this.sky, this.lamp, this.lamp.target)
     this.contents = new Contents(this.world)
     this.clear()
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.ground())
@@ -69,6 +75,9 @@ export class Scene {
     this.bonds = [] // arrows of each
     this.cameras = [] // { name, group, pose, fieldOfView }
     this.tips = [] // { name, group }
+    this.parts = [] // { participant, names, groups } of the bodies of each scene
+    this.room = null // position and target (m) of the scenario's camera in the room
+    this.followed = null
     this.places = new Map() // a group of each frame in which markers may be, by its name on /tf
     this.markers = new Markers((frame) => this.place(frame))
     this.focused = this.touched = false
@@ -86,6 +95,7 @@ export class Scene {
   }
 
   add(scene, groups) {
+    this.parts.push({ participant: scene.participant, names: scene.bodies, groups })
     for (const frame of scene.frames) {
       const axes = new THREE.AxesHelper(frame.name.endsWith("tip") ? 0.012 : 0.06)
       pose(axes, frame.pose)
@@ -123,7 +133,8 @@ export class Scene {
 
   get choices() {
     const arms = this.tips.map(({ name }) => name).filter((name) => name !== "ECM")
-    return ["work", "robot", ...(this.cameras.length ? ["endoscope"] : []), ...arms]
+    return ["work", "robot", ...Object.keys(DIRECTIONS), ...(this.room ? ["overview"] : []),
+      ...(this.cameras.length ? ["endoscope"] : []), ...arms]
   }
 
   poses(index, buffer, at, size) { this.contents.poses(index, buffer, at, size) }
@@ -164,8 +175,35 @@ export class Scene {
     this.dirty()
   }
 
+  // The left eye of the endoscope, as markers know it.
+  get eye() { return this.places.get(LEFT_EYE) }
+
+  // `place` returns a point (m) that the camera goes with, always the same function; null: it stays.
+  follow(place) {
+    this.followed = place
+    if (place) this.orbit.look(place().toArray(), Math.min(this.orbit.distance, 0.6))
+    this.dirty()
+  }
+
+  // The brightness of the lamp and of the sky, 1 as usual.
+  set brightness(value) {
+    this.lamp.intensity = LAMP * value
+    this.sky.intensity = SKY * value
+    this.dirty()
+  }
+
   choose(name) {
+    const before = this.choice
     this.choice = name
+    this.followed = null
+    if (name in DIRECTIONS && before !== "endoscope") this.orbit.face(...DIRECTIONS[name].turn)
+    else if (name === "overview") this.orbit.set(orbitFrom(this.room))
+    else this.frameChoice(name)
+    this.chosen?.(name)
+    this.dirty()
+  }
+
+  frameChoice(name) {
     const box = name === "robot" ? this.robotBox() : this.workBox()
     const tip = this.tips.find((one) => one.name === name)
     if (tip) this.orbit.look(tip.axes.getWorldPosition(new THREE.Vector3()).toArray(), 0.12)
@@ -174,9 +212,8 @@ export class Scene {
       if (name === "work") this.turnToWork(sphere.center)
       this.orbit.look(sphere.center.toArray(), Math.max(sphere.radius, 0.03) * (name === "robot" ? 2.4 : 3.2))
     }
+    if (name in DIRECTIONS) this.orbit.face(...DIRECTIONS[name].turn)
     this.floor(name === "robot" ? box : this.surfaceBox())
-    this.chosen?.(name)
-    this.dirty()
   }
 
   // Look from where the robot does not stand: its arms would hide the work.
@@ -236,7 +273,7 @@ export class Scene {
     const own = this.renderer.domElement, ratio = this.renderer.getPixelRatio()
     const scale = Math.min(1, own.width / width, own.height / height), size = [width * scale, height * scale]
     this.camera.aspect = width / height
-    this.follow(eye, (side === "left" ? -0.5 : 0.5) * eye.baseline)
+    this.stand(eye, (side === "left" ? -0.5 : 0.5) * eye.baseline)
     this.camera.updateProjectionMatrix()
     this.light()
     this.camera.layers.disable(FORCES)
@@ -260,6 +297,8 @@ export class Scene {
       this.focused = true
       this.choose(this.choices.includes(this.choice) ? this.choice : "work")
     }
+    if (this.followed) this.orbit.target = this.followed().toArray()
+    this.before?.()
     const { clientWidth: width, clientHeight: height } = this.canvas
     if (!width || !height) return
     const size = this.renderer.getSize(new THREE.Vector2())
@@ -267,7 +306,7 @@ export class Scene {
     this.camera.aspect = width / height
     const endoscope = this.choice === "endoscope" && this.cameras[0]
     if (this.grid) this.grid.visible = !endoscope
-    if (endoscope) this.follow(endoscope)
+    if (endoscope) this.stand(endoscope)
     else {
       this.camera.fov = 40
       this.orbit.place(this.camera)
@@ -305,7 +344,7 @@ export class Scene {
   }
 
   // `aside`: along the camera's x (m).
-  follow({ group, pose: [x, y, z, ...q], fieldOfView }, aside = 0) {
+  stand({ group, pose: [x, y, z, ...q], fieldOfView }, aside = 0) {
     this.camera.fov = (2 * Math.atan(Math.tan(fieldOfView / 2) / this.camera.aspect) * 180) / Math.PI
     this.camera.position.set(x, y, z).applyQuaternion(group.quaternion).add(group.position)
     this.camera.quaternion.copy(group.quaternion).multiply(new THREE.Quaternion(...q)).multiply(FLIP)

@@ -14,7 +14,8 @@ from tests.engines.bullet.rig import BLOCK, MS, RADIUS, SMALL_BLOCK, Rig, params
 
 def test_ports_and_bonds_are_readable_before_configure():
     engine = BulletEngine("tissue", params(probe={"stiffness": "500 N/m", "mass": "20 g"}))
-    (nodes,) = engine.ports
+    nodes, stiffness = engine.ports
+    assert (stiffness.name, stiffness.start, stiffness.limits) == ("probe/stiffness", (500.0,), (25.0, 500.0))
     assert (nodes.name, nodes.frame, nodes.period_ns) == ("block/nodes", "world", 16 * MS)
     (bond,) = engine.bonds
     assert (bond.name, bond.side, bond.dof, bond.frame) == ("probe", "force", 6, "world")
