@@ -86,10 +86,9 @@ class BulletEngine(Stepped):
             signal_out(f"{organ}/nodes", SoftBodyState, meaning, frame="world", period_ns=period_ns)
             for organ in self.params.organs
         )
-        couplings = tuple(self._stiffness_port(name) for name in self.params.probes)
-        return (*nodes, *couplings) + tuple(
-            port for name, probe in self.params.probes.items() if probe.grasp for port in grasp_ports(name)
-        )
+        couplings = (self._stiffness_port(name) for name in self.params.probes)
+        grasping = (name for name, probe in self.params.probes.items() if probe.grasp)
+        return *nodes, *couplings, *(port for name in grasping for port in grasp_ports(name))
 
     def _stiffness_port(self, probe: str) -> Port:
         coupling = self._coupling(probe)

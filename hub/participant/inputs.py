@@ -54,8 +54,7 @@ class Inputs:
             raise SessionError(f"no input port '{port}'.{did_you_mean(port, self._values)}") from None
 
     def number(self, port: str, default: float) -> float:
-        """Return the number of a port; `default` if the session's plan, of an older version, has no such port.
-        """
+        """Return the number of a port; `default` if the plan, of an older version, has no such port."""
         value = self._values.get(port)
         return default if value is None else float(value[0])
 

@@ -17,7 +17,16 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import Float64MultiArray
 
-__all__ = ["EventFields", "MessageType", "SignalFields", "event_in", "event_out", "signal_in", "signal_out", "tunable_in"]
+__all__ = [
+    "EventFields",
+    "MessageType",
+    "SignalFields",
+    "event_in",
+    "event_out",
+    "signal_in",
+    "signal_out",
+    "tunable_in",
+]
 
 MessageType = type[Message] | str
 """A message class, or the ROS name of a message such as `geometry_msgs/msg/PoseStamped`."""

@@ -130,7 +130,7 @@ def test_a_network_link_is_changed_and_the_session_can_be_verified(tmp_path):
 def test_a_changed_parameter_enters_with_a_grant_and_the_session_can_be_verified(
     tmp_path, scenario, name, value, words
 ):
-    """A softer coupling changes only what is in contact, so the whole state hash may not tell; gravity does."""
+    """What is set by hand is in the grants, so a re-simulation sets it at the same step."""
     file = load(scenario, ["duration=0.6 s", "participants.robot.looks=false", "pace=fast"])
     session = launch(file, record=tmp_path / "tuned", one_host=True)
     failed = []

@@ -98,6 +98,7 @@ class MjOption:
     cone: mjtCone
     impratio: float
     disableflags: int
+    gravity: _Array
 
 class MjsElement:
     name: str

@@ -57,8 +57,9 @@ export class Gizmo {
 
   // Shares of the speed (ahead, left, up of the hand) that lead the tip to the handle.
   wish() {
+    if (!this.held || !this.tip) return {}
     const frame = this.led.view === "camera" ? this.scene.eye : this.scene.place(`${this.led.arm}_base`)
-    if (!this.held || !this.tip || !frame) return {}
+    if (!frame) return {}
     const left = this.target.position.clone().sub(this.tip.getWorldPosition(new THREE.Vector3()))
     const turn = frame.getWorldQuaternion(new THREE.Quaternion())
     if (this.led.view === "camera") turn.multiply(HAND_IN_PICTURE)

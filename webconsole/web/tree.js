@@ -68,6 +68,7 @@ export class Tree {
     const name = make("span", { textContent: text, onclick: () => item && this.choose(item, element) })
     const element = make("div", { className: "line", tabIndex: -1 }, box, name)
     element.setAttribute("role", "treeitem")
+    element.setAttribute("aria-label", text)
     Object.assign(element, { box, item, text })
     return { element, name, show: (value) => { box.checked = value; shown(value) } }
   }
