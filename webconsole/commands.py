@@ -96,7 +96,7 @@ class Tune(_Command):
     name: Name
     """`participant.port`."""
     value: Finite
-    """In the unit of the port."""
+    """New value, in the unit of the port."""
 
 
 class Watch(_Command):

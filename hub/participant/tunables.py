@@ -7,7 +7,7 @@
         self._apply(name, value)
 
 A change enters with a grant, as all else that enters a simulation, so it is recorded and simulated again at
-the same step: docs/decisions/0118-parameters-that-change.md.
+the same step: docs/decisions/0119-parameters-that-change.md.
 """
 
 from __future__ import annotations
