@@ -262,6 +262,8 @@ class Host:
                 outputs.put(step, time_ns, returned)
         if one.bundles:
             self._send_bundles(one, step, time_ns)
+        if self._wire is not None:
+            self._wire.flush()
 
     def _send_bundles(self, one: HostedParticipant, step: int, time_ns: int) -> None:
         if self._wire is not None:

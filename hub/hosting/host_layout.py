@@ -37,7 +37,7 @@ class Listeners(Protocol):
 
 
 _MANY = 32
-"""Most values of a port waiting for their reader; beyond 4096, a `PortReceiver` stops all others."""
+"""Most values of a port waiting for their reader; beyond 4096, a `ZenohReceiver` stops all others."""
 
 
 class HostLayout:
@@ -97,7 +97,7 @@ class HostLayout:
             codec, listeners = PortCodec(port), self._listeners
             stride = plan.output_stride(planned.name, port.name)
             depth = self._depth(planned.name, port.name, here=True)
-            is_read = self._is_read_elsewhere(planned.name, port.name)
+            readers = self._reading_hosts(planned.name, port.name)
             to_devices = port.variability == "event" and any(
                 (outlet.source, outlet.source_port) == (planned.name, port.name) for outlet in plan.to_devices
             )
@@ -106,7 +106,7 @@ class HostLayout:
                 publisher = self._wire.publisher(
                     planned,
                     codec,
-                    is_read=is_read,
+                    readers,
                     feeds=to_devices,
                     bundles=indices.get(port.name, ()),
                     stride_ns=stride * plan.step_ns,
@@ -125,16 +125,17 @@ class HostLayout:
             one.ports.append(output)
             # an observer misses steps: of each that it takes, all is published
             outputs = by_stride.setdefault(1 if planned.observer else stride, [])
-            outputs.insert(0 if is_read else len(outputs), output)  # first what another host waits for
+            outputs.insert(0 if readers else len(outputs), output)  # first what another host waits for
         return by_stride
 
-    def _is_read_elsewhere(self, source: str, port: str) -> bool:
-        """Return whether another host reads an output."""
-        return any(
-            (connection.source, connection.source_port) == (source, port)
-            and self._plan.participants[connection.target].host != self._name
+    def _reading_hosts(self, source: str, port: str) -> list[str]:
+        """Return the other hosts that read an output."""
+        hosts = [
+            self._plan.participants[connection.target].host
             for connection in self._plan.connections
-        )
+            if (connection.source, connection.source_port) == (source, port)
+        ]
+        return [host for host in dict.fromkeys(hosts) if host != self._name]
 
     def _depth(self, source: str, port: str, *, here: bool | None = None) -> int:
         """Return how many values of an output readers look back.

@@ -1,6 +1,7 @@
 """A process running a host of a session; the process ends with the hub, its parent.
 
-`python -P -m hub.hosting.host_process --hub PID --connect ENDPOINT --session NAME --host NAME [--link FD FD]`
+`python -P -m hub.hosting.host_process --hub PID --connect ENDPOINT --session NAME --host NAME
+[--link FD FD [--inbox HOST FD]...]`
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ def main() -> None:
     for option in ("--connect", "--session", "--host"):
         parser.add_argument(option, required=True)
     parser.add_argument("--link", type=int, nargs=2)
+    parser.add_argument("--inbox", nargs=2, action="append", default=[])
     arguments = parser.parse_args()
     end_with_parent(arguments.hub)
     # what takes long to import comes after that
@@ -38,7 +40,10 @@ def main() -> None:
     )
     try:
         with ExitStack() as stack:
-            link = stack.enter_context(closing(HostLink(*arguments.link))) if arguments.link else None
+            link = None
+            if arguments.link:
+                inboxes = {host: int(end) for host, end in arguments.inbox}
+                link = stack.enter_context(closing(HostLink(*arguments.link, inboxes=inboxes)))
             run_host(arguments.connect, arguments.session, arguments.host, link=link)
     except TrocarError as error:
         log.error("%s", error)  # the cause is in the message; the traceback was logged where it happened

@@ -14,6 +14,7 @@ from hub.hosting.end_with_parent import NEEDS_INPUT
 from hub.hosting.numerics import pin_numerics
 from hub.hosting.patience import Patience
 from hub.transport.host_link import HubLink
+from hub.transport.local_values import Inboxes
 
 __all__ = ["HostProcesses"]
 
@@ -31,10 +32,12 @@ class HostProcesses:
 
     Args:
         links: Links by host; a host without a link answers over Zenoh.
+        inboxes: The sockets for values between hosts.
     """
 
-    def __init__(self, links: Mapping[str, HubLink] | None = None) -> None:
+    def __init__(self, links: Mapping[str, HubLink] | None = None, inboxes: Inboxes | None = None) -> None:
         self.links = links or {}
+        self._inboxes = inboxes
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._waiting: dict[str, threading.Thread] = {}
         self._changed = threading.Event()
@@ -59,9 +62,12 @@ class HostProcesses:
             host,
         ]
         link = self.links.get(host)
-        inherited = () if link is None else link.inherited
+        inherited = [] if link is None else [*link.inherited]
         if inherited:
             command += ["--link", *map(str, inherited)]
+        for reader, end in ({} if self._inboxes is None else self._inboxes.ends(host)).items():
+            command += ["--inbox", reader, str(end.fileno())]
+            inherited.append(end.fileno())
         environment = dict(os.environ)
         pin_numerics(environment)
         process = subprocess.Popen(
@@ -120,6 +126,8 @@ class HostProcesses:
                 process.stdin.close()
         for link in self.links.values():
             link.close()
+        if self._inboxes is not None:
+            self._inboxes.close()
 
 
 def _exit_sentence(code: int) -> str:

@@ -25,6 +25,7 @@ from hub.planning.session_parameters import SessionParameters
 from hub.transport.control_client import ask, ask_as_child
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.host_link import HostLink
+from hub.transport.local_values import LocalValues
 from hub.transport.router_client import RouterClient
 from hub.transport.run_connection import RunConnection
 from hub.transport.wire import Wire
@@ -70,7 +71,8 @@ class HostRun:
         participants = {name: first for name, (first, _) in ready.items()}
         self._run = RunConnection.of_host(session, reply, next(iter(mine.values())))
         keys = self._run.keys
-        wire = Wire(self._run, watched=reply.watched)
+        local = None if link is None else LocalValues(plan, host, link.inboxes)
+        self._wire = wire = Wire(self._run, local, watched=reply.watched)
         stepped = {name: p for name, p in participants.items() if isinstance(p, Stepped)}
         self._profile = HostProfile(self._run, host) if reply.profile else None
         if self._profile is not None:
@@ -189,6 +191,7 @@ class HostRun:
             grant = hub.grant(wait=True)
             if grant is not None:
                 return grant
+            self._wire.take_arrived()  # a host still stepping may wait for room
 
     def _check(self, payload: bytes) -> Grant:
         """Return the grant in `payload`; raises MessageError unless this is the next grant of the run."""

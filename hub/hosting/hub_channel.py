@@ -24,7 +24,7 @@ class HubChannel(Protocol):
     """Receives the grants of a run, and sends the acks of a host's participants."""
 
     def grant(self, *, wait: bool) -> Grant | None:
-        """Return the next grant; None if no grant has arrived. With `wait`, wait for a message."""
+        """Return the next grant; None if no grant has arrived. With `wait`, wait, or for a moment."""
         ...
 
     def acknowledge(self, name: str, ack: Ack) -> None:

@@ -40,6 +40,7 @@ from hub.session.run_state import RunState
 from hub.session.status_reporter import StatusReporter
 from hub.transport.control_messages import DescribeReply
 from hub.transport.host_link import HubLink, has_link
+from hub.transport.local_values import Inboxes, LocalValues
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
 from hub.transport.run_connection import RunConnection
@@ -138,7 +139,8 @@ class Run:
         )
         self.recorded = recorder is not None
         answering = stack.enter_context(ExitStack())
-        self.processes = HostProcesses(_links(plan))
+        inboxes = Inboxes(plan)
+        self.processes = HostProcesses(_links(plan), inboxes)
         stack.callback(self.processes.end)
         self.clock = _clock(scenario, plan, spec.live_from or 0)
         measures = Measures(scenario, plan)
@@ -148,6 +150,7 @@ class Run:
         ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
         self.acks = AckReceiver(self.connection, ack_keys, self.processes.links)
         self.profile = RunProfile(self.connection, self.clock, self.monitor) if spec.profiled else None
+        self.wire = Wire(self.connection, LocalValues(plan, "hub", inboxes.ends("hub")))
         self.host = self._host()
         """The stepped participants of this process."""
         stack.callback(self.host.close)
@@ -195,11 +198,10 @@ class Run:
         self.state.shutdown()
 
     def _host(self) -> Host:
-        """Return the host of this process, connected to the others over Zenoh."""
-        wire = Wire(self.connection)
+        """Return the host of this process, connected to the others."""
+        spec, wire = self.spec, self.wire
         if self.profile is not None:
-            self.profile.prepare(self.spec.stepped, wire)
-        spec = self.spec
+            self.profile.prepare(spec.stepped, wire)
         return Host(
             "hub", spec.plan, spec.stepped, wire=wire, listeners=self.monitor, successors=spec.successors
         )

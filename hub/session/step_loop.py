@@ -189,6 +189,8 @@ class StepLoop:
             for accepted in run.acks.receive(waiting, grant, steps):
                 waiting.remove(accepted[0].name)
                 self._unbooked.append(accepted)
+            if waiting:
+                run.wire.take_arrived()  # a host may wait for room
             run.failure.check()
         run.watchdog.wait_for(())
 

@@ -28,6 +28,7 @@ class Tag:
     """
 
     __slots__ = ("count", "epoch", "index", "run", "sent_ns", "step", "time_ns")
+    SIZE = _TAG.size
 
     def __init__(
         self, run: int, epoch: int, step: int, time_ns: int, index: int, count: int, sent_ns: int
@@ -50,9 +51,13 @@ class Tag:
     @classmethod
     def of(cls, sample: zenoh.Sample) -> Tag:
         """Return the tag of `sample`; raises MessageError if there is none."""
-        raw = b"" if sample.attachment is None else sample.attachment.to_bytes()
-        if len(raw) != _TAG.size:
-            raise MessageError(f"attachment of {len(raw)} bytes, a value's tag has {_TAG.size}")
+        return cls.unpack(b"" if sample.attachment is None else sample.attachment.to_bytes())
+
+    @classmethod
+    def unpack(cls, raw: bytes) -> Tag:
+        """Return the tag in `raw`; raises MessageError for another length."""
+        if len(raw) != Tag.SIZE:
+            raise MessageError(f"attachment of {len(raw)} bytes, a value's tag has {Tag.SIZE}")
         return cls(*_TAG.unpack(raw))
 
 

@@ -12,11 +12,11 @@ import os
 import socket
 import struct
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from time import sleep
 
-__all__ = ["IDLE", "HostLink", "HubLink", "has_link"]
+__all__ = ["IDLE", "TIME_LIMIT", "HostLink", "HubLink", "has_link"]
 
 IDLE = -1
 """The shared number of a host stepping no participant."""
@@ -27,9 +27,9 @@ _ACK = struct.Struct("<HI")
 _WORD = 8
 _CHUNK = 4096
 _LOOK_S = 0.02
-"""Longest single wait of the hub, which may have to look elsewhere."""
-_TIME_LIMIT = struct.pack("@ll", 0, round(_LOOK_S * 1e6))
-"""`struct timeval` of socket(7), SO_RCVTIMEO."""
+"""Longest single wait of a process, which may have to look elsewhere."""
+TIME_LIMIT = struct.pack("@ll", 0, round(_LOOK_S * 1e6))
+"""The same as `struct timeval` of socket(7), for SO_RCVTIMEO and SO_SNDTIMEO."""
 
 
 def has_link(host: str) -> bool:
@@ -82,7 +82,8 @@ class HubLink:
     def __init__(self, names: list[str]) -> None:
         self._names = names
         mine, self._theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
-        mine.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _TIME_LIMIT)
+        for end in (mine, self._theirs):
+            end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, TIME_LIMIT)
         self._messages = _Messages(mine)
         self._file = os.memfd_create("trocar-host")
         os.ftruncate(self._file, _WORD)
@@ -144,9 +145,11 @@ class HostLink:
     Args:
         stream: The descriptor of the socket, inherited from the hub.
         file: The descriptor of the shared number.
+        inboxes: Descriptors of the ends of `Inboxes` used by the host, by reading host.
     """
 
-    def __init__(self, stream: int, file: int) -> None:
+    def __init__(self, stream: int, file: int, inboxes: Mapping[str, int] | None = None) -> None:
+        self.inboxes = {host: socket.socket(fileno=end) for host, end in (inboxes or {}).items()}
         self._messages = _Messages(socket.socket(fileno=stream))
         self._memory = mmap.mmap(file, _WORD)
         os.close(file)
@@ -154,10 +157,10 @@ class HostLink:
         """Place of the participant being stepped, or IDLE; a single element."""
 
     def grant(self, *, wait: bool) -> bytes | None:
-        """Return the next grant; None if no grant has arrived. With `wait`, wait for a grant."""
+        """Return the next grant; None if no grant has arrived. With `wait`, wait a moment."""
         grant = self._messages.receive(0 if wait else socket.MSG_DONTWAIT)
-        while wait and grant is None:
-            sleep(1.0)  # the hub has ended, and so does this process
+        if wait and self._messages.ended:
+            sleep(_LOOK_S)  # the hub has ended, and so does this process
         return grant
 
     def send_acks(self, acks: Sequence[tuple[int, bytes]]) -> None:

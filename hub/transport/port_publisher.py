@@ -1,4 +1,4 @@
-"""Publishes the values of an output port on Zenoh."""
+"""Publishes the values of an output port: to hosts of this machine, and on Zenoh."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import zenoh
 from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle
 from hub.transport.envelope import Tag
+from hub.transport.local_values import LocalSender
 from hub.transport.page_feed import PageFeed
 from hub.transport.port_codec import PortCodec
 from hub.transport.publisher import Publisher
@@ -29,7 +30,8 @@ class PortPublisher:
         planned: The participant.
         codec: Codec of the output.
         changed: Is called whenever `needed` may have changed.
-        always: A reader needs every value from the first on.
+        local: Senders to the reading hosts of this machine.
+        always: A reader on Zenoh needs every value from the first on.
         feeds: Wall-time devices receive the events of the port.
         bundles: Bundles of the signal to wall-time devices and observers, with the signal's index in each.
         stride_ns: The simulated time between two values.
@@ -41,6 +43,7 @@ class PortPublisher:
         planned: PlannedParticipant,
         codec: PortCodec,
         changed: Callable[[], None],
+        local: Sequence[LocalSender] = (),
         *,
         always: bool,
         feeds: bool,
@@ -50,14 +53,15 @@ class PortPublisher:
         self.codec, port = codec, codec.port
         session, keys, self._run = run.session, run.keys, run.number
         self._changed = changed
-        self.always = always
-        """Whether a reader needs every value, and to know of steps without events."""
+        self._local = local
         self._bundles = bundles
         self._stride_ns = stride_ns
         block = zenoh.CongestionControl.BLOCK
         self._publishers: list[Publisher] = []
         key = keys.output(planned.key_role, planned.name, port.name)
         self._publishers.append(Publisher(session, key, block, self._update, always=always))
+        self._every = [*local, *(self._publishers if always else ())]
+        """Takers in need of every value, who learn of steps without events too."""
         if feeds:
             key = keys.feed(planned.name, port.name)
             self._publishers.append(Publisher(session, key, block, self._update, always=False))
@@ -66,35 +70,51 @@ class PortPublisher:
 
     def _update(self) -> None:
         self._needed = [publisher for publisher in self._publishers if publisher.needed]
+        self._takers = [*self._local, *self._needed]
         self._changed()
+
+    @property
+    def always(self) -> bool:
+        """Whether a reader needs every value, and to know of steps without events."""
+        return bool(self._every)
 
     @property
     def needed(self) -> bool:
         """Whether anybody receives the values."""
         bundled = any(bundle.needs(index) for bundle, index in self._bundles)
-        return bool(self._needed or bundled or self._pages.needed)
+        return bool(self._takers or bundled or self._pages.needed)
 
     def keep_first(self, value: Any) -> None:
         """Keep the value at time 0 for later pages, if later values may lack something."""
         self._pages.keep_first(0, value)
 
-    def put(self, step: int, time_ns: int, value: Any) -> None:
-        """Publish the value computed in `step`, valid at `time_ns`."""
+    def put(self, step: int, time_ns: int, value: Any, *, again: bool = False) -> None:
+        """Publish the value computed in `step`, valid at `time_ns`.
+
+        `again`: once more, for readers on Zenoh that were not there before.
+        """
         if self._bundles:
             self._send_bundle(time_ns, value)
         if self._pages.needed:
             self._pages.put(step, time_ns, value)
-        if not self._needed:
+        takers = self._needed if again else self._takers
+        if not takers:
             return
         if not self.codec.is_event:
-            self._send(self.codec.encode(value, time_ns), Tag.pack(self._run, 0, step, time_ns))
+            payload, tag = self.codec.encode(value, time_ns), Tag.pack(self._run, 0, step, time_ns)
+            for taker in takers:
+                taker.put(payload, tag)
             return
-        if not value and self.always:
-            self._publishers[0].put(b"", Tag.pack(self._run, 0, step, time_ns, 0, 0))
+        if not value:
+            tag = Tag.pack(self._run, 0, step, time_ns, 0, 0)
+            for taker in takers:
+                if taker in self._every:
+                    taker.put(b"", tag)
         for index, message in enumerate(value):
-            self._send(
-                self.codec.encode(message, time_ns), Tag.pack(self._run, 0, step, time_ns, index, len(value))
-            )
+            payload = self.codec.encode(message, time_ns)
+            tag = Tag.pack(self._run, 0, step, time_ns, index, len(value))
+            for taker in takers:
+                taker.put(payload, tag)
 
     def _send_bundle(self, time_ns: int, value: Any) -> None:
         takers = [
@@ -106,10 +126,6 @@ class PortPublisher:
             packed = self.codec.pack(value)
             for bundle, index in takers:
                 bundle.add(index, packed)
-
-    def _send(self, payload: bytes, tag: bytes) -> None:
-        for publisher in self._needed:
-            publisher.put(payload, tag)
 
     def close(self) -> None:
         """Stop publishing."""

@@ -1,4 +1,4 @@
-"""A host's connections to further processes, over Zenoh."""
+"""A host's connections to further processes: to hosts of this machine by sockets, to others over Zenoh."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle, DeviceBundle, ObserverBundle
 from hub.transport.cells import RemoteCell
+from hub.transport.local_values import LocalValues
 from hub.transport.port_codec import PortCodec
 from hub.transport.port_publisher import PortPublisher
-from hub.transport.port_receiver import PortReceiver
+from hub.transport.port_receiver import LocalReceiver, ZenohReceiver
 from hub.transport.run_connection import RunConnection
 from schemas.ports import Port
 
@@ -21,15 +22,19 @@ class Wire:
 
     Args:
         run: The connection to the run.
+        local: The values from and to other hosts of this machine; None without any.
         watched: The outputs with every value needed by the hub.
     """
 
-    def __init__(self, run: RunConnection, *, watched: Sequence[tuple[str, str]] = ()) -> None:
+    def __init__(
+        self, run: RunConnection, local: LocalValues | None = None, *, watched: Sequence[tuple[str, str]] = ()
+    ) -> None:
+        self._local = local
         self._watched = set(watched)
         self.run = run
         self._publishers: list[PortPublisher] = []
         self._bundles: list[Bundle] = []
-        self._receivers: list[PortReceiver] = []
+        self._receivers: list[ZenohReceiver] = []
         self._cells: list[RemoteCell] = []
         self.changes = 0
         """How often somebody has begun or ceased to receive an output."""
@@ -64,23 +69,26 @@ class Wire:
         self,
         planned: PlannedParticipant,
         codec: PortCodec,
+        readers: Sequence[str],
         *,
-        is_read: bool,
         feeds: bool,
         bundles: Sequence[tuple[Bundle, int]],
         stride_ns: int,
     ) -> PortPublisher:
-        """Return a publisher of an output of a participant here; remote hosts read the output if `is_read`.
+        """Return a publisher of an output of a participant here, read by the hosts `readers`.
 
         Wall-time devices receive the events if `feeds`; wall-time devices and observers receive the signal
         in `bundles`, each with the signal's index. `stride_ns` is the simulated time between two values.
         """
+        name, local = codec.port.name, self._local
+        senders = [None if local is None else local.sender(host, planned.name, name) for host in readers]
         publisher = PortPublisher(
             self.run,
             planned,
             codec,
             self._count_change,
-            always=is_read or (planned.name, codec.port.name) in self._watched,
+            [sender for sender in senders if sender is not None],
+            always=None in senders or (planned.name, name) in self._watched,
             feeds=feeds,
             bundles=bundles,
             stride_ns=stride_ns,
@@ -90,8 +98,12 @@ class Wire:
 
     def cell(self, planned: PlannedParticipant, port: Port, stride: int, depth: int) -> RemoteCell:
         """Return the cell of an output of a participant in another process."""
-        receiver = PortReceiver(self.run, planned, port)
-        self._receivers.append(receiver)
+        output = None if self._local is None else self._local.output(planned.name, port.name)
+        if output is None:
+            receiver = ZenohReceiver(self.run, planned, port)
+            self._receivers.append(receiver)
+        else:
+            receiver = LocalReceiver(self.run, port, output)
         cell = RemoteCell(planned.period, stride, depth, receiver)
         self._cells.append(cell)
         return cell
@@ -100,8 +112,20 @@ class Wire:
         """Return whether the initial value of every remote cell has arrived."""
         return all(cell.has_initial_value() for cell in self._cells)
 
+    def flush(self) -> None:
+        """Send the values for other hosts of this machine."""
+        if self._local is not None:
+            self._local.flush()
+
+    def take_arrived(self) -> None:
+        """Read the values of other hosts of this machine that have arrived, and make room for more."""
+        if self._local is not None:
+            self._local.take_arrived()
+
     def close(self) -> None:
         """Stop publishing and receiving; the session stays open."""
         for entity in (*self._publishers, *self._bundles, *self._receivers):
             entity.close()
         self._publishers, self._bundles, self._receivers = [], [], []
+        if self._local is not None:
+            self._local.close()

@@ -352,6 +352,6 @@ def test_a_participant_knows_which_of_its_outputs_nobody_uses():
     assert one.unread == {"idle"}
     # somebody subscribes
     host._hosted[0].ports[2].publisher = SimpleNamespace(needed=True)
-    host._wire = SimpleNamespace(changes=1, noted=0)
+    host._wire = SimpleNamespace(changes=1, noted=0, flush=lambda: None)
     run(host, 1, start=1)
     assert (one.unread, host._wire.noted) == (frozenset(), 1)

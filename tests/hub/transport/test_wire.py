@@ -57,7 +57,8 @@ HEARD = [
         f"{PREFIX}/engine/{name}/ack"
         for name in ("away", "talker", "far_listener", "follower", "nobody", "hub")
     ),
-    *(f"{PREFIX}/engine/{output}" for output in ("away/out/out", "pace/out/out", "talker/out/words")),
+    *(f"{PREFIX}/engine/{output}" for output in ("away/out/out", "talker/out/words")),
+    *(() if has_link("other") else (f"{PREFIX}/engine/pace/out/out",)),
     f"{PREFIX}/engine/far_listener/out/heard",
     *(f"{PREFIX}/device/idle_player/out/{port}" for port in ("hand", "buttons")),
 ]
@@ -67,6 +68,7 @@ UNHEARD = [
     f"{PREFIX}/hub/status",
     f"{PREFIX}/device/player/out/hand",  # it plays in the hub's own time
     f"{PREFIX}/engine/nobody/out/nothing",
+    *((f"{PREFIX}/engine/pace/out/out",) if has_link("other") else ()),  # its reader has a socket
     f"{PREFIX}/engine/pace/out",
     f"{PREFIX}/alive/hub/hub",
     f"{PREFIX}/control/shutdown",
