@@ -77,7 +77,8 @@ def _find_hub(name: str, timeout_s: float) -> HubFile:
     deadline = monotonic() + timeout_s
     while True:
         hubs = running_hubs()
-        named = [hub for hub in hubs if name in ("", hub.session)]
+        # a session has the name of its scenario, with underscores
+        named = [hub for hub in hubs if name.replace("-", "_") in ("", hub.session)]
         if len(found := [hub for hub in named if hub.programs]) == 1:
             return found[0]
         if found:

@@ -230,10 +230,10 @@ def endpoints():
 
 def test_of_a_session_closed_to_programs_it_is_said_what_opens_it(alone, endpoints):
     with (
-        hub_file(endpoints[0], [], session="teleop"),
-        pytest.raises(ConnectError, match=r"'teleop' is not open to programs. .* --programs"),
+        hub_file(endpoints[0], [], session="peg_board"),
+        pytest.raises(ConnectError, match=r"'peg_board' is not open to programs. .* --programs"),
     ):
-        trocar.connect()
+        trocar.connect("peg-board")
 
 
 def test_of_several_sessions_one_has_to_be_named(alone, endpoints):
