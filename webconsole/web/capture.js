@@ -19,6 +19,9 @@ export class Capture {
     place.append(this.place)
   }
 
+  // The least pixel ratio to draw with: on a slow machine a film has fewer pictures rather than coarse ones.
+  get coarsest() { return this.recorder ? 1 : 0.5 }
+
   begin(scene) {
     this.scene = scene
     this.place.hidden = false
@@ -44,9 +47,10 @@ export class Capture {
     this.letters = 15 * ratio
     this.onto = this.film.getContext("2d")
     this.recorder = new MediaRecorder(this.film.captureStream(FILM_PER_S), { mimeType: this.kind, videoBitsPerSecond: BITS_PER_S })
-    const parts = [], from = this.page().time
+    const parts = [], from = this.page().time, { stream } = this.recorder
     this.recorder.ondataavailable = ({ data }) => parts.push(data)
     this.recorder.onstop = () => {
+      for (const track of stream.getTracks()) track.stop() // not before: pictures are still being encoded
       const kind = this.kind.split(";")[0]
       save(new Blob(parts, { type: kind }), `${this.name(from, this.page().time)}.${kind.split("/")[1]}`)
     }
@@ -84,7 +88,6 @@ export class Capture {
   stop() {
     if (this.plays && this.timeline.playing) this.timeline.pause()
     this.recorder.stop()
-    for (const track of this.recorder.stream.getTracks()) track.stop()
     this.recorder = null
     this.button.textContent = "Film"
     this.button.setAttribute("aria-pressed", "false")

@@ -229,9 +229,8 @@ function draw(now) {
   if (!headset.worn) takeFrames()
   if (dirty && !headset.worn) {
     dirty = false
-    if (capture.recorder) scene.sharpen() // fewer pictures rather than coarse ones
-    else if (drawing) scene?.pace(now - last)
-    else scene?.resume()
+    if (drawing) scene?.pace(now - last, capture.coarsest)
+    else scene?.resume(capture.coarsest)
     if (moved && scene && $("pictures").checked) eyes.look((side, canvas) => scene.look(side, canvas))
     moved = false
     scene?.draw()

@@ -7,7 +7,7 @@ import { Contents } from "./contents.js"
 import { DIRECTIONS, orbitFrom } from "./views.js"
 
 const ASIDE_M = 0.1, ASIDE_RAD = 0.5
-const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5, SMOOTH = 2
+const SLOW_MS = 50, QUICK_MS = 20, SMOOTH = 2
 const SKY = 1.5, LAMP = 2
 const FORCE = 0xf2b705, M_PER_N = 0.05, LONGEST_M = 0.1, LEAST_N = 0.005
 export const FORCES = 3 // layer of what no endoscope sees; 1 and 2 are the eyes of a headset
@@ -316,23 +316,20 @@ export class Scene {
     this.renderer.render(this.world, this.camera)
   }
 
-  // `interval`: ms since the picture before. Where drawing is slow (no GPU), it is done with fewer pixels.
-  pace(interval) {
+  // `interval`: ms since the picture before; `coarsest`: the least pixel ratio. Where drawing is slow (no GPU), it is done with fewer pixels.
+  pace(interval, coarsest) {
     this.interval += 0.1 * (Math.min(interval, 500) - this.interval)
-    const ratio = this.interval > SLOW_MS ? Math.max(this.ratio / 1.5, COARSEST)
+    const ratio = this.interval > SLOW_MS ? Math.max(this.ratio / 1.5, coarsest)
       : this.interval < QUICK_MS ? Math.min(this.ratio * 1.5, this.finest) : this.ratio
     if (ratio !== this.ratio) {
       this.ratio = ratio
       this.interval = (SLOW_MS + QUICK_MS) / 2
     }
-    this.renderer.setPixelRatio(ratio)
+    this.renderer.setPixelRatio(Math.max(ratio, coarsest))
   }
 
-  // Every pixel of the screen, however long drawing takes.
-  sharpen() { this.renderer.setPixelRatio(this.finest) }
-
   // It moves again: the many pixels of what stood still would delay the first picture.
-  resume() { this.renderer.setPixelRatio(this.ratio) }
+  resume(coarsest) { this.renderer.setPixelRatio(Math.max(this.ratio, coarsest)) }
 
   // Nothing moves: draw once with more pixels than there are, so that edges are smooth; `quick`: not of what runs,
   // where somebody's hands would wait for that.
