@@ -78,6 +78,5 @@ def test_every_working_tip_is_in_the_pictures(
     for _ in RecordedScene(recording).stereo(times_ns.tolist(), (320, 240)):
         pass
     working = [tip for tip, places in Projection.places.items() if np.ptp(places, axis=0).max() > WORK_M]
-    assert working
-    for tip in working:
+    for tip in working or Projection.places:  # the rolling jaw works with its tip at rest
         assert np.mean(Projection.seen[tip]) > 0.15, f"{tip} is hardly in the pictures of {name}"
