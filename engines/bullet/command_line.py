@@ -1,4 +1,4 @@
-"""The command `trocar organs`: shapes and materials for scenarios, with their sources."""
+"""The list of `trocar organs`: shapes and materials for scenarios, with their sources."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-__all__ = ["app"]
-
-app = typer.Typer(help="Shapes and materials of organs.")
+__all__ = ["list_organs"]
 
 _WIDTH = 120
 _RADII_M = (2e-3, 5e-3)
@@ -28,8 +26,8 @@ _LIMITS = (
 """Limits of all materials."""
 
 
-@app.command()
-def organs(
+def list_organs(
+    context: typer.Context,
     *,
     nodes: Annotated[
         int, typer.Option(min=18, max=5000, help="About how many nodes the meshes shall have.")
@@ -38,8 +36,10 @@ def organs(
 ) -> None:
     """Print the organs and the materials for scenarios.
 
-    Organs come with surfaces and meshes, materials with sources; SI units.
+    Organs come with surfaces and meshes, materials with sources; SI units. `import` makes one of files.
     """
+    if context.invoked_subcommand:
+        return
     found = {"shapes": _shapes(nodes), "materials": _material_rows()}
     typer.echo(json.dumps(found, indent=2) if as_json else _text(found))
 

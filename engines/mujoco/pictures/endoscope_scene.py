@@ -22,7 +22,7 @@ from robots.dvrk.mounted import MountedEcm
 from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
-__all__ = ["EndoscopeScene", "look_at"]
+__all__ = ["EndoscopeScene", "add_sky", "look_at"]
 
 _SKY, _GROUND = [0.75, 0.8, 0.85], [0.35, 0.37, 0.4]
 """Behind everything seen from a room, above and below; an endoscope sees only what its own lamp lights."""
@@ -40,7 +40,7 @@ class EndoscopeScene:
         """
         scene, ecm = spec(params), params.arms.get("ECM")
         if params.view is not None or ecm is None:
-            _add_sky(scene)
+            add_sky(scene)
         self._skins = Skins(scene, bodies, params.soft_bodies)
         self._model = scene.compile()
         self._data = mujoco.MjData(self._model)
@@ -131,7 +131,8 @@ def _overview_camera(model: mujoco.MjModel) -> ViewParams:
     return ViewParams(position=(x, y, z), target=tuple(camera.lookat))
 
 
-def _add_sky(scene: mujoco.MjSpec) -> None:
+def add_sky(scene: mujoco.MjSpec) -> None:
+    """Add a bright background, as of a room."""
     scene.add_texture(
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,

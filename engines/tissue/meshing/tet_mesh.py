@@ -64,10 +64,12 @@ class TetMesh:
         return np.bincount(numbers)[numbers]
 
     def write_vtk(self, path: Path) -> None:
-        """Write a legacy ASCII .vtk file, Bullet's only tetrahedral format.
+        """Write a legacy ASCII .vtk file, Bullet's only tetrahedral format."""
+        path.write_text(self.vtk_text, encoding="ascii")
 
-        The nodes read back bit for bit.
-        """
+    @property
+    def vtk_text(self) -> str:
+        """The mesh as a legacy ASCII .vtk file. The nodes read back bit for bit."""
         lines = [
             "# vtk DataFile Version 2.0",
             "organ",
@@ -80,7 +82,7 @@ class TetMesh:
         lines += [f"4 {a} {b} {c} {d}" for a, b, c, d in self.tetrahedra.tolist()]
         lines.append(f"CELL_TYPES {len(self.tetrahedra)}")
         lines += ["10"] * len(self.tetrahedra)
-        path.write_text("\n".join(lines) + "\n", encoding="ascii")
+        return "\n".join(lines) + "\n"
 
 
 def volumes(nodes: Vector, tetrahedra: Indices) -> Vector:

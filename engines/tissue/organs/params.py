@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Literal, Self
 
@@ -10,17 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
+from engines.tissue.files.mesh_file import is_surface, read_surface, read_tetrahedra
 from engines.tissue.frequencies import highest_frequency, lowest_frequency
 from engines.tissue.material import Material
 from engines.tissue.meshing.grid import FEWEST_NODES
 from engines.tissue.meshing.mesh_check import LARGEST_M, MOST_NODES, SMALLEST_M, checked_mesh
+from engines.tissue.meshing.surface import Surface
 from engines.tissue.meshing.tet_mesh import TetMesh
-from engines.tissue.meshing.vtk_file import read_vtk
 from engines.tissue.organs.anchors import AnchorParams, Edges
 from engines.tissue.organs.catalogue import SHAPES, block_shape
 from engines.tissue.organs.material_file import MaterialFile
 from engines.tissue.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
+from engines.tissue.organs.organ_file import OrganFile
 from engines.tissue.organs.shape import Shape
+from engines.tissue.organs.surface_mesh import mesh_surface
 from robots import rotation
 from robots.dvrk.parameters import UnitQuaternion
 from schemas.files import find_file
@@ -34,6 +37,7 @@ _DENSITY = 1000.0
 """Density of water, kg/m^3."""
 
 _UNITS = {"m": 1.0, "mm": 1e-3}
+_ORGAN_SUFFIXES = (".yaml", ".yml")
 
 
 class OrganParams(BaseModel):
@@ -49,9 +53,15 @@ class OrganParams(BaseModel):
         default=None, description="instead: an organ; `trocar organs` shows them"
     )
     mesh: Path | None = Field(
-        default=None, description="instead: a .vtk file of tetrahedra; a relative path starts at the scenario"
+        default=None,
+        description=(
+            "instead: an organ of `trocar organs import` (.yaml), tetrahedra (.vtk, .vtu, .msh, .med) or a"
+            " closed surface (.stl, .obj, .ply, .glb, .gltf); a relative path starts at the scenario"
+        ),
     )
-    unit: Literal["m", "mm"] | None = Field(default=None, description="of the .vtk file; default: m")
+    unit: Literal["m", "mm"] | None = Field(
+        default=None, description="of the file of tetrahedra or of a surface; default: m"
+    )
     material: str | None = Field(
         default=None,
         description=(
@@ -103,8 +113,8 @@ class OrganParams(BaseModel):
     def _check_consistency(self) -> Self:
         if sum(part is not None for part in (self.size, self.shape, self.mesh)) != 1:
             raise ValueError(
-                f"an organ has a size (a block), a shape ({', '.join(SHAPES)}) or a mesh (a .vtk file), one"
-                " of them"
+                f"an organ has a size (a block), a shape ({', '.join(SHAPES)}) or a mesh (a file), one of"
+                " them"
             )
         if self.size is not None and not SMALLEST_M <= max(self.size) <= LARGEST_M:
             raise ValueError(
@@ -112,9 +122,13 @@ class OrganParams(BaseModel):
             )
         if self.mesh is None and self.unit is not None:
             raise ValueError("unit is that of a mesh file; elsewhere units stand with the numbers")
-        if self.mesh is not None and self.nodes is not None:
+        if self.mesh is not None and self.nodes is not None and not _is_surface(self.mesh):
             raise ValueError("nodes are those of the mesh file: leave them out")
-        if self.mesh is not None and self.anchors is None:
+        if self.mesh is not None and self.unit is not None and self.mesh.suffix in _ORGAN_SUFFIXES:
+            raise ValueError(
+                "unit is that of another program's file; files of `trocar organs import` are in m"
+            )
+        if self.mesh is not None and self.anchors is None and not self.body.anchors:
             raise ValueError(
                 "anchors are missing: state what holds the organ, for instance [{surface: bottom}], or [] if"
                 " it lies freely on rigid parts"
@@ -168,10 +182,7 @@ class OrganParams(BaseModel):
         if self.size is not None:
             return block_shape(self.size)
         if self.mesh is not None:
-            mesh = _from_file(self.mesh, _UNITS[self.unit or "m"])
-            return Shape(
-                description=str(self.mesh), mesh=lambda _: mesh, surfaces={}, anchors=(), material=None
-            )
+            return _from_file(self.mesh, _UNITS[self.unit or "m"], self.nodes or _NODES)
         return SHAPES[self.shape or ""]
 
     @cached_property
@@ -224,12 +235,15 @@ class OrganParams(BaseModel):
         """
         nodes, chosen = np.unique(self.local.triangles), np.zeros(len(self.local.nodes), np.bool_)
         points = self.local.nodes[nodes]
-        chosen[nodes] = (
-            part.box.depth(points) >= 0.0 if part.box else self.body.surface(part.surface or "", points)
-        )
+        if part.surface is None:
+            chosen = part.nodes(self.local)
+        elif part.surface in self.body.picks:
+            chosen = self.body.picks[part.surface].nodes(self.local)
+        else:
+            chosen[nodes] = self.body.surface(part.surface, points)
         if not chosen.any():
             raise ValueError(
-                f"no node of the surface lies in {part.surface or 'the box'}; the organ reaches from"
+                f"no node of the surface lies in {part.surface or _conditions(part)}; the organ reaches from"
                 f" {points.min(axis=0)} to {points.max(axis=0)} m"
             )
         return chosen
@@ -249,10 +263,45 @@ class OrganParams(BaseModel):
         return float(np.median(np.linalg.norm(edges, axis=2)))
 
 
+def _is_surface(path: Path) -> bool:
+    return path.suffix not in _ORGAN_SUFFIXES and is_surface(path)
+
+
+def _conditions(part: AnchorParams) -> str:
+    stated = [name for name in ("box", "normal", "plane") if getattr(part, name) is not None]
+    return f"the {' and the '.join(stated)}"
+
+
 @lru_cache(maxsize=16)
-def _from_file(path: Path, unit: float) -> TetMesh:
-    nodes, tetrahedra = read_vtk(path)
+def _from_file(path: Path, unit: float, nodes: int) -> Shape:
+    """Return the organ of a file; `unit`: m, `nodes`: of a surface. Raises ValueError, naming the file."""
+    if path.suffix in _ORGAN_SUFFIXES:
+        return _from_organ_file(path)
+    if is_surface(path):
+        surface = read_surface(path)
+        read = partial(mesh_surface, Surface(unit * surface.vertices, surface.triangles), nodes)
+    else:
+        points, tetrahedra = read_tetrahedra(path)
+        read = partial(checked_mesh, points * unit, tetrahedra)
     try:
-        return checked_mesh(nodes * unit, tetrahedra)
+        found = read()
     except ValueError as error:
         raise ValueError(f"mesh {path}: {error}") from error
+    mesh = found if isinstance(found, TetMesh) else found[0]
+    return Shape(description=str(path), mesh=lambda _: mesh, surfaces={}, anchors=(), material=None)
+
+
+def _from_organ_file(path: Path) -> Shape:
+    content = OrganFile.load(path)
+    try:
+        mesh = content.tet_mesh
+    except ValueError as error:
+        raise ValueError(f"organ {path}: {error}") from error
+    return Shape(
+        description=str(path),
+        mesh=lambda _: mesh,
+        surfaces={},
+        anchors=content.anchors,
+        material=content.material,
+        picks=content.surfaces,
+    )

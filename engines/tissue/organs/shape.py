@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from engines.tissue.meshing.isosurface_stuffing import Field, fill
 from engines.tissue.meshing.smoothing import smoothed
 from engines.tissue.meshing.tet_mesh import TetMesh
+from engines.tissue.organs.picks import SurfacePick
 from schemas.errors import did_you_mean
 from schemas.vectors import Vector
 
@@ -56,6 +57,8 @@ class Shape:
     """Surfaces anchored by default."""
     material: str | None
     """The default preset."""
+    picks: Mapping[str, SurfacePick] = field(default_factory=dict[str, SurfacePick])
+    """Parts of the surface of a mesh, by name."""
 
     def surface(self, name: str, nodes: Vector) -> NDArray[np.bool_]:
         """Return the membership of surface nodes, shape (n, 3), in the part `name`, shape (n,).
@@ -71,7 +74,7 @@ class Shape:
     @property
     def names(self) -> list[str]:
         """Names of all surfaces."""
-        return sorted({*self.surfaces, *SIDES})
+        return sorted({*self.surfaces, *self.picks, *SIDES})
 
 
 def on_side(nodes: Vector, side: str, share: float) -> NDArray[np.bool_]:
@@ -109,10 +112,15 @@ def mesher(
         for _ in range(_SEARCHES):
             found = fill(field, *corners, spacing)
             count = len(found.nodes)
+            if not count:  # the lattice went past a thin body
+                spacing *= 0.5
+                continue
             tried[count] = spacing, found
             if abs(count / nodes - 1.0) <= _COUNT_TOLERANCE:
                 break
             spacing *= (count / nodes) ** 0.4
+        if not tried:
+            raise ValueError(f"no lattice of {1e3 * spacing:.2g} mm and more meets the body: it is too thin")
         spacing, best = tried[min(tried, key=lambda count: abs(count - nodes))]
         thick = smoothed(best, field, spacing)
         return TetMesh(np.round(formed(thick.nodes), ROUNDING_DIGITS), thick.tetrahedra)

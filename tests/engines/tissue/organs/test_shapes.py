@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from typer.testing import CliRunner
 
-from engines.bullet.command_line import app
 from engines.bullet.params import BulletParams
+from engines.organ_commands import app
+from engines.tissue.files.vtk_file import read_vtk
 from engines.tissue.meshing.grid import block
 from engines.tissue.meshing.isosurface_stuffing import fill
 from engines.tissue.meshing.mesh_check import checked_mesh
 from engines.tissue.meshing.smoothing import smoothed
 from engines.tissue.meshing.tet_mesh import TetMesh, dihedral_angles, shape_quality, volumes
-from engines.tissue.meshing.vtk_file import read_vtk
 from engines.tissue.organs.catalogue import SHAPES
 from engines.tissue.organs.materials import presets
 from engines.tissue.organs.params import OrganParams
@@ -155,7 +155,7 @@ def test_materials_outside_nature_or_without_a_source_are_refused(wrong, expecte
         ({"shape": "colon", "unit": "mm"}, "unit is that of a mesh file"),
         ({"shape": "colon", "nodes": 6000}, "5000"),
         ({"shape": "colon", "anchors": [{"surface": "mesentary"}]}, "Did you mean 'mesentery'"),
-        ({"shape": "colon", "anchors": [{}]}, "a surface or a box"),
+        ({"shape": "colon", "anchors": [{}]}, "names a surface, or picks nodes"),
         (
             {"shape": "colon", "anchors": [{"box": {"low": [1, 1, 1], "high": [2, 2, 2]}}]},
             "no node of the surface lies in the box",

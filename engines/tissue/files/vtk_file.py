@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from engines.tissue.meshing.tet_mesh import Indices
 from schemas.vectors import Vector
 
-__all__ = ["read_vtk"]
+__all__ = ["parse_vtk", "read_vtk"]
 
 _TETRA = 10
 """VTK_TETRA, vtkCellType.h."""
@@ -40,11 +40,19 @@ def read_vtk(path: Path) -> tuple[Vector, Indices]:
             raise ValueError(f"has more than {_LARGEST_FILE // 1_000_000} MB")
         if not path.is_file():
             raise ValueError("is no file")  # a pipe or a device has no end
-        return _Reader(path.read_bytes()).mesh()
+        return parse_vtk(path.read_bytes())
     except OSError as error:
         raise ValueError(f"mesh {path} cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise ValueError(f"mesh {path}: {error}") from error
+
+
+def parse_vtk(content: bytes) -> tuple[Vector, Indices]:
+    """Return the nodes, shape (n, 3), and the tetrahedra, shape (m, 4), of a file's bytes.
+
+    Raises ValueError for a file without a tetrahedral mesh.
+    """
+    return _Reader(content).mesh()
 
 
 class _Reader:
