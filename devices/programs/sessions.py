@@ -24,7 +24,7 @@ from schemas.errors import ConnectError
 __all__ = ["connect"]
 
 _POLL_S = 0.2
-_ABSENT_S = 5.0
+_ABSENT_S = 10.0
 """Longest wait for a missing session."""
 _numbers = count(1)
 
@@ -87,10 +87,11 @@ def _find_hub(name: str, timeout_s: float) -> HubFile:
                 f"several sessions are open to programs: {names}. State the name or the endpoint:"
                 " trocar.connect('NAME'), trocar.connect(endpoint='ENDPOINT')"
             )
-        if named:
+        is_late = monotonic() > deadline
+        if named and (name or is_late):  # without a name, another session may be about to start
             names = ", ".join(f"'{hub.session}'" for hub in named)
             raise ConnectError(f"session {names} is not open to programs. {_REMEDY}")
-        if monotonic() > deadline:
+        if is_late:
             others = f"; running are: {', '.join(hub.session for hub in hubs)}" if hubs else ""
             what = f"session '{name}'" if name else "session"
             raise ConnectError(

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import trocar
+from devices.programs.sessions import _find_hub
 from hub.transport.hub_files import hub_file, running_hubs
 from tests.hub.authorities import Authority, free_port
 from tests.waiting import LIMIT_S, until
@@ -234,6 +235,19 @@ def test_of_a_session_closed_to_programs_it_is_said_what_opens_it(alone, endpoin
         pytest.raises(ConnectError, match=r"'peg_board' is not open to programs. .* --programs"),
     ):
         trocar.connect("peg-board")
+
+
+def test_without_a_name_a_session_about_to_start_is_waited_for(alone, endpoints):
+    with (
+        hub_file(endpoints[0], [], session="teleop"),
+        pytest.raises(ConnectError, match=r"'teleop' is not open to programs"),
+    ):
+        trocar.connect(timeout_s=0.3)
+    with (
+        hub_file(endpoints[0], [], session="teleop"),
+        hub_file(endpoints[1], [], session="psm", programs=endpoints[1]),
+    ):
+        assert _find_hub("", 0.3).session == "psm"
 
 
 def test_of_several_sessions_one_has_to_be_named(alone, endpoints):
