@@ -80,7 +80,7 @@ def bench_lead(_seconds: float) -> dict[str, Any]:
             endpoint = next(one.endpoint for one in running_hubs() if one.pid == run.pid)
             arrived: list[tuple[int, bytes]] = []
             with reach(endpoint, OBSERVER) as session:
-                key = Keys("browser").output("device", "hand", "buttons")
+                key = Keys("browser").output("device", "right", "buttons")
 
                 def take(sample: zenoh.Sample, arrived: list[tuple[int, bytes]] = arrived) -> None:
                     arrived.append((monotonic_ns(), sample.payload.to_bytes()))
@@ -96,7 +96,7 @@ def bench_lead(_seconds: float) -> dict[str, Any]:
             sample.age_ns
             for grant in Recording(recording).grants()
             for sample in grant.inlets
-            if (sample.participant, sample.port) == ("hand", "buttons") and sample.payload.size
+            if (sample.participant, sample.port) == ("right", "buttons") and sample.payload.size
         ]
     if len(arrived) != len(ages):
         return {"arrived": len(arrived), "granted": len(ages), "trouble": "some were lost"}
@@ -226,7 +226,7 @@ async def _silence(socket: ClientConnection, numbers: Iterator[int]) -> int:
 async def _led(socket: ClientConnection) -> None:
     """Become the pilot, once the hand is offered."""
     while True:
-        await socket.send(json.dumps({"do": "lead", "device": "hand"}))
+        await socket.send(json.dumps({"do": "lead", "device": "right"}))
         async for message in socket:
             if isinstance(message, bytes):
                 await _acknowledge(socket, message)

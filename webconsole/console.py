@@ -17,7 +17,7 @@ from webconsole.changes import wrong_fields
 from webconsole.commands import Control, Fork, Network, Pick, Say, Start, Tune
 from webconsole.fork import fork_arguments, fork_modules
 from webconsole.frame import Section, SectionKind, pose_content
-from webconsole.guide import guide_request
+from webconsole.guide import GuidedWork, guide_request
 from webconsole.live import Live
 from webconsole.log import card_of
 from webconsole.pilot import Pilots
@@ -84,7 +84,9 @@ class Console:
             self._wants.pop(page, None)
         else:
             self._wants[page] = names
-        self.source.want(frozenset[str]().union(*self._wants.values()))
+        guided = self.source.guided
+        work = () if guided is None else (GuidedWork(guided).stage, GuidedWork(guided).status)
+        self.source.want(frozenset(work).union(*self._wants.values()))
 
     def section(self, stage: Stage, name: str, value: Value) -> Section:
         """Return the section of a surface or a picture, made once for all pages."""
@@ -125,6 +127,13 @@ class Console:
         """Pass on a person's pick or word; raises MessageError or ConnectError."""
         live = self.live_source()
         await asyncio.to_thread(live.ask, "set", guide_request(live.guided, order), Empty)
+
+    def guided_work(self) -> dict[str, Any] | None:
+        """Return stage and words of the work that a person guides, ready for JSON; None without such work."""
+        if self.source.guided is None:
+            return None
+        work = GuidedWork(self.source.guided)
+        return work.as_json(*(self.source.newest(name, None) for name in (work.stage, work.status)))
 
     async def prepare(self) -> None:
         """Have processes ready for a session about to be started from here."""

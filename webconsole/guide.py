@@ -7,13 +7,17 @@ the right and y down; the participant finds the point of the scene under the pix
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from hub.planning.plan import Plan
 from hub.transport.control_messages import SetRequest
+from schemas.codec import decode
 from schemas.errors import MessageError
-from schemas.ros import PointStamped, StringMessage
+from schemas.ros import Float64Message, PointStamped, StringMessage
 from webconsole.commands import Pick, Say
+from webconsole.source import Value
 
-__all__ = ["guide_request", "guided_participant"]
+__all__ = ["GuidedWork", "guide_request", "guided_participant"]
 
 _PICK, _COMMAND = "operator/pick", "operator/command"
 _TYPES = {_PICK: PointStamped.ros_type, _COMMAND: StringMessage.ros_type}
@@ -44,3 +48,26 @@ def guide_request(participant: str | None, order: Pick | Say) -> SetRequest:
         "point": {"x": order.x, "y": order.y, "z": 0.0},
     }
     return SetRequest(participant=participant, port=_PICK, value=point)
+
+
+class GuidedWork(NamedTuple):
+    """The outputs of a guided participant for its person, as of `guided-stitching`."""
+
+    participant: str
+
+    @property
+    def stage(self) -> str:
+        """The outlet with the number of the stage."""
+        return f"{self.participant}.stage"
+
+    @property
+    def status(self) -> str:
+        """The outlet with the words to the person; pictures show them cut short."""
+        return f"{self.participant}.status"
+
+    def as_json(self, stage: Value | None, status: Value | None) -> dict[str, Any]:
+        """Return stage and words, ready for JSON; raises MessageError for an invalid value."""
+        return {
+            "stage": None if stage is None else decode(Float64Message, stage.payload).data,
+            "said": "" if status is None else decode(StringMessage, status.payload).data,
+        }

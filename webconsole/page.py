@@ -229,6 +229,7 @@ class Page:
             await self._tell_problems([*state.pop("problems", ()), *problem, *self._new.problems.values()])
             pilots = self._console.pilots.state(self)
             content: dict[str, Any] = {"is": "state", **state, "pilots": pilots, "card": card}
+            content["guide"] = self._console.guided_work()
             if self._role == "operator":  # their links are an operator's
                 content["started"] = self._console.started.as_json()
             if isinstance(source, Live):

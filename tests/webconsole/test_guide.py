@@ -52,10 +52,21 @@ def test_a_stitch_is_clicked_in_a_picture_and_consented_to(browser, tmp_path):
             picture.click(position={"x": x / 320 * box["width"], "y": y / 288 * box["height"]})
 
         words = person.page.locator("#notice")
+        consent = person.page.get_by_role("button", name="Consent")
+        until(consent.is_disabled)
+        assert "while the stitch is picking" in consent.get_attribute("title")
+        click(187, 104)  # an entry; its exit at the same place is refused, in words too long for a picture
+        click(187, 104)
+        whole = person.page.locator("#guide-words")
+        until(lambda: whole.inner_text().endswith("at least 2"))
+        assert "refused: entry and exit are 0.0 mm apart" in whole.inner_text()
+        person.page.get_by_role("button", name="Cancel").click()
+        until(lambda: whole.inner_text() == "picking")
         click(187, 104)  # the row of holes that is farthest from the camera
         click(145, 104)
         until(lambda: "? PSM" in words.inner_text())
-        person.page.get_by_role("button", name="Consent").click()
+        until(consent.is_enabled)
+        consent.click()
         until(lambda: words.inner_text() == "running")
         person.page.get_by_role("button", name="Take over").click()
         until(lambda: words.inner_text() == "taken over")

@@ -44,7 +44,7 @@ const link = new Link({
   session: begin,
   state(state) {
     head.show(state)
-    warn(state.log)
+    warn(state.log, new Set(state.pilots?.map(({ device }) => device)))
     showCard($("card"), state.card)
     headset.show(state.pilots, session?.role)
     pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one),
@@ -52,6 +52,7 @@ const link = new Link({
     pilot.gizmo?.show(session?.dragged?.find(({ device }) => device === pilot.device) ?? null)
     network.show(state.links, session?.role)
     tune.show(state.tunables, session?.role)
+    guide.show(state.guide)
     started.show(state.started)
     if (session?.kind === "recording") timeline.begin(state.start, state.end)
     else if (session) timeline.grow(state, pilot.leading || headset.worn)
@@ -103,9 +104,10 @@ foldable($("eyes"), $("plots"), $("log"))
 $("pictures").onchange = ask
 $("frames").onchange = () => scene?.frames($("frames").checked)
 
-function warn(entries) {
+// `led`: devices for pages to lead: the panel says how each follows, so their warnings stand in the log alone.
+function warn(entries = [], led = new Set()) {
   log.add(entries)
-  alerts.add(entries)
+  alerts.add(entries.filter(({ source }) => !led.has(source)))
 }
 
 function said(source, text) { warn([{ time: lastTime ?? 0, level: "warn", source, text }]) }
