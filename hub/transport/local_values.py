@@ -7,14 +7,12 @@ process can connect (docs/decisions/0106-values-over-zenoh.md). Linux only; othe
 
 from __future__ import annotations
 
-import os
 import socket
 import struct
 from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from time import perf_counter_ns
 
 from hub.planning.plan import Plan
 from hub.transport.host_link import TIME_LIMIT, has_link
@@ -28,12 +26,6 @@ A part is a value with its tag, or a piece of a larger value."""
 _PACKET = 64 * 2**10
 """Most bytes of a packet: a fraction of a socket's buffer."""
 _PART = _PACKET - _HEAD.size
-_AWAKE_NS = 500_000
-"""Longest time awake in a wait: steps of a neighbour are shorter where waking up matters."""
-_TAKEN_NS = 20_000
-"""A longer round of a waiting thread means that another thread had the core."""
-_SLEEPS = 256
-"""Waits asleep after a wait that did not pay."""
 
 
 def _outputs_by_reader(plan: Plan) -> dict[str, list[tuple[str, str]]]:
@@ -115,8 +107,6 @@ class LocalValues:
     def __init__(self, plan: Plan, host: str, ends: Mapping[str, socket.socket]) -> None:
         outputs = _outputs_by_reader(plan)
         self._inbox = ends.get(host)
-        self._sleeps = 0
-        """Number of the next waits without staying awake."""
         self._buffer = memoryview(bytearray(_PACKET))
         self._read = {output: LocalOutput(self) for output in outputs.get(host, ())}
         self._by_number = list(self._read.values())
@@ -146,23 +136,7 @@ class LocalValues:
             pass
 
     def wait(self) -> None:
-        """Read the next packet; wait for it a moment.
-
-        A core that goes to sleep takes long to come back: the thread stays awake while the core is free. As
-        soon as another thread takes the core, or nothing arrives in time, this wait and the next ones sleep.
-        """
-        if self._sleeps:
-            self._sleeps -= 1
-        else:
-            begun_ns = now_ns = perf_counter_ns()
-            while now_ns - begun_ns < _AWAKE_NS:
-                if self._receive(socket.MSG_DONTWAIT):
-                    return
-                os.sched_yield()
-                before_ns, now_ns = now_ns, perf_counter_ns()
-                if now_ns - before_ns > _TAKEN_NS:
-                    break
-            self._sleeps = _SLEEPS
+        """Read the next packet; wait for it a moment."""
         self._receive(0)
 
     def _receive(self, flags: int) -> bool:
