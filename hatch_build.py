@@ -1,6 +1,7 @@
 """Compiles the modules in C into the wheel, or beside their sources where the package is editable.
 
-Without a C compiler the wheel is one of pure Python: its results are the same to the bit, and it is slower.
+Without a C compiler the wheel is one of pure Python: its results are the same to the bit, it is slower, and
+it has no engine `fem`.
 """
 
 from __future__ import annotations
@@ -23,6 +24,12 @@ _EXTENSIONS = (
         depends=["robots/_kinematics.h"],
         include_dirs=[np.get_include()],
         extra_compile_args=_FLAGS,
+    ),
+    Extension(
+        "engines.fem._solid",
+        ["engines/fem/_solid.c", "engines/fem/_elements.c", "engines/fem/_contact.c"],
+        depends=["engines/fem/_solid.h", "engines/fem/_lanes.h"],
+        extra_compile_args=[*_FLAGS, "/O2" if sys.platform == "win32" else "-O3"],
     ),
     Extension("schemas._cdr", ["schemas/_cdr.c"], include_dirs=[np.get_include()], extra_compile_args=_FLAGS),
 )

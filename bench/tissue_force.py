@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' rig
 
 from engines.bullet.organ import Organ
 from engines.bullet.params import BulletParams
-from engines.bullet.probes.near_faces import closest_points
+from engines.tissue.probes.near_faces import closest_points
 from schemas.vectors import Vector
 from tests.engines.bullet.rig import BLOCK, Rig, params
 

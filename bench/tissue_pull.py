@@ -20,8 +20,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' truth
 
 from bench.tissue_force import places
 from bench.tissue_truth import BLOCK, STANDARD_GRAVITY, axisymmetric, graded
-from engines.bullet.elasticity.compliance import SurfaceCompliance
-from engines.bullet.probes.held_patch import missing_compliance
+from engines.tissue.elasticity.compliance import SurfaceCompliance
+from engines.tissue.probes.held_patch import missing_compliance
 from schemas.vectors import Vector
 from tests.engines.bullet import rig
 from tests.engines.bullet.finite_elements import Body, equilibrium

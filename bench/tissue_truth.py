@@ -1,7 +1,7 @@
 """The force of tissue on a sphere, converged, by finite elements that are not ours.
 
-python bench/tissue_truth.py law    # the shares in engines/bullet/elasticity/half_space.py
-python bench/tissue_truth.py rim    # the shares in engines/bullet/elasticity/rims.py, half an hour of a core
+python bench/tissue_truth.py law    # the shares in engines/tissue/elasticity/half_space.py
+python bench/tissue_truth.py rim    # the shares in engines/tissue/elasticity/rims.py, half an hour of a core
 python bench/tissue_truth.py        # bench/tissue_truth.json, half an hour of a core
 
 Quadratic elements of scikit-fem (`pip install scikit-fem`), fine where the sphere touches; Bullet's material;
@@ -27,7 +27,7 @@ from skfem import Basis, ElementTetP2, ElementTriP2, FacetBasis, MeshTet, MeshTr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from engines.bullet.elasticity.half_space import DEEPEST, POISSON_RATIOS, sphere_force
+from engines.tissue.elasticity.half_space import DEEPEST, POISSON_RATIOS, sphere_force
 from engines.tissue.material import Material
 from engines.tissue.meshing.isosurface_stuffing import fill
 from engines.tissue.meshing.smoothing import _onto_surface, smoothed
@@ -99,7 +99,7 @@ class Solid:
 
     def __post_init__(self) -> None:
         self.moved = np.zeros(self.rest.size)
-        self._mu, self._lambda = self.material.bullet_lame
+        self._mu, self._lambda = self.material.neo_hookean_lame
         self._alpha = 1.0 + 0.75 * self._mu / self._lambda
         dofs = self.dofs
         self._pairs = tuple(
@@ -510,14 +510,14 @@ def law(poisson_ratio: float) -> Iterator[float]:
 
 
 def print_law() -> None:
-    """Print the table of engines/bullet/elasticity/half_space.py."""
+    """Print the table of engines/tissue/elasticity/half_space.py."""
     shares = [list(law(nu)) for nu in POISSON_RATIOS]
     for depth, row in zip(LAW_DEPTHS, zip(*shares, strict=True), strict=True):
         print(f"[{depth:.2f}, {', '.join(f'{share:.4f}' for share in row)}],", flush=True)
 
 
 def print_rim() -> None:
-    """Print the table of engines/bullet/elasticity/rims.py."""
+    """Print the table of engines/tissue/elasticity/rims.py."""
     for away in RIM_AWAY:
         solid, at, shares = quarter_space(away * LAW_RADIUS_M), 0.0, list[str]()
         for depth in RIM_DEPTHS:

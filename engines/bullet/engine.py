@@ -5,20 +5,19 @@ from __future__ import annotations
 from math import ceil, pi, sin
 from typing import ClassVar
 
-import numpy as np
-
-from engines.bullet.elasticity.half_space import DEEPEST
 from engines.bullet.elasticity.stable_step import ACCURATE_PHASE, face_loss, longest_step
 from engines.bullet.organ import Organ
 from engines.bullet.params import BulletParams
 from engines.bullet.probes.contact_gain import Contacts, Tissue
-from engines.bullet.probes.grasp import Grasp, grasp_ports, nothing_held
-from engines.bullet.probes.near_faces import CONTACT_PERIOD_NS
-from engines.bullet.probes.params import Coupling, ProbeParams
 from engines.bullet.probes.probe import Probe
-from engines.bullet.probes.sub_grid import SubGrid, Surface
-from engines.bullet.warn_once import warn_once
 from engines.bullet.world import add_rigid, connect, disconnect
+from engines.tissue.elasticity.half_space import DEEPEST
+from engines.tissue.ports import node_ports, node_states
+from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
+from engines.tissue.probes.near_faces import CONTACT_PERIOD_NS
+from engines.tissue.probes.params import Coupling, ProbeParams
+from engines.tissue.probes.sub_grid import SubGrid, Surface
+from engines.tissue.warn_once import warn_once
 from hub.participant import (
     BondPlan,
     Inputs,
@@ -28,14 +27,11 @@ from hub.participant import (
     Stepped,
     Tunables,
     Value,
-    signal_out,
     state_hash,
     tunable_in,
 )
 from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port
-from schemas.ros import Header, Time
-from schemas.trocar_msgs import SoftBodyState
 from schemas.vectors import Vector
 
 __all__ = ["BulletEngine"]
@@ -80,15 +76,13 @@ class BulletEngine(Stepped):
     @property
     def ports(self) -> tuple[Port, ...]:
         """The nodes of every organ; of every probe the stiffness and, with fingers, the grasp."""
-        period_ns = self.params.node_period
-        meaning = "positions of the nodes; the surface triangles come with the first"
-        nodes = tuple(
-            signal_out(f"{organ}/nodes", SoftBodyState, meaning, frame="world", period_ns=period_ns)
-            for organ in self.params.organs
-        )
         couplings = (self._stiffness_port(name) for name in self.params.probes)
         grasping = (name for name, probe in self.params.probes.items() if probe.grasp)
-        return *nodes, *couplings, *(port for name in grasping for port in grasp_ports(name))
+        return (
+            *node_ports(self.params),
+            *couplings,
+            *(port for name in grasping for port in grasp_ports(name)),
+        )
 
     def _stiffness_port(self, probe: str) -> Port:
         coupling = self._coupling(probe)
@@ -144,7 +138,7 @@ class BulletEngine(Stepped):
         for tissue in self._tissues:
             tissue.advance()
         self._contacts = Contacts(self._tissues)
-        outputs = self._nodes(0)
+        outputs = node_states(self._organs, 0)
         self._unused = {
             port: value
             for name, probe in self.params.probes.items()
@@ -182,7 +176,7 @@ class BulletEngine(Stepped):
             self._contacts.update(self._probes)
             for probe, sub_grid in self._sub_grids:
                 self._follow(probe, sub_grid)
-        outputs = (self._nodes(end) if due else {}) | self._unused
+        outputs = (node_states(self._organs, end) if due else {}) | self._unused
         for probe in probes:
             outputs.update(probe.result(end, seconds))
         for grasp in self._grasps:
@@ -306,19 +300,6 @@ class BulletEngine(Stepped):
                 coupling.stiffness if self.params.has_sub_grid(name) else self._contact_stiffness(probe)
             ),
         )
-
-    def _nodes(self, t: int) -> dict[str, Value]:
-        header = Header(stamp=Time.from_ns(t), frame_id="world")
-        outputs: dict[str, Value] = {}
-        for organ in self._organs:
-            triangles = organ.mesh.triangles.astype(np.uint32).ravel() if t == 0 else np.zeros(0, np.uint32)
-            outputs[f"{organ.name}/nodes"] = SoftBodyState(
-                header=header,
-                body=organ.name,
-                nodes_m=organ.nodes.astype(np.float32).ravel(),
-                triangles=triangles,
-            )
-        return outputs
 
     def _read_nodes(self, t: int) -> None:
         for organ in self._organs:

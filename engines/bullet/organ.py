@@ -71,7 +71,7 @@ class Organ:
         """Load the mesh, and return Bullet's number of the body."""
         import pybullet as bullet
 
-        mu, lambda_ = params.elastic.bullet_lame
+        mu, lambda_ = params.elastic.neo_hookean_lame
         with TemporaryDirectory(prefix="trocar-") as directory, quiet():
             path = Path(directory) / f"{self.name}.vtk"
             self.mesh.write_vtk(path)

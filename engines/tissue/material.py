@@ -26,7 +26,7 @@ class Material:
         return e / (2.0 * (1.0 + nu)), e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
 
     @property
-    def bullet_lame(self) -> tuple[float, float]:
+    def neo_hookean_lame(self) -> tuple[float, float]:
         """Bullet's mu and lambda (Pa) for small strains obeying `lame`.
 
         Bullet has the energy of Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation (ACM Trans. Graph.

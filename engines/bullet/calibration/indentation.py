@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
+from engines.tissue.elasticity.half_space import DEEPEST, sphere_force
 from engines.tissue.material import Material
 from schemas.errors import RecordingError
 from schemas.vectors import Vector

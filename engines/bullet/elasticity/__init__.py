@@ -1,1 +1,1 @@
-"""The elastic material of tissue: constants, forces, and the longest time step."""
+"""Forces of the elements in Bullet, and its longest time step."""

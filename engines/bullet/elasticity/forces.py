@@ -28,7 +28,7 @@ class Elasticity:
         self._gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
         self._weighted = self._gradients / (6.0 * np.linalg.det(inverse))[:, None, None]  # times the volume
         self._tetrahedra = mesh.tetrahedra
-        self._mu, self._lambda = material.bullet_lame
+        self._mu, self._lambda = material.neo_hookean_lame
         self._alpha = 1.0 + 0.75 * self._mu / self._lambda
 
     def forces(self, nodes: Vector, at: NDArray[np.bool_]) -> Vector:

@@ -1,1 +1,1 @@
-"""The probes pressing on and grasping tissue."""
+"""The probes in Bullet, and the loss of force in their contacts."""

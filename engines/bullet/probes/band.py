@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engines.bullet.elasticity.compliance import MOST_NODES, SurfaceCompliance
-from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
+from engines.tissue.elasticity.compliance import MOST_NODES, SurfaceCompliance
+from engines.tissue.elasticity.half_space import DEEPEST, sphere_force
 from engines.tissue.organs.params import OrganParams
 
 __all__ = ["Band", "band"]

@@ -18,10 +18,10 @@ import numpy as np
 
 from engines.bullet.elasticity.forces import Elasticity
 from engines.bullet.organ import Organ
-from engines.bullet.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, near_faces
 from engines.bullet.probes.probe import Probe
 from engines.tissue.material import Material
 from engines.tissue.meshing.tet_mesh import Indices
+from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, near_faces
 from schemas.vectors import Vector
 
 __all__ = ["Contacts", "Tissue"]

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from engines.bullet.probes.held_patch import HeldPatch
-from engines.bullet.probes.near_faces import NearFaces
-from engines.bullet.probes.params import Coupling, ProbeParams
-from engines.bullet.probes.sub_grid import SubGrid
 from engines.bullet.world import COLLISION_MARGIN_M
+from engines.tissue.probes.held_patch import HeldPatch
+from engines.tissue.probes.near_faces import NearFaces
+from engines.tissue.probes.params import Coupling, ProbeParams
+from engines.tissue.probes.sub_grid import SubGrid
 from hub.participant import BondPlan, ForceSide, Inputs
 from schemas.errors import SessionError
 from schemas.ports import BondSide
@@ -112,6 +113,17 @@ class Probe:
     def contacts(self) -> Vector:
         """Contact force (N) of each proxy in the last sub-step, as in Bullet, shape (n, 3)."""
         return self._applied - self.coupling.mass / self._dt * (self.velocities - self._velocities_before)
+
+    def hold(self, spheres: NDArray[np.int64], *, held: bool) -> None:
+        """Mark spheres as holding tissue or not; a spring in series goes with what is let go."""
+        self.held[spheres] = held
+        self.gains[spheres] = 1.0
+        if not held:
+            self.held_patch = None
+
+    def soften(self, spheres: NDArray[np.int64], compliance: Vector) -> None:
+        """Put a spring of `compliance` (m/N, shape (3, 3)) in series with the pull of these spheres."""
+        self.held_patch = HeldPatch(spheres, self.coupling, compliance)
 
     def begin(self, inputs: Inputs, h: float) -> None:
         """Store the motion of the motion side at the start of a step of `h` seconds."""

@@ -1,1 +1,1 @@
-"""Organs: shapes, materials, anchors, and bodies in Bullet."""
+"""Organs: shapes, materials, anchors."""

@@ -86,7 +86,7 @@ class Body:
         """Take an OrganParams, and its coefficient of friction if it shall be another one."""
         self.friction = organ.friction if friction is None else friction
         mesh = organ.rest
-        self.elements = Elements(mesh.nodes, mesh.tetrahedra, *organ.elastic.bullet_lame)
+        self.elements = Elements(mesh.nodes, mesh.tetrahedra, *organ.elastic.neo_hookean_lame)
         self.fixed = np.any(list(organ.anchored_nodes.values()), axis=0)
         self.faces = mesh.triangles[~self.fixed[mesh.triangles].all(axis=1)]
         self.load = np.zeros_like(mesh.nodes)

@@ -28,8 +28,10 @@ class Rig:
     It keeps the outputs.
     """
 
+    engine_class = BulletEngine
+
     def __init__(self, model=None, start=(0.0, 0.0, RADIUS + 1e-3), period=MS, plan=IMPULSE):
-        self.engine = BulletEngine("tissue", model or params())
+        self.engine = self.engine_class("tissue", model or params())
         self.period, self.t = period, 0
         self.outputs = dict(self.engine.configure(Setup(period, Path(), {"probe": plan})))
         on_frame = self.engine.params.probes["probe"].spheres is None

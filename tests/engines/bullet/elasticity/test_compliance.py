@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from engines.bullet.elasticity.compliance import SurfaceCompliance
+from engines.tissue.elasticity.compliance import SurfaceCompliance
 from engines.tissue.organs.params import OrganParams
 from tests.engines.bullet.finite_elements import Elements
 from tests.engines.bullet.rig import BLOCK, SMALL_BLOCK
@@ -30,7 +30,7 @@ def test_a_force_moves_nodes_as_the_stiffness_of_the_elements_says():
     organ, anchored, compliance = surface(SMALL_BLOCK)
     pressed = top_near(organ, 0.0, 0.0, count=4)
     mesh = organ.rest
-    elements = Elements(mesh.nodes, mesh.tetrahedra, *organ.elastic.bullet_lame)
+    elements = Elements(mesh.nodes, mesh.tetrahedra, *organ.elastic.neo_hookean_lame)
     size = mesh.nodes.size
     stiffness = np.zeros((size, size))
     for tetrahedron, block in zip(mesh.tetrahedra, elements.stiffness(mesh.nodes), strict=True):

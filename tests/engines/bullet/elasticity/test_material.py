@@ -25,7 +25,7 @@ def test_small_strains_of_the_neo_hookean_model_obey_hookes_law(material, seed):
     strain = np.random.default_rng(seed).uniform(-1e-5, 1e-5, (3, 3))
     strain = (strain + strain.T) / 2
     nodes = CUBE.nodes + CUBE.nodes @ strain
-    forces = internal_forces(CUBE.nodes, CUBE.tetrahedra, nodes, *material.bullet_lame)
+    forces = internal_forces(CUBE.nodes, CUBE.tetrahedra, nodes, *material.neo_hookean_lame)
     stress = -(forces.T @ CUBE.nodes) / 0.02**3  # virial theorem
     mu, lambda_ = material.lame
     np.testing.assert_allclose(
@@ -57,7 +57,8 @@ def frequencies(mesh, free, material):
         moved = mesh.nodes.copy()
         moved.flat[i] += h
         columns.append(
-            -internal_forces(mesh.nodes, mesh.tetrahedra, moved, *material.bullet_lame).ravel()[moving] / h
+            -internal_forces(mesh.nodes, mesh.tetrahedra, moved, *material.neo_hookean_lame).ravel()[moving]
+            / h
         )
     return np.sqrt(
         np.linalg.eigvals(np.array(columns)).real / (material.density * mesh.volume / len(mesh.nodes))

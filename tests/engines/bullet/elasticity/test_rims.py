@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from engines.bullet.elasticity.rims import rim_share, rims_of
+from engines.tissue.elasticity.rims import rim_share, rims_of
 from engines.tissue.organs.params import OrganParams
 from tests.engines.bullet.rig import BLOCK, RADIUS, Rig, params
 

@@ -3,9 +3,9 @@
 import pytest
 from typer.testing import CliRunner
 
-from engines.bullet.command_line import app
 from engines.bullet.probes.band import band
 from engines.bullet.report_notes import notes
+from engines.organ_commands import app
 from engines.tissue.organs.params import OrganParams
 from hub.recording.report_notes import participant_notes
 from schemas.scenario import Scenario

@@ -108,7 +108,9 @@ def test_elastic_forces_are_those_of_finite_elements(seed, size):
         organ.rest.nodes + size * random.standard_normal(organ.rest.nodes.shape),
         random.random(len(organ.rest.nodes)) < 0.2,
     )
-    expected = internal_forces(organ.rest.nodes, organ.rest.tetrahedra, nodes, *organ.elastic.bullet_lame)
+    expected = internal_forces(
+        organ.rest.nodes, organ.rest.tetrahedra, nodes, *organ.elastic.neo_hookean_lame
+    )
     forces = Elasticity(organ.rest, organ.elastic).forces(nodes, at)
     np.testing.assert_allclose(forces[at], expected[at], atol=1e-9 * np.abs(expected).max())
     assert not forces[~at].any()

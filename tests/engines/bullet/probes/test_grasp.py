@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from engines.bullet.elasticity.compliance import SurfaceCompliance
 from engines.bullet.engine import BulletEngine
 from engines.bullet.params import BulletParams
-from engines.bullet.probes.held_patch import missing_compliance
+from engines.tissue.elasticity.compliance import SurfaceCompliance
 from engines.tissue.organs.params import OrganParams
+from engines.tissue.probes.held_patch import missing_compliance
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from tests.engines.bullet.finite_elements import Body, equilibrium

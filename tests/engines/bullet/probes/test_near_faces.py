@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from engines.bullet.probes.near_faces import closest_points, near_faces
+from engines.tissue.probes.near_faces import closest_points, near_faces
 from tests.engines.bullet.rig import SMALL_BLOCK, params
 
 TRIANGLES = arrays(float, (5, 3, 3), elements=st.floats(-1, 1))

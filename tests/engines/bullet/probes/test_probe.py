@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from engines.bullet.engine import BulletEngine
-from engines.bullet.probes.params import ProbeParams
+from engines.tissue.probes.params import ProbeParams
 from tests.engines.bullet.rig import SMALL_BLOCK, Rig, params
 
 stiffnesses, steps = st.floats(1.0, 1e5), st.floats(1e-5, 1e-2)

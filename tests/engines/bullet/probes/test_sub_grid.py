@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 
-from engines.bullet.elasticity.half_space import sphere_force
+from engines.tissue.elasticity.half_space import sphere_force
 from tests.engines.bullet.finite_elements import Body
 from tests.engines.bullet.rig import BLOCK, RADIUS, Rig, params
 

@@ -1,4 +1,4 @@
-"""The scene of a page: the soft surfaces of a participant of kind bullet, and their colours."""
+"""The scene of a page: the soft surfaces of a tissue engine, and their colours."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.params import BulletParams
+from engines.tissue.params import PressedOrgansParams
 from hub.participant.view import Camera, Frame, Part, Rgb
 from schemas.vectors import Vector
 
@@ -33,7 +33,7 @@ class ViewScene:
     cameras: tuple[Camera, ...] = ()
     inputs: tuple[str, ...] = ()
 
-    def __init__(self, params: BulletParams) -> None:
+    def __init__(self, params: PressedOrgansParams) -> None:
         self.surfaces: dict[str, Rgb] = {
             f"{name}/nodes": _COLOURS.get(next(filter(name.endswith, _COLOURS), ""), _TISSUE)
             for name in params.organs

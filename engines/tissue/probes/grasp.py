@@ -9,23 +9,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.organ import Organ
-from engines.bullet.probes.held_patch import HeldPatch, missing_compliance
-from engines.bullet.probes.params import GraspParams
-from engines.bullet.probes.probe import Probe
-from engines.bullet.probes.sub_grid import Surface
-from engines.bullet.warn_once import warn_once
+from engines.tissue.organs.body import Body
+from engines.tissue.probes.held_patch import missing_compliance
+from engines.tissue.probes.params import GraspParams
+from engines.tissue.probes.sub_grid import Surface
+from engines.tissue.warn_once import warn_once
 from hub.participant import Value, event_out, signal_out
 from schemas.ports import Port
 from schemas.ros import Float64Message, Header, Time
 from schemas.trocar_msgs import TissueGrasp
 from schemas.vectors import Vector
 
-__all__ = ["Grasp", "grasp_ports", "nothing_held"]
+__all__ = ["Grasp", "GraspedOrgan", "GraspingProbe", "grasp_ports", "nothing_held"]
 
 _CLOSING_M = 0.5e-3
 """Closing of the fingers on tissue for a grasp, and opening from there for a release.
@@ -62,11 +62,68 @@ def nothing_held(probe: str) -> dict[str, Value]:
     }
 
 
+class GraspedOrgan(Body, Protocol):
+    """An organ whose nodes can be tied to spheres."""
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Nodes held by a grasp, shape (n,)."""
+        ...
+
+    @property
+    def mean_edge(self) -> float:
+        """Mean length of an edge of the surface, m."""
+        ...
+
+    def anchor(self, node: int, body: int) -> int:
+        """Tie a node to a sphere by the engine's number, where both are now; return the number of the tie."""
+        ...
+
+    def release(self, node: int, anchor: int) -> None:
+        """Undo `anchor`."""
+        ...
+
+    def let_touch(self, body: int, *, on: bool) -> None:
+        """Let a sphere by the engine's number press the organ, or pass through."""
+        ...
+
+
+class GraspingProbe(Protocol):
+    """The spheres of fingers in an engine."""
+
+    name: str
+    radii: Vector
+    """m, shape (n,)."""
+    targets: Vector
+    """Centres of the spheres on the instrument, m, in `world`, shape (n, 3)."""
+    positions: Vector
+    """Centres of the spheres in the engine, m, in `world`, shape (n, 3)."""
+    held: NDArray[np.bool_]
+    """Spheres with tied tissue, shape (n,)."""
+    touching: NDArray[np.bool_]
+    """Spheres touching an organ at the last reading, shape (n,)."""
+    bodies: list[int]
+    """The engine's number of every sphere."""
+
+    @property
+    def forces(self) -> Vector:
+        """Force of the instrument on every sphere, N, shape (n, 3)."""
+        ...
+
+    def hold(self, spheres: NDArray[np.int64], *, held: bool) -> None:
+        """Mark spheres as holding tissue or not."""
+        ...
+
+    def soften(self, spheres: NDArray[np.int64], compliance: Vector) -> None:
+        """Let spheres with a common pull yield by `compliance`, m/N, shape (3, 3)."""
+        ...
+
+
 @dataclass(frozen=True)
 class _Hold:
     """The held part of an organ."""
 
-    organ: Organ
+    organ: GraspedOrgan
     nodes: NDArray[np.int64]
     anchors: list[int]
     rest: Vector
@@ -77,7 +134,11 @@ class Grasp:
     """Watches the fingers of a probe, and ties tissue to the fingers."""
 
     def __init__(
-        self, params: GraspParams, probe: Probe, organs: list[Organ], surfaces: Sequence[Surface] = ()
+        self,
+        params: GraspParams,
+        probe: GraspingProbe,
+        organs: Sequence[GraspedOrgan],
+        surfaces: Sequence[Surface] = (),
     ) -> None:
         """`organs`: organs for the fingers of `probe`; `surfaces`: their surfaces, with a `width`."""
         self._params, self._probe, self._organs = params, probe, organs
@@ -196,33 +257,33 @@ class Grasp:
         if self._holds:
             self._widest = spread
             self._set_held(spheres, held=True)
-            probe.held_patch = self._held_patch(spheres)
+            self._soften(spheres)
         return self._events("grasped", t)
 
-    def _held_patch(self, spheres: NDArray[np.int64]) -> HeldPatch | None:
-        """Return the spring in series with these spheres, given a `width` and a single held organ."""
+    def _soften(self, spheres: NDArray[np.int64]) -> None:
+        """Let these spheres yield as a patch of the pad's width does, given a `width` and a single organ."""
         width = self._params.width
         if width is None:
-            return None
+            return
         if len(self._holds) != 1:
             held = " and ".join(f"'{hold.organ.name}'" for hold in self._holds)
             warn_once(
                 f"probe '{self._probe.name}' holds {held}: its grasp.width counts for one organ alone, so the"
                 " pull is that of the nodes that the meshes hold"
             )
-            return None
+            return
         hold = self._holds[0]
         surface = self._surfaces[hold.organ.name]
-        compliance = missing_compliance(surface.compliance, surface.material, hold.nodes, width)
-        return HeldPatch(spheres, self._probe.coupling, compliance)
+        self._probe.soften(
+            spheres, missing_compliance(surface.compliance, surface.material, hold.nodes, width)
+        )
 
-    def _reach(self, organ: Organ) -> float:
+    def _reach(self, organ: GraspedOrgan) -> float:
         return organ.mean_edge / sqrt(3.0) if self._params.reach is None else self._params.reach
 
     def _let_go(self, why: str, t: int) -> tuple[TissueGrasp, ...]:
         events = self._events(why, t)
         self.untie()
-        self._probe.held_patch = None
         self._holds.clear()
         self._widest = 0.0
         self._pull[:], self._lift[:] = 0.0, 0.0
@@ -233,8 +294,7 @@ class Grasp:
 
         Spheres pass through the held organs, so all force goes through the anchors.
         """
-        self._probe.held[spheres] = held
-        self._probe.gains[spheres] = 1.0
+        self._probe.hold(spheres, held=held)
         numbers: list[int] = spheres.tolist()
         for hold in self._holds:
             for sphere in numbers:

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from engines.bullet.elasticity.compliance import SurfaceCompliance
-from engines.bullet.elasticity.half_space import patch_compliance
-from engines.bullet.probes.params import Coupling
+from engines.tissue.elasticity.compliance import SurfaceCompliance
+from engines.tissue.elasticity.half_space import patch_compliance
 from engines.tissue.material import Material
 from engines.tissue.meshing.tet_mesh import Indices
+from engines.tissue.probes.params import Coupling
 from schemas.vectors import Vector
 
 __all__ = ["HeldPatch", "missing_compliance"]

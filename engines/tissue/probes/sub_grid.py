@@ -15,14 +15,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from engines.bullet.elasticity.compliance import SurfaceCompliance
-from engines.bullet.elasticity.half_space import DEEPEST, sphere_force
-from engines.bullet.elasticity.rims import rim_share
-from engines.bullet.organ import Organ
-from engines.bullet.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, closest_points
-from engines.bullet.probes.params import Coupling
+from engines.tissue.elasticity.compliance import SurfaceCompliance
+from engines.tissue.elasticity.half_space import DEEPEST, sphere_force
+from engines.tissue.elasticity.rims import rim_share
 from engines.tissue.material import Material
 from engines.tissue.meshing.tet_mesh import Indices
+from engines.tissue.organs.body import Body
+from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, closest_points
+from engines.tissue.probes.params import Coupling
 from schemas.vectors import Vector
 
 __all__ = ["SubGrid", "Surface"]
@@ -59,7 +59,7 @@ _RATIOS = (0.2, 2.0)
 class Surface:
     """The surface of an anchored organ at rest under its weight, with compliance."""
 
-    def __init__(self, organ: Organ, material: Material) -> None:
+    def __init__(self, organ: Body, material: Material) -> None:
         """`organ`: a settled organ."""
         self.organ, self.material = organ, material
         self.settled = organ.nodes
@@ -103,7 +103,7 @@ class SubGrid:
         """Whether the sphere has been deeper than `DEEPEST` radii: there the law is extrapolated."""
         self._speed: float = 0.0  # of the yield, m/s
         self._is_new = False  # the law
-        self._forces = self._yields = np.zeros(1)
+        self._forces = self._yields = self._mesh_yields = np.zeros(1)
         self._rim: float = 0.0  # how far the law is that of a rim, 0 to 1
 
     @property
@@ -131,6 +131,18 @@ class SubGrid:
         if keep:
             self.yielded, self._speed, self._is_new = yielded, speed, False
 
+    def follow(self, pressed: float, rate: float) -> None:
+        """Let the yield go towards that of a force of `pressed` (N) by the share `rate` of the way.
+
+        For a sphere without a coupling, whose force falls as it yields: the share is that of a closed loop,
+        as the mesh's part of all compliance says.
+        """
+        force = max(pressed, 0.0)
+        wanted = float(np.interp(force, self._forces, self._yields))
+        mesh = float(np.interp(force, self._forces, self._mesh_yields))
+        whole = wanted + mesh
+        self.yielded += rate * (mesh / whole if whole > 0.0 else 1.0) * (wanted - self.yielded)
+
     def sight(self, velocity: Vector) -> float:
         """Return how far (m) from the centre of a sphere with this velocity (m/s) a face may soon be touched.
 
@@ -153,7 +165,7 @@ class SubGrid:
         ]
         if not places:
             self.yielded, self._speed, self.inward, self.ratio = 0.0, 0.0, np.zeros(3), 1.0
-            self._forces = self._yields = np.zeros(1)
+            self._forces = self._yields = self._mesh_yields = np.zeros(1)
             return
         place, self._forces = min(places, key=lambda one: one[0].distance)
         place = self._at_rim(place, centre)
@@ -218,6 +230,7 @@ class SubGrid:
         if self._rim:
             at_rim = compliance.of_body_at_rim(place.nodes, place.parts, -place.inward)
             body += self._rim * (at_rim - body)
+        self._mesh_yields = self.ratio * mesh * forces
         missing = self._depths + (body - self.ratio * mesh - 1.0 / self._coupling.stiffness) * forces
         return np.maximum.accumulate(np.maximum(missing, 0.0))
 

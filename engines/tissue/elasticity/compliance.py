@@ -13,8 +13,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.elasticity.half_space import point_displacement, point_stress
-from engines.bullet.elasticity.rims import MIRRORED, mirror_displacement, rims_of
+from engines.tissue.elasticity.half_space import point_displacement, point_stress
+from engines.tissue.elasticity.rims import MIRRORED, mirror_displacement, rims_of
 from engines.tissue.material import Material
 from engines.tissue.meshing.tet_mesh import Indices, TetMesh
 from schemas.vectors import Vector

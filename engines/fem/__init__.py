@@ -1,0 +1,1 @@
+"""Soft tissue of our own: finite elements in explicit dynamics."""

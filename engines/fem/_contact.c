@@ -1,0 +1,187 @@
+/* Spheres against the faces of a body: no face enters a sphere, with Coulomb friction.
+
+Impulses at the points of the faces that are nearest to the centre, by projected Gauss and Seidel (Moreau, Numerical
+aspects of the sweeping process, Comput. Methods Appl. Mech. Eng. 177, 1999). A sphere moves as told, whatever the
+force. A sphere has one contact for each nearest point; faces that share the point share the contact.
+*/
+
+#include "_solid.h"
+
+#define AHEAD 1e-3f     /* of the surface, m: contacts that may close within a step */
+#define ITERATIONS 6
+#define RECOVERY 0.2f   /* share of a penetration that is undone in a sub-step */
+#define SAME_POINT 1e-7f /* m */
+#define DEEPEST 0.5f     /* of a centre behind a face, in radii */
+
+typedef struct {
+    const int32_t *node; /* three */
+    float share[3], point[3], normal[3], gap, mass, pushed, rubbed[3];
+} Contact;
+
+static inline float dot(const float a[3], const float b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline void position(const Body *body, int32_t node, float x[3])
+{
+    for (int i = 0; i < 3; i++)
+        x[i] = body->rest[4 * node + i] + body->displacement[4 * node + i];
+}
+
+/* Barycentric coordinates of the point of a triangle nearest to the origin: Ericson, Real-Time Collision Detection
+(2005), section 5.1.5. */
+static void nearest(const float a[3], const float b[3], const float c[3], float share[3])
+{
+    float ab[3], ac[3];
+    for (int i = 0; i < 3; i++)
+        ab[i] = b[i] - a[i], ac[i] = c[i] - a[i];
+    float d1 = -dot(ab, a), d2 = -dot(ac, a), d3 = -dot(ab, b), d4 = -dot(ac, b), d5 = -dot(ab, c), d6 = -dot(ac, c);
+    float va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+    float along = 0.0f;
+    share[0] = share[1] = share[2] = 0.0f;
+    if (d1 <= 0.0f && d2 <= 0.0f)
+        share[0] = 1.0f;
+    else if (d3 >= 0.0f && d4 <= d3)
+        share[1] = 1.0f;
+    else if (vc <= 0.0f && d1 >= 0.0f && d3 <= 0.0f)
+        along = d1 / (d1 - d3), share[0] = 1.0f - along, share[1] = along;
+    else if (d6 >= 0.0f && d5 <= d6)
+        share[2] = 1.0f;
+    else if (vb <= 0.0f && d2 >= 0.0f && d6 <= 0.0f)
+        along = d2 / (d2 - d6), share[0] = 1.0f - along, share[2] = along;
+    else if (va <= 0.0f && d4 >= d3 && d5 >= d6)
+        along = (d4 - d3) / ((d4 - d3) + (d5 - d6)), share[1] = 1.0f - along, share[2] = along;
+    else {
+        float all = va + vb + vc;
+        share[1] = vb / all, share[2] = vc / all, share[0] = 1.0f - share[1] - share[2];
+    }
+}
+
+/* Write the faces that a sphere may touch within a step; return how many. */
+int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_steps, int *near, int most)
+{
+    float low[3], high[3];
+    for (int i = 0; i < 3; i++) {
+        double least = INFINITY, largest = -INFINITY;
+        for (int k = 0; k <= sub_steps; k++) {
+            double x = spheres->path[3 * (k * spheres->count + sphere) + i];
+            least = x < least ? x : least, largest = x > largest ? x : largest;
+        }
+        float reach = (float)spheres->radius[sphere] + 2.0f * AHEAD;
+        low[i] = (float)least - reach, high[i] = (float)largest + reach;
+    }
+    int found = 0;
+    for (int t = 0; t < body->faces && found < most; t++) {
+        float x[3][3];
+        int is_near = 1;
+        for (int a = 0; a < 3; a++)
+            position(body, body->surface[3 * t + a], x[a]);
+        for (int i = 0; i < 3; i++)
+            is_near &= !(x[0][i] < low[i] && x[1][i] < low[i] && x[2][i] < low[i]) &
+                       !(x[0][i] > high[i] && x[1][i] > high[i] && x[2][i] > high[i]);
+        if (is_near)
+            near[found++] = t;
+    }
+    return found;
+}
+
+/* Fill in the contact of a face with a sphere at `centre`; return whether there is one. */
+static int touch(const Body *body, const int32_t *node, const double *centre, float radius, Contact *contact)
+{
+    float x[3][3], normal[3], side = 0.0f, away[3], inverse = 0.0f;
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < 3; i++)
+            x[a][i] = (float)((double)body->rest[4 * node[a] + i] - centre[i]) + body->displacement[4 * node[a] + i];
+    nearest(x[0], x[1], x[2], contact->share);
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        normal[i] = (x[1][j] - x[0][j]) * (x[2][k] - x[0][k]) - (x[1][k] - x[0][k]) * (x[2][j] - x[0][j]);
+        away[i] = contact->share[0] * x[0][i] + contact->share[1] * x[1][i] + contact->share[2] * x[2][i];
+        contact->point[i] = away[i];
+    }
+    float distance = sqrtf(dot(away, away));
+    if (!(distance < radius + AHEAD) || distance < SAME_POINT)
+        return 0;
+    side = dot(away, normal) > 0.0f ? -1.0f : 1.0f; /* -1: the centre is behind the face */
+    if (side < 0.0f && distance > DEEPEST * radius)
+        return 0; /* a face of the far side */
+    for (int a = 0; a < 3; a++)
+        inverse += contact->share[a] * contact->share[a] * body->inverse_mass[node[a]];
+    if (inverse <= 0.0f)
+        return 0;
+    contact->node = node;
+    for (int i = 0; i < 3; i++)
+        contact->normal[i] = side * away[i] / distance; /* out of the sphere */
+    contact->gap = side * distance - radius;
+    contact->mass = 1.0f / inverse;
+    contact->pushed = 0.0f;
+    memset(contact->rubbed, 0, sizeof contact->rubbed);
+    return 1;
+}
+
+static int is_known(const Contact *contacts, int count, const Contact *other)
+{
+    for (int k = 0; k < count; k++) {
+        float apart[3];
+        for (int i = 0; i < 3; i++)
+            apart[i] = contacts[k].point[i] - other->point[i];
+        if (dot(apart, apart) < SAME_POINT * SAME_POINT)
+            return 1;
+    }
+    return 0;
+}
+
+/* Change the velocities of a contact's nodes towards no approach; keep normal and friction within their cone. */
+static void resolve(const Body *body, Contact *contact, const float moving[3], float seconds, float friction)
+{
+    const int32_t *node = contact->node;
+    float apart[3], impulse[3], rub[3];
+    for (int i = 0; i < 3; i++) {
+        apart[i] = -moving[i];
+        for (int a = 0; a < 3; a++)
+            apart[i] += contact->share[a] * body->velocity[4 * node[a] + i];
+    }
+    float along = dot(apart, contact->normal);
+    float least = contact->gap > 0.0f ? -contact->gap / seconds : -RECOVERY * contact->gap / seconds;
+    float pushed = contact->pushed + (least - along) * contact->mass;
+    pushed = pushed > 0.0f ? pushed : 0.0f;
+    for (int i = 0; i < 3; i++)
+        rub[i] = contact->rubbed[i] - contact->mass * (apart[i] - along * contact->normal[i]);
+    float size = sqrtf(dot(rub, rub)), most = friction * pushed;
+    float kept = size > most ? most / size : 1.0f;
+    for (int i = 0; i < 3; i++) {
+        impulse[i] = (pushed - contact->pushed) * contact->normal[i] + kept * rub[i] - contact->rubbed[i];
+        contact->rubbed[i] = kept * rub[i];
+    }
+    contact->pushed = pushed;
+    for (int a = 0; a < 3; a++) {
+        float inverse = contact->share[a] * body->inverse_mass[node[a]];
+        for (int i = 0; i < 3; i++)
+            body->velocity[4 * node[a] + i] += inverse * impulse[i];
+    }
+}
+
+/* Let a sphere push the body on its way from one place of its path to the next; write the force on the sphere.
+Return the number of contacts. */
+int press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count)
+{
+    Contact contacts[MOST_CONTACTS];
+    const double *here = spheres->path + 3 * (sub_step * spheres->count + sphere), *next = here + 3 * spheres->count;
+    double *force = spheres->force + 3 * (sub_step * spheres->count + sphere);
+    float moving[3];
+    for (int i = 0; i < 3; i++)
+        moving[i] = (float)((next[i] - here[i]) / (double)seconds);
+    int found = 0;
+    for (int k = 0; k < count && found < MOST_CONTACTS; k++)
+        if (touch(body, body->surface + 3 * near[k], here, (float)spheres->radius[sphere], contacts + found) &&
+            !is_known(contacts, found, contacts + found))
+            found++;
+    for (int pass = 0; pass < ITERATIONS; pass++)
+        for (int k = 0; k < found; k++)
+            resolve(body, contacts + k, moving, seconds, spheres->friction);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < found; k++)
+            force[i] -= (double)(contacts[k].pushed * contacts[k].normal[i] + contacts[k].rubbed[i]) / (double)seconds;
+    return found;
+}

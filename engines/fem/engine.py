@@ -1,0 +1,227 @@
+"""Soft tissue in finite elements of our own, pressed by probes through power bonds."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from engines.fem.organ import Organ
+from engines.fem.params import FemParams
+from engines.fem.probe import RIGID, Probe
+from engines.tissue.elasticity.half_space import DEEPEST
+from engines.tissue.ports import node_ports, node_states
+from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
+from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, near_faces
+from engines.tissue.probes.sub_grid import SubGrid, Surface
+from engines.tissue.warn_once import warn_once
+from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
+from schemas.errors import ScenarioError, StateError
+from schemas.ports import BondSide, Port
+
+__all__ = ["FemEngine"]
+
+
+class FemEngine(Stepped):
+    """Soft organs in explicit dynamics; every probe is the force side of a bond.
+
+    The state hash covers the displacements, the probes and their bonds at every step.
+    """
+
+    params_model: ClassVar[type[Params]] = FemParams
+    params: FemParams
+
+    def __init__(self, name: str, params: FemParams) -> None:
+        super().__init__(name, params)
+        self._organs: list[Organ] = []
+        self._probes: list[Probe] = []
+        self._grasps: list[Grasp] = []
+        self._unused: dict[str, Value] = {}
+        """Outputs of grasping probes without a bond."""
+        self._settled: list[tuple[bytes, ...]] = []
+        self._bonded: dict[str, BondPlan] = {}
+        self._surfaces: list[Surface] = []
+        self._at_start = False
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """The nodes of every organ; for every probe with fingers, the grasp."""
+        grasping = (name for name, probe in self.params.probes.items() if probe.grasp)
+        return *node_ports(self.params), *(port for name in grasping for port in grasp_ports(name))
+
+    @property
+    def bonds(self) -> tuple[BondSide, ...]:
+        """Every probe: a frame, or the centres of the probe's spheres."""
+        return tuple(self._bond(name) for name in self.params.probes)
+
+    def configure(self, setup: Setup) -> Outputs:
+        """Build the organs and let them settle.
+
+        Raises ScenarioError for unfit periods and for rigid parts.
+        """
+        self._check(setup.period_ns)
+        for name, organ in self.params.organs.items():
+            self._organs.append(Organ(name, organ))
+        for organ in self._organs:
+            organ.settle(self.params.gravity)
+        self._settled = [tuple(array.tobytes() for array in organ.state) for organ in self._organs]
+        self._sub_steps = max(organ.solid.sub_steps(setup.period_ns * 1e-9) for organ in self._organs)
+        if self.params.timestep is not None:
+            self._sub_steps = max(self._sub_steps, -(-setup.period_ns // self.params.timestep))
+        if any(self.params.has_series(name) for name in setup.bonds):
+            self._surfaces = [
+                Surface(organ, self.params.organs[organ.name].elastic) for organ in self._organs
+            ]
+        self._bonded = dict(setup.bonds)
+        return self._begin()
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
+        """Press the organs along the predicted motion; return the reactions, and the nodes when due."""
+        seconds, end = h * 1e-9, t + h
+        self._at_start = False
+        if self._probes:
+            path = np.concatenate([probe.begin(inputs, seconds) for probe in self._probes], axis=1)
+        else:
+            path = np.zeros((self._sub_steps + 1, 0, 3))
+        forces = np.zeros((self._sub_steps, path.shape[1], 3))
+        for organ in self._organs:
+            forces += organ.advance(seconds, path, self._radii, self.params.gravity)
+        if not np.isfinite(forces).all():
+            for organ in self._organs:
+                organ.sample(end)  # says which is unstable
+        due, touch = end % self.params.node_period == 0, end // CONTACT_PERIOD_NS != t // CONTACT_PERIOD_NS
+        if due or touch:
+            for organ in self._organs:
+                organ.sample(end)
+        outputs = (node_states(self._organs, end) if due else {}) | self._unused
+        for probe in self._probes:
+            outputs.update(probe.end(forces[:, probe.bodies], seconds))
+        if touch:
+            self._look()
+        for grasp in self._grasps:
+            grasp.update(end, looked=touch)
+            outputs.update(grasp.outputs)
+        return outputs
+
+    def state_hash(self) -> int:
+        """Return 64 bits of the displacements, and of the probes and grasps."""
+        keepers = (*self._probes, *self._grasps)
+        return state_hash(
+            *(part for keeper in keepers for part in keeper.state),
+            *(organ.solid.displacement.tobytes() for organ in self._organs),
+        )
+
+    def save(self) -> bytes:
+        """Return a mark of the start. Raises StateError later."""
+        if not self._at_start:
+            raise StateError(self._no_state)
+        return self._start_mark
+
+    def restore(self, state: bytes) -> None:
+        """Go back to the start, bit for bit; raises StateError for a state of other organs."""
+        if state != self._start_mark:
+            raise StateError(self._no_state)
+        for organ, settled in zip(self._organs, self._settled, strict=True):
+            for array, saved in zip(organ.state, settled, strict=True):
+                array[...] = np.frombuffer(saved, array.dtype).reshape(array.shape)
+            organ.passing = ()
+        self._begin()
+
+    def close(self) -> None:
+        """Forget the organs."""
+        for kept in (self._organs, self._probes, self._grasps, self._surfaces):
+            kept.clear()
+        self._at_start = False
+
+    def _begin(self) -> Outputs:
+        """Make the probes of the bonds beside the settled organs; return the outputs at time 0."""
+        self._probes.clear()
+        self._grasps.clear()
+        for organ in self._organs:
+            organ.sample(0)
+        outputs = node_states(self._organs, 0)
+        self._unused = {
+            port: value
+            for name, probe in self.params.probes.items()
+            if probe.grasp and name not in self._bonded
+            for port, value in nothing_held(name).items()
+        }
+        outputs.update(self._unused)
+        first = 0
+        for bond in self.bonds:
+            if plan := self._bonded.get(bond.name):
+                probe = Probe(self.params.probes[bond.name], bond, plan, first, self._sub_steps)
+                first += len(probe.radii)
+                self._probes.append(probe)
+                outputs.update(probe.idle)
+                if self.params.has_sub_grid(bond.name):
+                    probe.sub_grid = SubGrid(float(probe.radii[0]), RIGID, self._surfaces)
+                if grasp := self.params.probes[bond.name].grasp:
+                    self._grasps.append(Grasp(grasp, probe, self._organs, self._surfaces))
+                    outputs.update(self._grasps[-1].outputs)
+        self._radii = np.concatenate([np.zeros(0), *(probe.radii for probe in self._probes)])
+        self._at_start = True
+        return outputs
+
+    def _look(self) -> None:
+        """Find the faces near each probe; set what touches, and the laws of springs in series."""
+        for probe in self._probes:
+            loose = np.flatnonzero(~probe.held)
+            reach = np.maximum(probe.radii[loose] + BAND_M, probe.sight)
+            probe.near = [
+                near_faces(probe.positions[loose], reach, organ.nodes, organ.touchable)
+                for organ in self._organs
+            ]
+            probe.touching[:] = False
+            for near in probe.near:
+                probe.touching[loose[near.within(probe.radii[loose] + BAND_M).spheres]] = True
+            if probe.sub_grid is not None:
+                self._follow(probe, probe.sub_grid)
+
+    def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:
+        sub_grid.update(probe.positions[0], probe.forces[0], probe.near)
+        if sub_grid.is_beyond:
+            warn_once(
+                f"participant '{self.name}', probe '{probe.name}': it pressed deeper than {DEEPEST:g} radii,"
+                f" {DEEPEST * float(probe.radii[0]) * 1e3:.3g} mm, up to which the force of tissue is known;"
+                " beyond, it is extrapolated. Press less deep, or with a larger sphere"
+            )
+
+    def _bond(self, name: str) -> BondSide:
+        probe = self.params.probes[name]
+        return BondSide(
+            name=name,
+            side="force",
+            dof=6 if probe.spheres is None else 3,
+            points=probe.spheres or 1,
+            frame="world",
+            contact_stiffness=max(
+                organ.elastic.contact_stiffness(radius)
+                for organ in self.params.organs.values()
+                for radius in probe.radii.tolist()
+            ),
+        )
+
+    def _check(self, period_ns: int) -> None:
+        where = f"participant '{self.name}'"
+        if self.params.node_period % period_ns:
+            raise ScenarioError(
+                f"{where}: node_period {self.params.node_period} ns is no multiple of the period"
+                f" {period_ns} ns"
+            )
+        if self.params.rigid:
+            raise ScenarioError(
+                f"{where}: kind fem has no rigid parts yet ({', '.join(self.params.rigid)}); anchor the"
+                " organs to 'world', or take kind bullet"
+            )
+
+    @property
+    def _start_mark(self) -> bytes:
+        return state_hash(*(part for organ in self._settled for part in organ)).to_bytes(8, "little")
+
+    @property
+    def _no_state(self) -> str:
+        return (
+            f"participant '{self.name}': only the start can be saved, and restored with the same organs."
+            " Re-simulate from the recorded grants instead"
+        )

@@ -1,0 +1,20 @@
+"""Parameters of tissue in finite elements of our own."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from engines.tissue.params import PressedOrgansParams
+from schemas.quantity import Duration
+
+__all__ = ["FemParams"]
+
+
+class FemParams(PressedOrgansParams):
+    """Tissue in explicit dynamics."""
+
+    timestep: Duration | None = Field(
+        default=None,
+        ge=10_000,
+        description="longest sub-step; the mesh may need shorter ones, which the engine works out",
+    )

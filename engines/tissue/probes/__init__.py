@@ -1,0 +1,1 @@
+"""The probes pressing on and grasping tissue."""

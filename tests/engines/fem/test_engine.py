@@ -1,0 +1,179 @@
+"""Tissue of our own as an engine: forces of converged finite elements, grasps, starts, and sessions."""
+
+import json
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engines.bullet.params import BulletParams
+from engines.fem.engine import FemEngine
+from engines.fem.params import FemParams
+from hub.participant import Inputs, Setup
+from hub.testing import check_engine
+from schemas.errors import ScenarioError, SessionError, StateError
+from tests.engines.bullet.rig import IMPULSE
+from tests.engines.fem.rig import BLOCK, MS, FemRig, params
+
+CONVERGED = {
+    2e-3: [0.01856, 0.05525, 0.09744, 0.13861],
+    5e-3: [0.03176, 0.10143, 0.19358, 0.30134],
+}
+"""Force (N) of a sphere 1, 2, 3 and 4 mm deep in the middle of the block: bench/tissue_truth.json."""
+
+
+def middle(organ, place):
+    """Return the node, or the middle of a face, nearest to the middle of the block's top."""
+    top = organ.touchable[(organ.mesh.nodes[organ.touchable][:, :, 2] > -1e-9).all(axis=1)]
+    nodes = organ.mesh.nodes
+    found = nodes[np.unique(top)] if place == "node" else nodes[top].mean(axis=1)
+    return found[np.linalg.norm(found, axis=1).argmin()]
+
+
+@pytest.mark.parametrize("place", ["node", "face"])
+@pytest.mark.parametrize("radius", CONVERGED)
+def test_the_force_is_that_of_converged_elements(radius, place):
+    with FemRig(params({**BLOCK, "nodes": 250}, {"radius": radius}), start=(0.0, 0.0, 0.5)) as rig:
+        at = middle(rig.engine._organs[0], place)
+        rig.at[...] = at + np.array([0.0, 0.0, radius + 1e-3])
+        for depth, force in zip((1e-3, 2e-3, 3e-3, 4e-3), CONVERGED[radius], strict=True):
+            rig.move(at + np.array([0.0, 0.0, radius - depth]), 0.06)
+            rig.hold(0.2)
+            assert rig.force[2] == pytest.approx(force, rel=0.02)
+        assert np.std([wrench[2] for wrench in rig.wrenches[-50:]]) < 1e-4 * rig.force[2]
+
+
+def test_a_swinging_press_gives_back_no_more_than_it_took():
+    with FemRig(params({**BLOCK, "nodes": 250}), start=(0.0, 0.0, 6e-3)) as rig:
+        rig.move((0.0, 0.0, 2e-3), 0.1)
+        paid = sum(rig.power) * 1e-3
+        rig.follow(
+            lambda t: (
+                np.array([0.0, 0.0, 2e-3 + 1e-3 * np.sin(10.0 * np.pi * t)]),
+                np.array([0.0, 0.0, 0.01 * np.pi * np.cos(10.0 * np.pi * t)]),
+            ),
+            0.4,
+        )
+        rig.move((0.0, 0.0, 8e-3), 0.1)
+        assert paid > 1e-4
+        assert 0.0 < sum(rig.power) * 1e-3 < paid
+
+
+def test_an_organ_that_hangs_is_saved_and_restored_at_its_start():
+    with FemRig(params({**BLOCK, "nodes": 75}, node_period="1 ms"), start=(0.0, 0.0, 6e-3)) as rig:
+        start = rig.engine.save()
+        hashes = []
+        for _ in range(2):
+            rig.at[...], rig.t, rig.hashes = (0.0, 0.0, 6e-3), 0, []
+            rig.move((0.0, 0.0, 3e-3), 0.05)
+            hashes.append(rig.hashes)
+            with pytest.raises(StateError, match="only the start"):
+                rig.engine.save()
+            rig.engine.restore(start)
+        assert hashes[0] == hashes[1]
+
+
+@pytest.mark.parametrize("speed", [3.0, 30.0, 100.0])
+def test_a_sphere_shot_through_ends_with_a_word_or_not_at_all(speed):
+    """The speed of sound in this tissue is 5 m/s."""
+    with FemRig(params({**BLOCK, "nodes": 75}), start=(0.0, 0.0, 0.03)) as rig, suppress(SessionError):
+        rig.follow(
+            lambda t: (np.array([1e-3, 0.0, 0.03 - speed * t]), np.array([0.0, 0.0, -speed])), 0.06 / speed
+        )
+        rig.follow(lambda t: (np.array([0.0, 0.0, 0.1]), np.zeros(3)), 0.1)
+    assert np.isfinite(rig.wrenches).all()
+
+
+class Jaw:
+    """Two fingers of three spheres that point down, apart along x."""
+
+    def __init__(self, **grasp):
+        slab = {"size": ["60 mm", "40 mm", "12 mm"], "young_modulus": "10 kPa", "nodes": 150}
+        probe = {"spheres": 6, "radius": "2 mm", "grasp": grasp}
+        self.engine = FemEngine("tissue", params(slab, probe, node_period="1 ms"))
+        self.outputs = dict(self.engine.configure(Setup(MS, Path(), {"probe": IMPULSE})))
+        self.t, self.events = 0, []
+
+    def spheres(self, height, opening):
+        return np.array(
+            [[side * opening, 3e-3 * i, height] for side in (-1, 1) for i in (-1, 0, 1)], dtype=np.float64
+        )
+
+    def go(self, start, end, seconds=0.1):
+        """Move from one height and opening (m) to another."""
+        steps = round(seconds * 1e3)
+        one, other = self.spheres(*start), self.spheres(*end)
+        for i in range(steps):
+            place, velocity = one + (other - one) * i / steps, (other - one) / seconds
+            inputs = Inputs({"probe/position": place.ravel(), "probe/velocity": velocity.ravel()})
+            self.outputs |= self.engine.step(self.t, MS, inputs)
+            self.t += MS
+            self.events += [event.event for event in self.outputs["probe/events"]]
+        return self
+
+    def take(self):
+        return self.go((3e-3, 5e-3), ON_SLAB).go(ON_SLAB, CLOSED, 0.2)
+
+
+ON_SLAB, CLOSED, LIFTED = (0.5e-3, 5e-3), (0.5e-3, 2e-3), (4.5e-3, 2e-3)
+"""Height and half of the opening, m."""
+
+
+def test_fingers_take_tissue_lift_it_and_let_go():
+    jaw = Jaw().take()
+    assert jaw.events == ["grasped"]
+    before = jaw.outputs["probe/lift"][0]
+    jaw.go(CLOSED, LIFTED)
+    assert jaw.outputs["probe/lift"][0] - before == pytest.approx(4e-3, rel=0.02)
+    felt = jaw.outputs["probe/force"].reshape(6, 3).sum(axis=0)
+    assert 0.1 < -felt[2] < 3.0
+    np.testing.assert_allclose(jaw.outputs["probe/pull"], -felt, rtol=0.05, atol=5e-3)
+    jaw.go(LIFTED, (4.5e-3, 6e-3))
+    assert jaw.events == ["grasped", "released"]
+    jaw.go((8e-3, 6e-3), (8e-3, 6e-3), 0.3)
+    assert np.abs(jaw.engine._organs[0].solid.displacement[:, :3]).max() < 5e-4
+
+
+def test_tissue_that_is_pulled_too_hard_tears_loose():
+    jaw = Jaw(hold="0.3 N")
+    jaw.go((3e-3, 5e-3), (0.5e-3, 5e-3)).go((0.5e-3, 5e-3), (0.5e-3, 2e-3), 0.2).go(
+        (0.5e-3, 2e-3), (12e-3, 2e-3)
+    )
+    assert jaw.events == ["grasped", "torn"]
+
+
+def test_it_keeps_the_contract_of_engines():
+    model = params({**BLOCK, "nodes": 75})
+    inputs = {"probe/pose": [0, 0, 5.2e-3, 0, 0, 0, 1], "probe/twist": [0.001, 0, -0.02, 0, 0, 0]}
+    check_engine(lambda: FemEngine("tissue", model), period_ns=4 * MS, inputs=inputs)
+
+
+def test_what_is_not_there_yet_is_said():
+    model = params(rigid={"bed": {"box": ["1 m", "1 m", "1 cm"]}})
+    with pytest.raises(ScenarioError, match="no rigid parts yet"):
+        FemEngine("tissue", model).configure(Setup(MS, Path(), {}))
+    with pytest.raises(ScenarioError, match="node_period"):
+        FemEngine("tissue", params(node_period="1.5 ms")).configure(Setup(MS, Path(), {}))
+
+
+def test_parameters_are_those_of_bullet_but_for_its_own():
+    shared = FemParams.model_fields.keys()
+    assert BulletParams.model_fields.keys() - shared == {"standstill"}
+
+
+def test_a_palpation_with_it_is_recorded_and_verified(tmp_path):
+    recording = str(tmp_path / "press")
+    options = ["--set", "participants.tissue.kind=fem", "--set", "duration=1.2 s", "--record", recording]
+    command_line("run", "palpation", "--json", *options)
+    assert command_line("verify", recording, "--json")["same"]
+
+
+def command_line(*arguments):
+    """Return what a command answers in JSON."""
+    command = [sys.executable, "-P", "-m", "hub.command_line", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert not done.returncode, done.stderr
+    return json.loads(done.stdout)
