@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import accumulate
 from typing import ClassVar
 
 import numpy as np
@@ -35,13 +37,11 @@ class FemEngine(Stepped):
         super().__init__(name, params)
         self._organs: list[Organ] = []
         self._probes: list[Probe] = []
-        self._grasps: list[Grasp] = []
+        self._grasps: list[tuple[Grasp, Probe]] = []
         self._unused: dict[str, Value] = {}
         """Outputs of grasping probes without a bond."""
-        self._settled: list[tuple[bytes, ...]] = []
         self._bonded: dict[str, BondPlan] = {}
         self._surfaces: list[Surface] = []
-        self._at_start = False
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -64,7 +64,6 @@ class FemEngine(Stepped):
             self._organs.append(Organ(name, organ))
         for organ in self._organs:
             organ.settle(self.params.gravity)
-        self._settled = [tuple(array.tobytes() for array in organ.state) for organ in self._organs]
         self._sub_steps = max(organ.solid.sub_steps(setup.period_ns * 1e-9) for organ in self._organs)
         if self.params.timestep is not None:
             self._sub_steps = max(self._sub_steps, -(-setup.period_ns // self.params.timestep))
@@ -78,7 +77,6 @@ class FemEngine(Stepped):
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Press the organs along the predicted motion; return the reactions, and the nodes when due."""
         seconds, end = h * 1e-9, t + h
-        self._at_start = False
         if self._probes:
             path = np.concatenate([probe.begin(inputs, seconds) for probe in self._probes], axis=1)
         else:
@@ -98,47 +96,61 @@ class FemEngine(Stepped):
             outputs.update(probe.end(forces[:, probe.bodies], seconds))
         if touch:
             self._look()
-        for grasp in self._grasps:
+        for grasp, _ in self._grasps:
             grasp.update(end, looked=touch)
             outputs.update(grasp.outputs)
         return outputs
 
     def state_hash(self) -> int:
         """Return 64 bits of the displacements, and of the probes and grasps."""
-        keepers = (*self._probes, *self._grasps)
         return state_hash(
-            *(part for keeper in keepers for part in keeper.state),
+            *(probe.numbers for probe in self._probes),
+            *(grasp.numbers for grasp, _ in self._grasps),
             *(organ.solid.displacement.tobytes() for organ in self._organs),
         )
 
     def save(self) -> bytes:
-        """Return a mark of the start. Raises StateError later."""
-        if not self._at_start:
-            raise StateError(self._no_state)
-        return self._start_mark
+        """Return the bytes of all arrays, organs first."""
+        return b"".join(self._parts())
 
     def restore(self, state: bytes) -> None:
-        """Go back to the start, bit for bit; raises StateError for a state of other organs."""
-        if state != self._start_mark:
-            raise StateError(self._no_state)
-        for organ, settled in zip(self._organs, self._settled, strict=True):
-            for array, saved in zip(organ.state, settled, strict=True):
-                array[...] = np.frombuffer(saved, array.dtype).reshape(array.shape)
-            organ.passing = ()
-        self._begin()
+        """Go back to a saved state, bit for bit.
+
+        Raises StateError for the state of other organs or probes.
+        """
+        sizes = [len(part) for part in self._parts()]
+        if len(state) != sum(sizes):
+            raise StateError(
+                f"participant '{self.name}': a saved state of {len(state)} bytes, expected {sum(sizes)}; was"
+                " it saved elsewhere?"
+            )
+        ends = accumulate(sizes)
+        parts = iter([state[end - size : end] for size, end in zip(sizes, ends, strict=True)])
+        for organ in self._organs:
+            for array in organ.state:
+                array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
+        for probe in self._probes:
+            probe.numbers = np.frombuffer(next(parts))
+        for grasp, probe in self._grasps:
+            held = ((organ, organ.held_by(probe.bodies)) for organ in self._organs)
+            grasp.resume(
+                np.frombuffer(next(parts)), [(organ, nodes, nodes) for organ, nodes in held if nodes]
+            )
+
+    def _parts(self) -> Iterator[bytes]:
+        """Yield the parts of a saved state in order."""
+        for organ in self._organs:
+            yield from (array.tobytes() for array in organ.state)
+        yield from (probe.numbers.tobytes() for probe in self._probes)
+        yield from (grasp.numbers.tobytes() for grasp, _ in self._grasps)
 
     def close(self) -> None:
         """Forget the organs."""
         for kept in (self._organs, self._probes, self._grasps, self._surfaces):
             kept.clear()
-        self._at_start = False
 
     def _begin(self) -> Outputs:
         """Make the probes of the bonds beside the settled organs; return the outputs at time 0."""
-        self._probes.clear()
-        self._grasps.clear()
-        for organ in self._organs:
-            organ.sample(0)
         outputs = node_states(self._organs, 0)
         self._unused = {
             port: value
@@ -157,10 +169,11 @@ class FemEngine(Stepped):
                 if self.params.has_sub_grid(bond.name):
                     probe.sub_grid = SubGrid(float(probe.radii[0]), RIGID, self._surfaces)
                 if grasp := self.params.probes[bond.name].grasp:
-                    self._grasps.append(Grasp(grasp, probe, self._organs, self._surfaces))
-                    outputs.update(self._grasps[-1].outputs)
+                    self._grasps.append((Grasp(grasp, probe, self._organs, self._surfaces), probe))
+                    outputs.update(nothing_held(bond.name))
         self._radii = np.concatenate([np.zeros(0), *(probe.radii for probe in self._probes)])
-        self._at_start = True
+        for organ in self._organs:
+            organ.meet(len(self._radii))
         return outputs
 
     def _look(self) -> None:
@@ -214,14 +227,3 @@ class FemEngine(Stepped):
                 f"{where}: kind fem has no rigid parts yet ({', '.join(self.params.rigid)}); anchor the"
                 " organs to 'world', or take kind bullet"
             )
-
-    @property
-    def _start_mark(self) -> bytes:
-        return state_hash(*(part for organ in self._settled for part in organ)).to_bytes(8, "little")
-
-    @property
-    def _no_state(self) -> str:
-        return (
-            f"participant '{self.name}': only the start can be saved, and restored with the same organs."
-            " Re-simulate from the recorded grants instead"
-        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ class Organ:
         self.solid = Solid(self.mesh, self.anchored, self.touchable, params.elastic, branches)
         self._inverse_mass = self.solid.inverse_mass.copy()
         self._slowest = params.frequencies[1]
-        self._passing = set[int]()
+        self._free = np.ones(0, np.uint8)
         self._reach = float(np.linalg.norm(np.ptp(self.mesh.nodes, axis=0)))
         self.nodes: Vector = self.mesh.nodes
 
@@ -68,9 +68,7 @@ class Organ:
 
         path: centres at the ends of the sub-steps, m, shape (k + 1, n, 3).
         """
-        free = np.ones(len(radii), np.uint8)
-        free[list(self._passing)] = 0
-        return self.solid.advance(seconds, SphereWay(path, radii, free), self.friction, gravity)
+        return self.solid.advance(seconds, SphereWay(path, radii, self._free), self.friction, gravity)
 
     def sample(self, time_ns: int) -> None:
         """Read the nodes. Raises SessionError if the tissue has become unstable by `time_ns`."""
@@ -96,18 +94,17 @@ class Organ:
 
     def let_touch(self, body: int, *, on: bool) -> None:
         """Let a sphere press the organ, or pass through."""
-        (self._passing.discard if on else self._passing.add)(body)
+        self._free[body] = on
+
+    def meet(self, spheres: int) -> None:
+        """Forget all spheres, and let so many press the organ."""
+        self._free = np.ones(spheres, np.uint8)
+
+    def held_by(self, bodies: Collection[int]) -> list[int]:
+        """Return the nodes that these spheres hold."""
+        return np.flatnonzero(np.isin(self.solid.holder, list(bodies))).tolist()
 
     @property
-    def state(self) -> tuple[NDArray[np.float32] | NDArray[np.int32], ...]:
-        """Arrays that the next step depends on, beside the spheres that pass through."""
-        return *self.solid.state, self.solid.holder, self.solid.inverse_mass
-
-    @property
-    def passing(self) -> tuple[int, ...]:
-        """Spheres that pass through the organ."""
-        return tuple(sorted(self._passing))
-
-    @passing.setter
-    def passing(self, spheres: Iterable[int]) -> None:
-        self._passing = set(spheres)
+    def state(self) -> tuple[NDArray[np.float32] | NDArray[np.int32] | NDArray[np.uint8], ...]:
+        """Arrays that the next step depends on, to be written."""
+        return *self.solid.state, self.solid.holder, self.solid.inverse_mass, self._free

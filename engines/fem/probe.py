@@ -48,7 +48,8 @@ class Probe:
         self._offsets: Vector = np.zeros((n, 3))
         """Yield of the springs in series, m, shape (n, 3)."""
         self._velocity: Vector = np.zeros((n, 3))
-        self._compliance: Vector | None = None
+        self._compliance: Vector = np.zeros((3, 3))
+        self._is_soft = False
         self._at_start = True
 
     @property
@@ -64,13 +65,13 @@ class Probe:
     def hold(self, spheres: NDArray[np.int64], *, held: bool) -> None:
         """Mark spheres as holding tissue or not; a spring in series goes with what is let go."""
         self.held[spheres] = held
-        if not held:
-            self._compliance = None
+        self._is_soft &= held
 
     def soften(self, spheres: NDArray[np.int64], compliance: Vector) -> None:  # noqa: ARG002
         """Put a spring of `compliance` (m/N, shape (3, 3)) in series with the pull of the held spheres."""
         values, axes = np.linalg.eigh(compliance)
         self._compliance = (axes * np.maximum(values, 0.0)) @ axes.T
+        self._is_soft = True
 
     def begin(self, inputs: Inputs, seconds: float) -> Vector:
         """Return the ways of the spheres in a step of `seconds`, m, in `world`, shape (k + 1, n, 3)."""
@@ -108,21 +109,37 @@ class Probe:
         return {self._side.force_port: np.zeros(self._size), self._side.work_port: np.zeros(1)}
 
     @property
-    def state(self) -> tuple[Vector, ...]:
-        """Numbers that the next step depends on."""
+    def numbers(self) -> Vector:
+        """Everything that the next step depends on, to be set again."""
         own = (
-            self.targets,
-            self.positions,
-            self._forces,
-            self._offsets,
-            self._velocity,
-            self.held.astype(np.float64),
-            self.touching.astype(np.float64),
-            np.zeros((3, 3)) if self._compliance is None else self._compliance,
-            np.array([float(self._at_start)]),
+            self.targets.ravel(),
+            self.positions.ravel(),
+            self._forces.ravel(),
+            self._offsets.ravel(),
+            self._velocity.ravel(),
+            self.held,
+            self.touching,
+            self._compliance.ravel(),
+            np.array([self._is_soft, self._at_start]),
             self._side.state,
+            np.zeros(0) if self.sub_grid is None else self.sub_grid.numbers,
         )
-        return own if self.sub_grid is None else (*own, self.sub_grid.state)
+        return np.concatenate(own, dtype=np.float64)
+
+    @numbers.setter
+    def numbers(self, numbers: Vector) -> None:
+        n, side = len(self.radii), len(self._side.state)
+        at = np.cumsum([3 * n] * 5 + [n, n, 9, 2, side])
+        parts = np.split(numbers.copy(), at)
+        self.targets, self.positions, self._forces, self._offsets, self._velocity = (
+            part.reshape(n, 3) for part in parts[:5]
+        )
+        self.held, self.touching = parts[5] > 0.0, parts[6] > 0.0
+        self._compliance = parts[7].reshape(3, 3)
+        self._is_soft, self._at_start = (parts[8] > 0.0).tolist()
+        self._side.state = parts[9]
+        if self.sub_grid is not None:
+            self.sub_grid.numbers = parts[10]
 
     def _yielded(self, seconds: float) -> Vector:
         """Return how far the springs in series yield at the end of the next step, m, shape (n, 3)."""
@@ -130,7 +147,7 @@ class Probe:
         if self.sub_grid is not None:
             self.sub_grid.follow(float(self._forces[0] @ self.sub_grid.inward), rate)
             return (self.sub_grid.yielded * self.sub_grid.inward)[None]
-        if self._compliance is not None:
+        if self._is_soft:
             wanted = self._compliance @ self._forces[self.held].sum(axis=0)
             offsets = self._offsets.copy()
             offsets[self.held] += rate * (wanted - offsets[self.held]) * _HELD_LOOP

@@ -184,6 +184,21 @@ class Grasp:
             *(hold.nodes.astype(np.float64) for hold in self._holds),
         )
 
+    @property
+    def numbers(self) -> Vector:
+        """Spread, pull and lift, to be set by `resume`, shape (5,)."""
+        return np.concatenate([[self._widest], self._pull, self._lift])
+
+    def resume(self, numbers: Vector, ties: Sequence[tuple[GraspedOrgan, list[int], list[int]]]) -> None:
+        """Go on as saved, with the tied nodes and the ties of organs, which exist already."""
+        self._widest, self._pull[:], self._lift[:] = float(numbers[0]), numbers[1:4], numbers[4:]
+        rest = {organ.name: heights for organ, heights in zip(self._organs, self._rest, strict=True)}
+        self._holds = [
+            _Hold(organ, np.array(nodes, np.int64), anchors, rest[organ.name][nodes])
+            for organ, nodes, anchors in ties
+        ]
+        self._write_outputs(())
+
     def _finger_spread(self) -> float:
         """Return the mean distance (m) of the middles of the instrument's fingers from the middle of all."""
         middles = self._probe.targets[self._spheres].mean(axis=1)  # (fingers, 3)

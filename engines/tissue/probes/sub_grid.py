@@ -112,6 +112,24 @@ class SubGrid:
         last = self._forces[-1], self._yields[-1]
         return np.array([self.yielded, self._speed, *self.inward, self.ratio, *last])
 
+    @property
+    def numbers(self) -> Vector:
+        """Everything that the next step depends on, to be set again, shape (10 + 3 `_GRID`,)."""
+        flags = float(self._is_new), float(self.is_beyond), float(len(self._forces) == _GRID)
+        law = np.zeros((3, _GRID))
+        law[:, : len(self._forces)] = self._forces, self._yields, self._mesh_yields
+        return np.array(
+            [self.yielded, self._speed, *self.inward, self.ratio, self._rim, *flags, *law.ravel()]
+        )
+
+    @numbers.setter
+    def numbers(self, numbers: Vector) -> None:
+        self.yielded, self._speed, self.ratio, self._rim = numbers[[0, 1, 5, 6]].tolist()
+        self.inward = numbers[2:5].copy()
+        self._is_new, self.is_beyond, has_law = (bool(flag) for flag in numbers[7:10].tolist())
+        law = numbers[10:].reshape(3, _GRID)[:, : _GRID if has_law else 1].copy()
+        self._forces, self._yields, self._mesh_yields = law
+
     def give_way(self, spring: Vector, damper: Vector, since: float, *, keep: bool) -> None:
         """Reduce the forces (N, shape (3,)) of a rigid coupling by the yield of the spring in series.
 
