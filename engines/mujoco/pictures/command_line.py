@@ -18,7 +18,7 @@ __all__ = ["film_app", "render_app"]
 
 render_app, film_app = typer.Typer(), typer.Typer()
 
-_MOST_PIXELS = 2048
+_MOST_PIXELS = 4096
 
 Recorded = Annotated[
     Path,

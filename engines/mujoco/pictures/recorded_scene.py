@@ -173,7 +173,10 @@ class RecordedScene:
         # a default that is stated may be refused
         stated = self._params.model_dump(include=set(SceneParams.model_fields), exclude_unset=True)
         looks = {"looks": True, "skins": {name: self._looks.get(name, {}) for name in bodies}}
-        params = EndoscopeParams.model_validate(stated | looks | dict(shown), context=self._files.context)
+        size = {"width": shown["width"], "height": shown["height"]}
+        others = {name: value for name, value in shown.items() if name not in size}
+        params = EndoscopeParams.model_validate(stated | looks | others, context=self._files.context)
+        params = params.model_copy(update=size)  # a file may be larger than a message
         positions = _Newest(self._recording, self._qpos)
         nodes = {name: _Newest(self._recording, self._nodes[name]) for name in bodies}
         markers = [_Newest(self._recording, topic) for topic in self._markers]

@@ -202,13 +202,20 @@ def test_bad_usage_of_film_is_refused(
     [
         (["-o", "moment.bmp"], ".png or .jpg"),
         (["-o", "moment.png", "--from", "1,2"], "write x,y,z"),
-        (["-o", "moment.png", "--width", "5000"], "2048"),
+        (["-o", "moment.png", "--width", "5000"], "4096"),
     ],
 )
 def test_bad_usage_is_refused(recordings: dict[str, Recording], arguments: list[str], problem: str) -> None:
     done = CliRunner().invoke(render_app, [str(recordings["tissue"].file), *arguments])
     assert done.exit_code == 2
     assert problem in done.output
+
+
+def test_a_picture_may_be_larger_than_that_of_a_message(recordings: dict[str, Recording]) -> None:
+    if not (found := opengl.find()).name:
+        pytest.skip(f"no OpenGL: {found.detail}")
+    picture = RecordedScene(recordings["tissue"]).picture(0, camera="left", size=(4096, 16))
+    assert picture.shape == (16, 4096, 3)
 
 
 def test_a_recording_without_a_scene_is_refused(recordings: dict[str, Recording]) -> None:
