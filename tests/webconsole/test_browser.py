@@ -478,6 +478,7 @@ class Looker:
 def test_a_viewer_who_looks_at_the_past_leaves_the_leading_page_in_the_present(session):
     """The viewer moves through the past as fast as it may; the other page leads on, and sees the present."""
     _, invite = session
+    readings = []
 
     async def opened(stack, role):
         host, path = re.fullmatch(r"http://([^/]+)(/.*)", await asyncio.to_thread(invite, role)).groups()
@@ -488,12 +489,15 @@ def test_a_viewer_who_looks_at_the_past_leaves_the_leading_page_in_the_present(s
                 connect(url, additional_headers=headers, origin=None, max_size=None)
             )
         )
-        reading = asyncio.create_task(page.read())
-        stack.callback(reading.cancel)
+        readings.append(asyncio.create_task(page.read()))
+        stack.callback(readings[-1].cancel)
         return page
 
     async def true(condition):
         while not condition():
+            for reading in readings:
+                if reading.done():
+                    reading.result()  # says why a page hears no more
             await asyncio.sleep(0.01)
 
     async def body():

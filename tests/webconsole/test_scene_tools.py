@@ -11,7 +11,7 @@ from schemas.files import Files
 from tests.waiting import until
 from tests.webconsole.conftest import served
 from tests.webconsole.recorded_scene import write_scene
-from tests.webconsole.test_browser import LED, Person, running
+from tests.webconsole.test_browser import Person, running
 from webconsole.drag import dragged_tips
 from webconsole.recorded import Recorded
 
@@ -195,8 +195,11 @@ def test_it_is_said_why_no_tip_can_be_dragged():
         tips, reasons = dragged_tips(file.scenario, params.validate_last)
         return json.dumps([tip._asdict() for tip in tips]), reasons
 
-    assert of("browser") == (json.dumps([{"device": LED[0]["device"], "arm": "PSM1", "view": "base"}]), ())
-    tips, (reason,) = of("browser", "participants.teleop.engage=released")
-    assert (tips, "engage: held" in reason) == ("[]", True)
+    right, left = (
+        {"device": name, "arm": arm, "view": "camera"} for name, arm in (("right", "PSM1"), ("left", "PSM2"))
+    )
+    assert of("browser") == (json.dumps([right, left]), ())
+    tips, (reason,) = of("browser", "participants.right_hand.engage=released")
+    assert (tips, "engage: held" in reason) == (json.dumps([left]), True)
     tips, (reason,) = of("palpation")
     assert (tips, "no device of this session is led from a page" in reason) == ("[]", True)

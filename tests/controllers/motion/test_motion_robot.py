@@ -65,7 +65,8 @@ class Bench:
                 for said in heard
             ]
             for name in self.arms.values:
-                self.arms.set(name, self.told[f"drive/{name}"])
+                if (port := f"drive/{name}") in self.told:  # gravity keeps its start value
+                    self.arms.set(name, self.told[port])
             self.arms.step()
         return self.position("PSM1") if "PSM1/measured_js" in self.sensed else None
 

@@ -124,7 +124,7 @@ def test_the_arm_holds_in_an_outage_and_continues_after_it(prepare):
 
 
 def test_on_the_command_line(prepare, monkeypatch, capfd):
-    monkeypatch.setenv("COLUMNS", "160")
+    monkeypatch.setenv("COLUMNS", "300")
     session = prepare(SCENARIO)
     seen = []
 
