@@ -504,8 +504,9 @@ def test_a_viewer_who_looks_at_the_past_leaves_the_leading_page_in_the_present(s
         async with asyncio.timeout(100), AsyncExitStack() as stack:
             leader, viewer = await opened(stack, "operator"), await opened(stack, "viewer")
             await true(lambda: leader.state["pilots"])  # the device takes part once the scene is made
-            await leader.send(do="lead", device="hand")
-            await true(lambda: leader.state["pilots"] == LED and viewer.state.get("end", 0.0) > 1.0)
+            await true(lambda: viewer.state.get("end", 0.0) > 1.0)
+            await leader.send(do="lead", device="hand")  # the lead of a silent page ends after 3 s
+            await true(lambda: leader.state["pilots"] == LED)
             seen, number = len(leader.times), 0
             while leader.times[-1] < leader.times[seen - 1] + 500_000_000 or number < 300:
                 await viewer.send(do="at", time=0.2 + number % 80 / 100)
