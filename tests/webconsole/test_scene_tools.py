@@ -11,7 +11,7 @@ from schemas.files import Files
 from tests.waiting import until
 from tests.webconsole.conftest import served
 from tests.webconsole.recorded_scene import write_scene
-from tests.webconsole.test_browser import Person, running
+from tests.webconsole.test_browser import LED_ARM, Person, running
 from webconsole.drag import dragged_tips
 from webconsole.recorded import Recorded
 
@@ -140,7 +140,7 @@ def test_nothing_is_wider_than_a_phone(person):
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     hub = tmp_path_factory.mktemp("hub")
-    with running(hub, "browser", "--set", "step=5 ms") as session:
+    with running(hub, str(LED_ARM)) as session:
         yield session
 
 
