@@ -11,12 +11,11 @@ from engines.bullet.params import BulletParams
 from engines.bullet.probes.contact_gain import Contacts, Tissue
 from engines.bullet.probes.probe import Probe
 from engines.bullet.world import add_rigid, connect, disconnect
-from engines.tissue.elasticity.half_space import DEEPEST
 from engines.tissue.ports import node_ports, node_states
 from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
 from engines.tissue.probes.near_faces import CONTACT_PERIOD_NS
 from engines.tissue.probes.params import Coupling, ProbeParams
-from engines.tissue.probes.sub_grid import SubGrid, Surface
+from engines.tissue.probes.sub_grid import SubGrid, Surface, warn_beyond
 from engines.tissue.warn_once import warn_once
 from hub.participant import (
     BondPlan,
@@ -258,22 +257,10 @@ class BulletEngine(Stepped):
     def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:
         sub_grid.update(probe.positions[0], probe.forces[0], probe.near)
         if sub_grid.is_beyond:
-            warn_once(
-                f"participant '{self.name}', probe '{probe.name}': it pressed deeper than {DEEPEST:g} radii,"
-                f" {DEEPEST * float(probe.radii[0]) * 1e3:.3g} mm, up to which the force of tissue is known;"
-                " beyond, it is extrapolated. Press less deep, or with a larger sphere"
-            )
+            warn_beyond(self.name, probe.name, float(probe.radii[0]))
 
     def _tissue(self, organ: Organ) -> Tissue:
         return Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity)
-
-    def _contact_stiffness(self, probe: ProbeParams) -> float:
-        """Return the largest contact stiffness (N/m) of the probe's spheres."""
-        return max(
-            organ.contact_stiffness(radius)
-            for organ in self.params.organs.values()
-            for radius in probe.radii.tolist()
-        )
 
     def _coupling(self, probe: str) -> Coupling:
         params, timestep = self.params.probes[probe], self.params.sub_step * 1e-9
@@ -282,7 +269,7 @@ class BulletEngine(Stepped):
         if self.params.has_sub_grid(probe):
             stiffest = max(material.contact_stiffness(float(params.radii[0])) for material in organs)
             return params.coupling(stiffest, damping, timestep, sub_grid=True)
-        return params.coupling(self._contact_stiffness(params), damping, timestep)
+        return params.coupling(self.params.contact_stiffness(probe), damping, timestep)
 
     def _bond(self, name: str, probe: ProbeParams) -> BondSide:
         coupling = self._coupling(name)
@@ -297,7 +284,7 @@ class BulletEngine(Stepped):
             proxy_mass=coupling.mass,
             proxy_step=self.params.sub_step * 1e-9,
             contact_stiffness=(
-                coupling.stiffness if self.params.has_sub_grid(name) else self._contact_stiffness(probe)
+                coupling.stiffness if self.params.has_sub_grid(name) else self.params.contact_stiffness(name)
             ),
         )
 

@@ -89,7 +89,7 @@ int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_step
 /* Fill in the contact of a face with a sphere at `centre`; return whether there is one. */
 static int touch(const Body *body, const int32_t *node, const double *centre, float radius, Contact *contact)
 {
-    float x[3][3], normal[3], side = 0.0f, away[3], inverse = 0.0f;
+    float x[3][3], normal[3], away[3], inverse = 0.0f;
     for (int a = 0; a < 3; a++)
         for (int i = 0; i < 3; i++)
             x[a][i] = (float)((double)body->rest[4 * node[a] + i] - centre[i]) + body->displacement[4 * node[a] + i];
@@ -103,7 +103,7 @@ static int touch(const Body *body, const int32_t *node, const double *centre, fl
     float distance = sqrtf(dot(away, away));
     if (!(distance < radius + AHEAD) || distance < SAME_POINT)
         return 0;
-    side = dot(away, normal) > 0.0f ? -1.0f : 1.0f; /* -1: the centre is behind the face */
+    float side = dot(away, normal) > 0.0f ? -1.0f : 1.0f; /* -1: the centre is behind the face */
     if (side < 0.0f && distance > DEEPEST * radius)
         return 0; /* a face of the far side */
     for (int a = 0; a < 3; a++)
@@ -162,9 +162,8 @@ static void resolve(const Body *body, Contact *contact, const float moving[3], f
     }
 }
 
-/* Let a sphere push the body on its way from one place of its path to the next; write the force on the sphere.
-Return the number of contacts. */
-int press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count)
+/* Let a sphere push the body on its way from one place of its path to the next; write the force on the sphere. */
+void press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count)
 {
     Contact contacts[MOST_CONTACTS];
     const double *here = spheres->path + 3 * (sub_step * spheres->count + sphere), *next = here + 3 * spheres->count;
@@ -183,5 +182,4 @@ int press(const Body *body, const Spheres *spheres, int sphere, int sub_step, fl
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < found; k++)
             force[i] -= (double)(contacts[k].pushed * contacts[k].normal[i] + contacts[k].rubbed[i]) / (double)seconds;
-    return found;
 }

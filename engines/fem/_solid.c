@@ -102,7 +102,7 @@ static PyObject *advance(Solid *self, PyObject *args)
     Py_RETURN_NONE;
 }
 
-PyDoc_STRVAR(settle_forces_doc, "forces(seconds)\n--\n\nSet the forces of the elements on the nodes, N; viscous strains \
+PyDoc_STRVAR(forces_doc, "forces(seconds)\n--\n\nSet the forces of the elements on the nodes, N; viscous strains \
 advance by `seconds`.");
 
 static PyObject *forces(Solid *self, PyObject *seconds)
@@ -167,7 +167,7 @@ static void finish(Solid *self)
 
 static PyMethodDef methods[] = {
     {"advance", (PyCFunction)advance, METH_VARARGS, advance_doc},
-    {"forces", (PyCFunction)forces, METH_O, settle_forces_doc},
+    {"forces", (PyCFunction)forces, METH_O, forces_doc},
     {NULL, NULL, 0, NULL},
 };
 

@@ -43,5 +43,5 @@ typedef struct {
 } Spheres;
 
 void elastic_forces(const Body *body, float seconds);
-int press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count);
+void press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count);
 int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_steps, int *near, int most);

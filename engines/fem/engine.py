@@ -11,12 +11,10 @@ import numpy as np
 from engines.fem.organ import Organ
 from engines.fem.params import FemParams
 from engines.fem.probe import RIGID, Probe
-from engines.tissue.elasticity.half_space import DEEPEST
 from engines.tissue.ports import node_ports, node_states
 from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
 from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, near_faces
-from engines.tissue.probes.sub_grid import SubGrid, Surface
-from engines.tissue.warn_once import warn_once
+from engines.tissue.probes.sub_grid import SubGrid, Surface, warn_beyond
 from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port
@@ -194,11 +192,7 @@ class FemEngine(Stepped):
     def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:
         sub_grid.update(probe.positions[0], probe.forces[0], probe.near)
         if sub_grid.is_beyond:
-            warn_once(
-                f"participant '{self.name}', probe '{probe.name}': it pressed deeper than {DEEPEST:g} radii,"
-                f" {DEEPEST * float(probe.radii[0]) * 1e3:.3g} mm, up to which the force of tissue is known;"
-                " beyond, it is extrapolated. Press less deep, or with a larger sphere"
-            )
+            warn_beyond(self.name, probe.name, float(probe.radii[0]))
 
     def _bond(self, name: str) -> BondSide:
         probe = self.params.probes[name]
@@ -208,11 +202,7 @@ class FemEngine(Stepped):
             dof=6 if probe.spheres is None else 3,
             points=probe.spheres or 1,
             frame="world",
-            contact_stiffness=max(
-                organ.elastic.contact_stiffness(radius)
-                for organ in self.params.organs.values()
-                for radius in probe.radii.tolist()
-            ),
+            contact_stiffness=self.params.contact_stiffness(name),
         )
 
     def _check(self, period_ns: int) -> None:

@@ -48,6 +48,14 @@ class PressedOrgansParams(TissueParams):
         """The organs at rest."""
         return {name: Surface(organ.rest.nodes, organ.rest.triangles) for name, organ in self.organs.items()}
 
+    def contact_stiffness(self, probe: str) -> float:
+        """Return the largest contact stiffness (N/m) of a probe's spheres on the organs' meshes."""
+        return max(
+            organ.contact_stiffness(radius)
+            for organ in self.organs.values()
+            for radius in self.probes[probe].radii.tolist()
+        )
+
     def has_sub_grid(self, probe: str) -> bool:
         """Return whether a probe of a single sphere feels the tissue's own force on every organ."""
         given = self.probes[probe]

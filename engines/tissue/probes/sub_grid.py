@@ -23,9 +23,10 @@ from engines.tissue.meshing.tet_mesh import Indices
 from engines.tissue.organs.body import Body
 from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, closest_points
 from engines.tissue.probes.params import Coupling
+from engines.tissue.warn_once import warn_once
 from schemas.vectors import Vector
 
-__all__ = ["SubGrid", "Surface"]
+__all__ = ["SubGrid", "Surface", "warn_beyond"]
 
 _GRID = 160
 """Number of points of the spring's law, dense at small forces with a steep law."""
@@ -276,6 +277,15 @@ class SubGrid:
             -normal / np.sqrt(normal @ normal),
             float(distances.min()),
         )
+
+
+def warn_beyond(participant: str, probe: str, radius: float) -> None:
+    """Warn once that a probe's sphere of `radius` (m) went deeper than the law is known."""
+    warn_once(
+        f"participant '{participant}', probe '{probe}': it pressed deeper than {DEEPEST:g} radii,"
+        f" {DEEPEST * radius * 1e3:.3g} mm, up to which the force of tissue is known;"
+        " beyond, it is extrapolated. Press less deep, or with a larger sphere"
+    )
 
 
 def _summed(numbers: Indices, parts: Vector, count: int) -> Vector:
