@@ -94,7 +94,7 @@ class Gateway(Device):
         """Whether programs have subscribed, or have ceased to."""
         self._events: dict[str, EventTopic] = {}
         self._arbiters: defaultdict[str, CommandArbiter] = defaultdict(
-            lambda: CommandArbiter(self._is_connected)
+            lambda: CommandArbiter(self._present_name)
         )
         self._refusals = RefusalReports(self.name, self._publish_text)
         self._refused_moves = RefusedMoves(self._publish)
@@ -185,8 +185,8 @@ class Gateway(Device):
             self._received.append(Sample(row.port.name, message))
             self._is_new.set()
 
-    def _is_connected(self, client: str) -> bool:
-        return self._transport is not None and self._transport.is_connected(client)
+    def _present_name(self, client: str) -> str | None:
+        return None if self._transport is None else self._transport.present_name(client)
 
     def _refuse(self, row: Row, level: str, reason: str) -> None:
         self._refusals.report(row, level, reason)

@@ -106,9 +106,12 @@ class Transport(ABC):
     def announce_ready(self) -> None:  # noqa: B027 - a middleware may have no use for it
         """Note that all rows are advertised, subscribed to or served."""
 
-    def is_connected(self, client: str) -> bool:  # noqa: ARG002
-        """Return whether a program is still there; a middleware without this knowledge returns True."""
-        return True
+    def present_name(self, client: str) -> str | None:
+        """Return the present name of a program once named `client`; None: the program has left.
+
+        A middleware without this knowledge returns the name.
+        """
+        return client
 
     @abstractmethod
     def close(self) -> None:

@@ -20,9 +20,9 @@ _KEPT_NS = 1_000_000_000
 class CommandArbiter:
     """Grants an arm to one program at a time; for use from any thread."""
 
-    def __init__(self, is_connected: Callable[[str], bool] = lambda _: True) -> None:
-        """`is_connected`: returns whether a program is still there."""
-        self._is_connected = is_connected
+    def __init__(self, present_name: Callable[[str], str | None] = lambda name: name) -> None:
+        """`present_name`: returns the present name of a program; None: the program has left."""
+        self._present_name = present_name
         self.busy = False
         """Whether the arm is moving, from the operating state."""
         self._client, self._until_ns = "", 0
@@ -32,8 +32,9 @@ class CommandArbiter:
         """Give the arm to `client` and return None, or return why not while another program has the arm."""
         with self._deciding:
             now_ns = monotonic_ns()
-            kept = self.busy or (now_ns < self._until_ns and self._is_connected(self._client))
-            if client != self._client and self._client and kept:
+            present = self._present_name(self._client) if self._client else None
+            kept = self.busy or (now_ns < self._until_ns and present is not None)
+            if self._client and kept and client not in (self._client, present):
                 return (
                     f"{client} may not move the arm while {self._client} commands it; hold, free and"
                     " state_command are accepted"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Collection
 
 from xxhash import xxh3_128_digest
@@ -11,6 +12,11 @@ from devices.ros.transport import Client
 from devices.ros.zenoh.layout import GraphToken
 
 __all__ = ["Graph", "gid_of"]
+
+_UNIDENTIFIED = "publisher "
+"""Beginning of the name of a sender without a known token; its gid follows."""
+_LEFT = 1000
+"""Removed publishers remembered; a leading program is free to others after a second anyway."""
 
 
 def gid_of(key: str) -> bytes:
@@ -34,6 +40,8 @@ class Graph:
         """Names of programs by session."""
         self._senders: dict[bytes, str] = {}
         """Key of the token by gid of the publisher, also where the gid is not a hash of the key."""
+        self._left: deque[bytes] = deque(maxlen=_LEFT)
+        """Hashes of the removed tokens of publishers."""
 
     def add(self, key: str) -> None:
         """Add the token with this key."""
@@ -52,6 +60,8 @@ class Graph:
             token = self._tokens.pop(key, None)
             if token is None:
                 return
+            if token.kind == "MP":
+                self._left.append(gid_of(key))
             self._senders = {gid: its for gid, its in self._senders.items() if its != key}
             if all(other.session != token.session for other in self._tokens.values()):
                 del self._names[token.session]
@@ -75,14 +85,25 @@ class Graph:
                 by_hash = next((other for other in others if gid_of(other) == gid), None)
                 key = by_hash if by_hash is not None else others[0] if len(others) == 1 else None
                 if key is None:
-                    return f"publisher {gid.hex()}"
+                    return f"{_UNIDENTIFIED}{gid.hex()}"
                 self._senders[gid] = key
             return self._names[self._tokens[key].session]
 
-    def is_connected(self, name: str) -> bool:
-        """Return whether the sender `name` is there; a publisher without a program always is."""
+    def present_name(self, name: str) -> str | None:
+        """Return the present name of the sender once named `name`; None: the program has left.
+
+        A router may deliver a message before the token of its publisher: a sender named by a gid can become
+        a program, and leave.
+        """
         with self._changing:
-            return not name.startswith("/") or name in self._names.values()
+            if "/" in name:  # of a program
+                return name if name in self._names.values() else None
+            gid = bytes.fromhex(name.removeprefix(_UNIDENTIFIED))
+            if gid in self._left:
+                return None
+            publishers = (key for key, token in self._tokens.items() if token.kind == "MP")
+            key = self._senders.get(gid) or next((key for key in publishers if gid_of(key) == gid), None)
+            return name if key is None else self._names[self._tokens[key].session]
 
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
         """Return the programs with a publisher, subscriber, server or client of any of `topics`."""

@@ -92,7 +92,6 @@ class ZenohTransport(Transport):
         ] = []
         self._number = 0
         self._closed = False
-        # in the thread that also delivers messages: no message is handled before its sender's token
         watch = Callback(self._token_changed, indirect=False)
         liveliness = self._session.liveliness()
         self._entities.append(liveliness.declare_subscriber(graph_key(domain), watch, history=True))
@@ -196,8 +195,8 @@ class ZenohTransport(Transport):
         token = ready_key(self._domain, self._id, self._number)
         self._entities.append(self._session.liveliness().declare_token(token))
 
-    def is_connected(self, client: str) -> bool:  # noqa: D102
-        return self._graph.is_connected(client)
+    def present_name(self, client: str) -> str | None:  # noqa: D102
+        return self._graph.present_name(client)
 
     def close(self) -> None:  # noqa: D102
         if not self._closed:

@@ -82,3 +82,22 @@ def test_the_sender_of_a_program_that_has_gone_is_forgotten():
     assert it.sender(COMMAND, b"0" * 16) == "/console"
     it.remove(entity(ONE, COMMAND))
     assert it.sender(COMMAND, b"0" * 16).startswith("publisher ")
+
+
+def test_a_message_may_come_before_the_token_of_its_publisher():
+    it, token = graph(), entity(ONE, COMMAND)
+    unidentified = it.sender(COMMAND, gid_of(token))
+    assert it.present_name(unidentified) == unidentified
+    it.add(token)
+    assert it.present_name(unidentified) == it.present_name("/console") == "/console"
+    it.remove(token)
+    assert it.present_name(unidentified) is None
+    assert it.present_name("/console") is None
+
+
+def test_a_publisher_with_an_id_of_its_own_is_identified_by_its_next_message():
+    it = graph()
+    unidentified = it.sender(COMMAND, b"0" * 16)
+    it.add(entity(ONE, COMMAND))
+    assert it.present_name(unidentified) == unidentified
+    assert it.sender(COMMAND, b"0" * 16) == it.present_name(unidentified) == "/console"
