@@ -49,6 +49,7 @@ __all__ = [
     "SessionStatus",
     "ShownMarkers",
     "SoftBodyState",
+    "SurfaceChange",
     "TaskEvent",
     "TissueGrasp",
 ]
@@ -152,6 +153,30 @@ class SoftBodyState(Message):
     triangles: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
     """Surface triangles as node indices, three after the other; sent with the first state, empty afterwards.
     """
+
+
+class SurfaceChange(Message):
+    """Difference of the surface of a soft body from the triangles of its first `SoftBodyState`.
+
+    Every message is complete: the newest message and the first triangles make the surface. Nodes are only
+    ever appended, and faces keep their slot, the place in the list of faces: the first slots are those of the
+    triangles.
+    """
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/SurfaceChange"
+    header: Header
+    """Time of the newest change."""
+    body: String
+    version: UInt64 = 0
+    """Count of the changes: equal versions of a run are equal surfaces. 0: the triangles."""
+    slots: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
+    """Slots of the changed and appended faces, ascending."""
+    faces: Int32Array = Field(default_factory=lambda: np.zeros(0, np.int32))
+    """Node indices of each of these faces, three after the other; three times -1: the face is gone."""
+    kinds: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
+    """Kind of tissue of each of these faces: 0 outside, 1 inside of a cut, 2 coagulated, 3 charred."""
+    origins: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
+    """Node of the first state at the resting place of each appended node."""
 
 
 class ShownMarkers(Message):

@@ -1,4 +1,4 @@
-"""The nodes of organs as outputs of a tissue engine."""
+"""The nodes and surfaces of organs as outputs of a tissue engine."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from engines.tissue.organs.body import Body
+from engines.tissue.organs.body import Body, ChangingBody
 from engines.tissue.params import PressedOrgansParams
 from hub.participant import Value, signal_out
 from schemas.ports import Port
 from schemas.ros import Header, Time
-from schemas.trocar_msgs import SoftBodyState
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange
 
-__all__ = ["node_ports", "node_states"]
+__all__ = ["node_ports", "node_states", "surface_changes", "surface_ports"]
 
 
 def node_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
@@ -23,6 +23,23 @@ def node_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
         signal_out(f"{organ}/nodes", SoftBodyState, meaning, frame="world", period_ns=params.node_period)
         for organ in params.organs
     )
+
+
+def surface_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
+    """Return a port of the changed surface of every organ, for engines that change surfaces.
+
+    It is due with the nodes, so that both are always of the same time.
+    """
+    meaning = "difference of the surface from the triangles at time 0: faces changed, appended and gone"
+    return tuple(
+        signal_out(f"{organ}/surface", SurfaceChange, meaning, frame="world", period_ns=params.node_period)
+        for organ in params.organs
+    )
+
+
+def surface_changes(organs: Iterable[ChangingBody], t: int) -> dict[str, Value]:
+    """Return the changed surface of every organ at `t` ns."""
+    return {f"{organ.name}/surface": organ.surface.change(organ.name, t) for organ in organs}
 
 
 def node_states(organs: Iterable[Body], t: int) -> dict[str, Value]:

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.tissue.meshing.tet_mesh import Indices, TetMesh
+from engines.tissue.tissue_surface import TissueSurface
 from schemas.vectors import Vector
 
-__all__ = ["Body"]
+__all__ = ["Body", "ChangingBody"]
 
 
 class Body(Protocol):
@@ -39,4 +40,13 @@ class Body(Protocol):
     @property
     def touchable(self) -> Indices:
         """Faces with a free node, shape (f, 3)."""
+        ...
+
+
+class ChangingBody(Body, Protocol):
+    """An organ whose surface may change: it is cut, torn or burnt."""
+
+    @property
+    def surface(self) -> TissueSurface:
+        """The surface as it is now."""
         ...

@@ -1,0 +1,87 @@
+"""The surface of a soft body as its messages describe it, for whatever draws it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.errors import MessageError
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange
+
+__all__ = ["FaceKind", "SoftSurface"]
+
+_GONE = -1
+
+
+class FaceKind(IntEnum):
+    """Kind of tissue of a face of a surface."""
+
+    OUTSIDE = 0
+    """As at the start of the session."""
+    CUT = 1
+    """Inside of a cut or tear."""
+    COAGULATED = 2
+    CHARRED = 3
+
+
+class SoftSurface(NamedTuple):
+    """Faces of a soft body."""
+
+    faces: NDArray[np.int32]
+    """Node indices, shape (f, 3), counter-clockwise from outside; -1: an empty slot."""
+    kinds: NDArray[np.uint8]
+    """`FaceKind` of each face, shape (f,)."""
+    origins: NDArray[np.int64]
+    """Node of the first state at the resting place of each node, shape (n,)."""
+
+    @classmethod
+    def of_first(cls, state: SoftBodyState) -> SoftSurface:
+        """Return the surface of a first state. Raises MessageError if it has none, or an invalid one."""
+        count, triangles = state.nodes_m.size // 3, state.triangles
+        if state.nodes_m.size % 3 or not triangles.size or triangles.size % 3 or triangles.max() >= count:
+            raise MessageError(
+                f"soft body '{state.body:.40}': {triangles.size} numbers are no triangles of"
+                f" {state.nodes_m.size / 3:g} nodes"
+            )
+        faces = triangles.astype(np.int32).reshape(-1, 3)
+        return cls(faces, np.zeros(len(faces), np.uint8), np.arange(count))
+
+    def changed(self, change: SurfaceChange) -> SoftSurface:
+        """Return the surface with a change. `self`: the surface of the first state.
+
+        Raises MessageError for a change that does not fit it.
+        """
+        self._check(change)
+        slots, faces = change.slots, change.faces.reshape(-1, 3)
+        appended = int((slots >= len(self.faces)).sum())
+        changed = np.concatenate([self.faces, np.full((appended, 3), _GONE, np.int32)])
+        kinds = np.concatenate([self.kinds, np.zeros(appended, np.uint8)])
+        changed[slots], kinds[slots] = faces, change.kinds
+        return SoftSurface(changed, kinds, np.concatenate([self.origins, change.origins.astype(np.int64)]))
+
+    def _check(self, change: SurfaceChange) -> None:
+        """Raise MessageError if a change does not fit this surface of the first state."""
+        slots, kinds, first = change.slots, change.kinds, len(self.faces)
+        if not 3 * slots.size == 3 * kinds.size == change.faces.size:
+            raise _misfit(change, f"{slots.size} slots, {kinds.size} kinds, {change.faces.size} face nodes")
+        if (slots[1:] <= slots[:-1]).any():
+            raise _misfit(change, "slots that do not ascend")
+        appended = slots[slots >= first]
+        if appended.size and int(appended[-1]) != first + appended.size - 1:
+            raise _misfit(change, f"{appended.size} appended faces up to slot {appended[-1]} after {first}")
+        if kinds.size and kinds.max() > max(FaceKind):
+            raise _misfit(change, f"kind {kinds.max()}, allowed are 0 to {max(FaceKind):d}")
+        nodes, faces = len(self.origins), change.faces.reshape(-1, 3)
+        count = nodes + change.origins.size
+        gone = (faces == _GONE).all(axis=1)
+        if ((faces < 0).any(axis=1) & ~gone).any() or faces.max(initial=_GONE) >= count:
+            raise _misfit(change, f"a face with a node outside 0 to {count - 1}")
+        if change.origins.size and change.origins.max() >= nodes:
+            raise _misfit(change, f"a copy of node {change.origins.max()}, allowed are 0 to {nodes - 1}")
+
+
+def _misfit(change: SurfaceChange, problem: str) -> MessageError:
+    return MessageError(f"changed surface of '{change.body:.40}', version {change.version}: {problem}")
