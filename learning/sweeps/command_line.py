@@ -113,10 +113,9 @@ def _run(sweep: Sweep, jobs: int, ray: str | None) -> None:
         if rows := sweep.rows():
             write_table(rows, sweep.variations, sweep.directory / "results.parquet")
             drawn = write_plots(rows, sweep.variations, sweep.directory / "results.png")
-            console.print(
+            typer.echo(
                 f"{len(rows)} of {total} trials, {failed} failed: {sweep.directory / 'results.parquet'}"
-                + (", results.png" if drawn else ""),
-                markup=False,
+                + (", results.png" if drawn else "")
             )
     if failed:
         raise typer.Exit(1)

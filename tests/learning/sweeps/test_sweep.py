@@ -74,7 +74,7 @@ def test_a_killed_trial_is_repeated_once_and_the_table_is_whole(scenario, tmp_pa
     assert [(row["state"], row["attempts"]) for row in _rows(output)] == [("done", 1), ("done", 2)]
     always = _sweep(scenario, "--vary", "part.value=0,2,0.5", "-o", tmp_path / "always")
     assert always.returncode == 1
-    assert "3 of 3 trials, 1 failed" in always.stderr
+    assert "3 of 3 trials, 1 failed" in always.stdout
     rows = _rows(tmp_path / "always")
     assert [(row["state"], row["attempts"], row["error"]) for row in rows] == [
         ("done", 1, None),
