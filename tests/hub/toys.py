@@ -83,6 +83,23 @@ class Mixer(Bare):
         return state_hash(self.x)
 
 
+class Counter(Bare):
+    """Publishes the number of its step every second step: no value comes twice."""
+
+    ports = (Port(name="number", causality="output", size=1, period_ns=2_000_000),)
+
+    def configure(self, setup):
+        self.number = np.zeros(1)
+        return {"number": self.number}
+
+    def step(self, t, h, inputs):
+        self.number += 1.0
+        return {"number": self.number}
+
+    def state_hash(self):
+        return state_hash(self.number)
+
+
 class Chain(Bare):
     """A state that is a hash of everything so far."""
 
