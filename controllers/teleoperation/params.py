@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -26,6 +27,13 @@ def _instrument_by_arms(data: dict[str, Any]) -> str:
     arms: Arms | None = data["arms"]
     led = None if arms is None else arms.present_arms.get(data["arm"])
     return led.instrument if isinstance(led, PsmTool) else DEFAULT_INSTRUMENT
+
+
+def _tip_by_arms(data: dict[str, Any]) -> Path | None:
+    """Return the file of the led arm's fingers by `arms`, if stated there."""
+    arms: Arms | None = data["arms"]
+    led = None if arms is None else arms.present_arms.get(data["arm"])
+    return led.tip if isinstance(led, PsmTool) else None
 
 
 class Buttons(Params):
@@ -64,6 +72,10 @@ class TeleoperationParams(PsmTool, _LedArm):
             "what the arm holds: name or number, such as 400006; default: as in `arms`, without them"
             f" {DEFAULT_INSTRUMENT}"
         ),
+    )
+    tip: Path | None = Field(
+        default_factory=_tip_by_arms,
+        description="file of `trocar instruments import`; default: as in `arms`",
     )
     start: MountedPositions = Field(
         default_factory=home,
@@ -145,6 +157,10 @@ class TeleoperationParams(PsmTool, _LedArm):
             raise ValueError(
                 f"instrument '{self.instrument}', but in `arms` {self.arm} holds '{led.instrument}'; state it"
                 " once, in `arms`"
+            )
+        if isinstance(led, PsmTool) and led.tip != self.tip:
+            raise ValueError(
+                f"tip '{self.tip}', but in `arms` {self.arm} has '{led.tip}'; state it once, in `arms`"
             )
         if led is None and "instrument" not in self.model_fields_set:
             raise ValueError(

@@ -29,7 +29,10 @@ def plan_bond(scenario: Scenario, participants: Mapping[str, Stepped | Device], 
         problem = f"'{bond.motion}' has {motion.dof} degrees of freedom, '{bond.force}' has {force.dof}"
         raise ScenarioError(problem, path=path)
     if motion.points != force.points:
-        problem = f"'{bond.motion}' bonds {motion.points} points, '{bond.force}' bonds {force.points}"
+        problem = (
+            f"'{bond.motion}' bonds {motion.points} points, '{bond.force}' bonds {force.points}: both need"
+            " as many, so change the number on either side (`spheres` of a tissue's probe)"
+        )
         raise ScenarioError(problem, path=path)
     if motion.frame and force.frame and motion.frame != force.frame:
         problem = f"'{bond.motion}' is in frame '{motion.frame}', '{bond.force}' in frame '{force.frame}'"

@@ -29,6 +29,7 @@ from robots.dvrk import arm_bodies, drives, ecm, psm
 from robots.dvrk.drive import Disc, Drive
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
 from robots.dvrk.end_effectors.end_effector import EndEffector, Mount
+from robots.dvrk.end_effectors.own_jaw import JawFile, with_own_jaw
 from robots.dvrk.end_effectors.probe import PROBE_RADIUS, Probe
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import Instrument, instrument
@@ -172,6 +173,12 @@ class PsmTool(BaseModel):
     instrument: InstrumentName = Field(
         default=DEFAULT_INSTRUMENT, description="what the arm holds: name or number, such as 400006"
     )
+    tip: Path | None = Field(
+        default=None,
+        description=(
+            "file of `trocar instruments import`: fingers of your own in place of the instrument's jaw"
+        ),
+    )
     start: MountedPositions = Field(
         default_factory=home,
         description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are",
@@ -201,12 +208,21 @@ class PsmTool(BaseModel):
     @cached_property
     def tool(self) -> Instrument:
         """The instrument's numbers."""
-        return instrument(self.instrument)
+        shaft = instrument(self.instrument)
+        try:
+            return shaft if self.tip is None else with_own_jaw(shaft, JawFile.load(self.tip))
+        except MotionError as error:
+            raise ValueError(f"tip: {error}") from error
 
     @cached_property
     def chain(self) -> SerialChain:
         """The arm's kinematics, from `<arm>_base` to the tip."""
         return psm.chain(self.tool)
+
+    @field_validator("tip")
+    @classmethod
+    def _find_tip(cls, file: Path | None, info: ValidationInfo) -> Path | None:
+        return None if file is None else find_file(file, info)
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:

@@ -91,6 +91,8 @@ class mjtSensor(IntEnum):
 
 class MjsCompiler:
     degree: bool
+    boundinertia: float
+    boundmass: float
 
 class MjOption:
     timestep: float
@@ -143,6 +145,7 @@ class MjsMaterial(MjsElement):
     rgba: _Array
 
 class MjsMesh(MjsElement):
+    file: str
     uservert: _Numbers
     userface: Sequence[int] | NDArray[np.int32]
 
@@ -164,6 +167,7 @@ class MjsBody(MjsElement):
     pos: _Array
     gravcomp: float
     parent: MjsBody
+    bodies: list[MjsBody]
     joints: list[MjsJoint]
     geoms: list[MjsGeom]
     sites: list[MjsSite]
@@ -186,9 +190,14 @@ class MjsKey:
     ctrl: _Array
 
 class MjSpec:
+    @staticmethod
+    def from_file(filename: str) -> MjSpec: ...
+    @staticmethod
+    def from_string(xml: str) -> MjSpec: ...
     compiler: MjsCompiler
     option: MjOption
     worldbody: MjsBody
+    meshdir: str
     modelname: str
     bodies: list[MjsBody]
     geoms: list[MjsGeom]
@@ -266,6 +275,7 @@ class MjModel:
     wrap_objid: NDArray[np.int32]
     wrap_prm: _Array
     body_gravcomp: _Array
+    body_mass: _Array
     body_dofadr: NDArray[np.int32]
     body_parentid: NDArray[np.int32]
     nsite: int
@@ -292,6 +302,7 @@ class MjModel:
     eq_obj2id: NDArray[np.int32]
     eq_type: NDArray[np.int32]
     jnt_dofadr: NDArray[np.int32]
+    jnt_limited: NDArray[np.uint8]
     jnt_qposadr: NDArray[np.int32]
     jnt_range: _Array
     body_jntadr: NDArray[np.int32]
@@ -330,6 +341,8 @@ class MjData:
     qacc: _Array
     qfrc_bias: _Array
     qfrc_gravcomp: _Array
+    xanchor: _Array
+    xaxis: _Array
     xpos: _Array
     xquat: _Array
     xmat: _Array

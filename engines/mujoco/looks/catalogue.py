@@ -7,7 +7,7 @@ from typing import get_args
 
 from engines.mujoco.looks import cart, collision_shapes, ecm, instruments, psm, setup_joints
 from engines.mujoco.looks.part import Collisions, Looks
-from robots.dvrk.instruments import instrument
+from robots.dvrk.instruments import Instrument, instrument
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MotionError
 
@@ -17,18 +17,20 @@ _INSTRUMENT = "instrument/"
 
 
 @cache
-def parts(what: str) -> Looks:
+def parts(what: str | Instrument) -> Looks:
     """Return the meshes of `what` by body, drawn with every joint at 0.
 
     Args:
         what: `psm` and `ecm` (in the arm's base frame `<arm>_base`; the PSM without instrument, the ECM with
         endoscope),
             `instrument/<name or number>` (in the PSM's base frame), `cart` and `suj/<arm>` (in the cart's
-            frame).
+            frame); or an instrument of the user's own.
 
     Raises:
         MotionError: no such instrument, or nothing of this name.
     """
+    if isinstance(what, Instrument):
+        return instruments.parts(what)
     if what.startswith(_INSTRUMENT):
         return instruments.parts(instrument(what.removeprefix(_INSTRUMENT)))
     for arm in get_args(CartArm):
@@ -41,12 +43,14 @@ def parts(what: str) -> Looks:
 
 
 @cache
-def collision(what: str) -> Collisions:
+def collision(what: str | Instrument) -> Collisions:
     """Return the collision shapes of `what` by body, in the frames of `parts`.
 
     Raises:
         MotionError: no such instrument, or nothing of this name.
     """
+    if isinstance(what, Instrument):
+        return collision_shapes.instrument(what)
     if what.startswith(_INSTRUMENT):
         return collision_shapes.instrument(instrument(what.removeprefix(_INSTRUMENT)))
     for arm in get_args(CartArm):

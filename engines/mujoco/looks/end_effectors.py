@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from functools import singledispatch
 
-from engines.mujoco.looks import electrode, fingers, musha, rolling_jaw
+from engines.mujoco.looks import electrode, fingers, musha, own_jaw, rolling_jaw
 from engines.mujoco.looks.part import Collisions, Looks
 from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.end_effectors.end_effector import EndEffector, Mount
 from robots.dvrk.end_effectors.hand import Hand
 from robots.dvrk.end_effectors.jaw import Jaw
+from robots.dvrk.end_effectors.own_jaw import OwnJaw
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
 
 __all__ = ["collision", "parts"]
@@ -32,9 +33,11 @@ def collision(_effector: EndEffector, _instrument: str, _mount: Mount) -> Collis
 
 
 parts.register(Jaw, fingers.parts)
+parts.register(OwnJaw, own_jaw.parts)
 parts.register(RollingJaw, rolling_jaw.parts)
 parts.register(Hand, musha.parts)
 parts.register(Electrode, electrode.parts)
 collision.register(Jaw, fingers.collision)
+collision.register(OwnJaw, own_jaw.collision)
 collision.register(RollingJaw, rolling_jaw.collision)
 collision.register(Hand, musha.collision)

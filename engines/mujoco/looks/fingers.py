@@ -17,13 +17,13 @@ from robots.dvrk.end_effectors.end_effector import Mount
 from robots.dvrk.end_effectors.jaw import FINGERS, Jaw
 from schemas.vectors import Vector
 
-__all__ = ["Shape", "collision", "finger_frame", "fingers", "grips", "parts", "shape"]
+__all__ = ["ROOT", "Shape", "collision", "finger_frame", "fingers", "grips", "parts", "shape"]
 
 _HUB_RADIUS, _HUB_WIDTH = 0.0025, 0.00195
 """Eye about the wrist yaw axis: a hub lies on either side of y = 0 (bounds of the jaw meshes in
 med-air/SurRoL).
 """
-_ROOT = 0.0030
+ROOT = 0.0030
 """Distance from the axis at which the pad's plane is free of the opposite finger's hub."""
 
 
@@ -105,19 +105,19 @@ def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
     length, back = form.length, form.thickness
     front, tip = form.recess, form.tip_thickness
     profile = [
-        (_ROOT, front),
+        (ROOT, front),
         (length, front),
         (length, 0.6 * tip),
         (length - 0.0006, tip),
         (0.45 * length, back),
-        (_ROOT, back),
+        (ROOT, back),
     ]
     blade = plate("y", outline(profile), -0.01, 0.01) ^ plate(
-        "x", outline(_top_view(form, _ROOT / length), 0.0004), -0.01, 0.01
+        "x", outline(_top_view(form, ROOT / length), 0.0004), -0.01, 0.01
     )
     low, high = sorted((-side * _HUB_WIDTH, 0.0))
     hub = rod((0.0, low, 0.0), (0.0, high, 0.0), _HUB_RADIUS)
-    arm = block((0.0, low, 0.0), (back, high, _ROOT + 0.0012))
+    arm = block((0.0, low, 0.0), (back, high, ROOT + 0.0012))
     pad = plate("x", outline(_top_view(form, 0.42, 0.97, share=0.8)), 0.0, 0.0002)
     if form.window:
         half, low_end, high_end = 0.45 * form.width, 0.50 * length, 0.86 * length
@@ -150,7 +150,7 @@ def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
         [
             side * (form.tip_thickness + form.recess) / 2.0,
             _finger_curve(form, 0.7),
-            (_ROOT + form.length) / 2.0,
+            (ROOT + form.length) / 2.0,
         ]
     )
     box = pose.copy()
@@ -161,7 +161,7 @@ def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
         (
             (form.tip_thickness - form.recess) / 2.0,
             (form.width + form.tip_width) / 2.0,
-            (form.length - _ROOT) / 2.0,
+            (form.length - ROOT) / 2.0,
         ),
         box,
     )
@@ -176,7 +176,7 @@ def _top_view(form: Shape, start: float, end: float = 1.0, share: float = 1.0) -
         end: end, as a fraction of the length.
         share: of the pad's width.
     """
-    root = _ROOT / form.length
+    root = ROOT / form.length
     right, left = list[tuple[float, float]](), list[tuple[float, float]]()
     for s in np.linspace(start, end, 5 if form.curve else 2).tolist():
         half = share * (form.width + (form.tip_width - form.width) * (s - root) / (1.0 - root))

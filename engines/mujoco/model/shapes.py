@@ -18,6 +18,7 @@ import numpy as np
 from engines.mujoco import looks
 from engines.mujoco.model.poses import pose_attributes
 from robots.dvrk.end_effectors.probe import Probe
+from robots.dvrk.instruments import Instrument
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from robots.transform import inverse_transform
@@ -42,8 +43,7 @@ def add_arm(
     spec: mujoco.MjSpec, arm: CartArm, params: MountedPsm | MountedEcm, bodies: Bodies, *, seen: bool
 ) -> None:
     """Give an arm and the instrument collision shapes and, if `seen`, looks."""
-    whats = ("ecm",) if isinstance(params, MountedEcm) else ("psm", f"instrument/{params.tool.name}")
-    for what in whats:
+    for what in ("ecm",) if isinstance(params, MountedEcm) else ("psm", _look(params)):
         add(spec, what, arm, bodies, seen=seen)
     if isinstance(params.end_effector, Probe):
         body, _ = bodies[params.chain.joints[-1].name]
@@ -57,17 +57,21 @@ def add_arm(
         )
 
 
-def add(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *, seen: bool) -> None:
+def _look(params: MountedPsm) -> str | Instrument:
+    return f"instrument/{params.tool.name}" if params.tip is None else params.tool
+
+
+def add(spec: mujoco.MjSpec, what: str | Instrument, owner: str, bodies: Bodies, *, seen: bool) -> None:
     """Give the bodies of `owner` collision shapes and, if `seen`, looks.
 
-    `what`: a name known to `looks.parts`.
+    `what`: a name known to `looks.parts`, or an instrument of the user's own.
     """
     if seen:
-        _add_looks(spec, what, bodies)
+        _add_looks(spec, what, owner, bodies)
     _add_collision(spec, what, owner, bodies, group=_COLLIDING if seen else _SEEN)
 
 
-def _add_looks(spec: mujoco.MjSpec, what: str, bodies: Bodies) -> None:
+def _add_looks(spec: mujoco.MjSpec, what: str | Instrument, owner: str, bodies: Bodies) -> None:
     for link, parts in looks.parts(what).items():
         body, pose = bodies[link]
         for part in parts:
@@ -79,19 +83,21 @@ def _add_looks(spec: mujoco.MjSpec, what: str, bodies: Bodies) -> None:
                     specular=material.specular,
                     shininess=material.shininess,
                 )
-            mesh = _mesh(spec, f"{what}/{part.name}", part, pose)
+            mesh = _mesh(spec, f"{_label(what, owner)}/{part.name}", part, pose)
             body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, material=material.name, **_UNSEEN_BY_PHYSICS
             )
 
 
-def _add_collision(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *, group: int) -> None:
+def _add_collision(
+    spec: mujoco.MjSpec, what: str | Instrument, owner: str, bodies: Bodies, *, group: int
+) -> None:
     for link, shapes in looks.collision(what).items():
         body, pose = bodies[link]
         for shape in shapes:
             common = {"name": f"{owner}/{shape.name}", "mass": 0.0, "group": group}
             if isinstance(shape, looks.Part):
-                mesh = _mesh(spec, f"{what}/{shape.name}", shape, pose)
+                mesh = _mesh(spec, f"{_label(what, owner)}/{shape.name}", shape, pose)
                 body.add_geom(
                     type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, contype=0, conaffinity=_THINGS, **common
                 )
@@ -104,6 +110,11 @@ def _add_collision(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *
                     **common,
                     **_instrument(owner),
                 )
+
+
+def _label(what: str | Instrument, owner: str) -> str:
+    """Return the first part of the names of meshes: two arms may hold two instruments of one name."""
+    return f"{owner}/{what.name}" if isinstance(what, Instrument) else what
 
 
 def _instrument(arm: str) -> dict[str, int]:
