@@ -179,6 +179,8 @@ class Hand(_Command):
     """Ahead, left, up, each a share of the greatest speed."""
     angular: tuple[Share, Share, Share] = (0.0, 0.0, 0.0)
     """Shares about the stylus' own x (the point moves up), y (right) and z (as a screw going in)."""
+    turn: tuple[Share, Share, Share] = (0.0, 0.0, 0.0)
+    """Shares about the axes ahead, left, up of the hand's frame."""
     drag: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
     """Way of the pointer since this page leads, m: ahead, left, up."""
     gripper: Share = 0.0

@@ -21,6 +21,8 @@ class DraggedTip(NamedTuple):
     arm: str
     view: str
     """`base` of the arm, or `camera`: the picture."""
+    turns: bool
+    """Whether the tip turns with the hand."""
 
 
 def dragged_tips(
@@ -39,13 +41,16 @@ def dragged_tips(
         if teleoperation is None:
             reasons.append(f"'{device}' leads no teleoperation")
             continue
-        given = params(teleoperation).model_dump(include={"arm", "law", "view", "engage", "registration"})
+        given = params(teleoperation).model_dump(
+            include={"arm", "law", "view", "engage", "registration", "orientation"}
+        )
         if given["law"] != "pose" or given["engage"] != "held" or given["view"] == "display":
             reasons.append(f"'{teleoperation}' needs law: pose, engage: held, and view: base or camera")
         elif tuple(given["registration"]) != _LEVEL:
             reasons.append(f"'{teleoperation}' turns the hand's frame (registration)")
         else:
-            found.append(DraggedTip(device, given["arm"], given["view"]))
+            turns = given["orientation"] == "follow"
+            found.append(DraggedTip(device, given["arm"], given["view"], turns))
     return tuple(found), tuple(reasons)
 
 

@@ -89,7 +89,7 @@ def _give_hand(device: str, hand: Hand | None) -> None:
     if hand is None:
         hand_of(device).release()
         return
-    wish = Wish(hand.linear, hand.angular, hand.gripper, hand.dead_man, hand.jaw)
+    wish = Wish(hand.linear, hand.angular, hand.gripper, hand.dead_man, hand.jaw, hand.turn)
     hand_of(device).give(PageInput(wish, hand.drag, _tracked_pose(hand), hand.away))
 
 

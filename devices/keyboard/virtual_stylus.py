@@ -32,6 +32,8 @@ class Wish:
     """1 opens, -1 closes."""
     dead_man: bool = False
     jaw: bool = False
+    turn: Vector3 = (0.0, 0.0, 0.0)
+    """Angular shares about the axes of the base frame: ahead, left, up."""
 
     def __add__(self, other: Wish) -> Wish:
         """Return the sum of the commands of two sources."""
@@ -41,6 +43,7 @@ class Wish:
             self.gripper + other.gripper,
             self.dead_man or other.dead_man,
             self.jaw or other.jaw,
+            _sum(self.turn, other.turn),
         )
 
 
@@ -79,11 +82,10 @@ class VirtualStylus:
 
     def advance(self, wish: Wish, dt: float) -> None:
         """Move for `dt` seconds by the command `wish`."""
-        own = _limit_speed(wish.angular, self._turn_speed)
-        self._linear, self._angular = (
-            _limit_speed(wish.linear, self._speed),
-            rotation.matrix(self._orientation) @ own,
-        )
+        axes = rotation.matrix(self._orientation)
+        x, y, z = (np.array(wish.angular) + axes.T @ wish.turn).tolist()
+        own = _limit_speed((x, y, z), self._turn_speed)
+        self._linear, self._angular = _limit_speed(wish.linear, self._speed), axes @ own
         self._position = self._position + dt * self._linear
         turned = rotation.product(self._orientation, rotation.exp(dt * own))
         self._orientation = turned / np.linalg.norm(turned)

@@ -88,6 +88,12 @@ def test_two_recordings_are_compared_on_one_timeline(person):
     slider.fill("1.44")
     one.sees(f"Math.abs({OTHER_TIP} - {OWN_TIP}) > 0.02")
     one.sees("document.querySelectorAll('.plot i.dashed').length > 0")
+    theirs = one.page.locator("#lines li.other")
+    theirs.get_by_text("contact, 0.05 N").wait_for()
+    assert theirs.locator("span").nth(1).inner_text().startswith("second: ")
+    times = one.page.locator("#lines li span:first-child").all_inner_texts()
+    assert len(times) == 2 * theirs.count()
+    assert times == sorted(times, key=lambda text: float(text.split()[0]))
     one.page.get_by_label("ghost in the scene").uncheck()
     one.sees("!trocar.comparison.world.visible")
     assert one.page.evaluate(NAMELESS) == []

@@ -3,10 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hub.planning.scenario_file import load
 from hub.planning.session_parameters import SessionParameters
+from robots import rotation
 from schemas.files import Files
 from tests.waiting import until
 from tests.webconsole.conftest import served
@@ -28,6 +30,19 @@ UP_ARROW = """
   return [left + ((place.x + 1) / 2) * width, top + ((1 - place.y) / 2) * height]
 }
 """
+RING = """
+() => {
+  const { scene } = trocar, { camera, canvas } = scene, place = camera.position.clone()
+  scene.tips[0].axes.getWorldPosition(place)
+  const size = 1.1 / 4 * place.distanceTo(camera.position) * 1.9 * Math.tan((Math.PI * camera.fov) / 360)
+  const near = camera.position.clone().sub(place), side = near.clone().set(-near.y, near.x, 0).normalize()
+  near.setZ(0).normalize().add(side).normalize() // on the ring about z, where no other ring is
+  place.addScaledVector(near, 0.5 * size).project(camera)
+  const { left, top, width, height } = canvas.getBoundingClientRect()
+  return [left + ((place.x + 1) / 2) * width, top + ((1 - place.y) / 2) * height]
+}
+"""
+TURN = "trocar.scene.tips[0].axes.getWorldQuaternion(trocar.scene.tips[0].axes.quaternion.clone()).toArray()"
 WIDE = """
 [...document.querySelectorAll("body *")].filter((one) => one.checkVisibility() && !one.closest(".segments") &&
   one.getBoundingClientRect().right > innerWidth + 1).map((one) => one.outerHTML.slice(0, 120))
@@ -164,8 +179,24 @@ def test_the_handle_leads_the_tip_while_it_is_held(browser, session):
         one.page.mouse.up()
         return ended[2] - start[2] > 0.003 and ended[:2] == pytest.approx(start[:2], abs=1e-3)
 
+    def turn():
+        start, before = one.page.evaluate(TIP), np.array(one.page.evaluate(TURN))
+        x, y = one.page.evaluate(RING)
+        one.page.mouse.move(x, y)
+        one.page.wait_for_timeout(300)
+        one.page.mouse.down()
+        one.page.mouse.move(x + 60, y, steps=5)
+        one.page.wait_for_timeout(1000)
+        ended, after = one.page.evaluate(TIP), np.array(one.page.evaluate(TURN))
+        one.page.mouse.up()
+        about = rotation.log(rotation.product(after, rotation.conjugate(before)))  # in the world, rad
+        still = ended == pytest.approx(start, abs=2e-3)
+        return still and abs(about[2]) > 0.1 and np.abs(about[:2]).max() < 0.3 * abs(about[2])
+
     until(drag)
+    until(turn)
     one.page.get_by_text("holding").wait_for()
+    assert one.errors == []
     one.context.close()
 
 
@@ -196,7 +227,8 @@ def test_it_is_said_why_no_tip_can_be_dragged():
         return json.dumps([tip._asdict() for tip in tips]), reasons
 
     right, left = (
-        {"device": name, "arm": arm, "view": "camera"} for name, arm in (("right", "PSM1"), ("left", "PSM2"))
+        {"device": name, "arm": arm, "view": "camera", "turns": True}
+        for name, arm in (("right", "PSM1"), ("left", "PSM2"))
     )
     assert of("browser") == (json.dumps([right, left]), ())
     tips, (reason,) = of("browser", "participants.right_hand.engage=released")

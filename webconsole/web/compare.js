@@ -56,7 +56,16 @@ export class Comparison {
     this.later = start - this.timeline.start
     this.timeline.extend(end - this.later)
     this.aligned(this.later)
+    this.tell()
     if (this.time != null) this.at(this.time)
+  }
+
+  // The events of the other recording, at the times of the one that is shown.
+  async tell() {
+    const answer = await fetch(pathTo("/events", {}, compared))
+    if (!answer.ok) return this.said(await answer.text())
+    const events = await answer.json()
+    this.timeline.beside(events.map((event) => ({ ...event, time: event.time - this.later, recording: compared })))
   }
 
   // The instant of the recording that is shown, s.

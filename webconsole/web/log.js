@@ -40,8 +40,10 @@ export class Log {
     for (const entry of entries) {
       const line = this.line(entry, jumps)
       line.hidden = !this.passes(entry)
-      this.rows.push({ entry, line })
-      this.lines.append(line)
+      // events of a second recording come after those of the first: here both stand by time
+      const at = jumps ? this.rows.findIndex(({ entry: { time } }) => time > entry.time) : -1
+      this.lines.insertBefore(line, this.rows[at]?.line ?? null)
+      this.rows.splice(at < 0 ? this.rows.length : at, 0, { entry, line })
       this.name(participant(entry))
     }
     for (const { line } of this.rows.splice(0, this.rows.length - KEPT)) line.remove()
@@ -50,9 +52,10 @@ export class Log {
     this.worst.textContent = this.warnings ? `${this.warnings} warning${this.warnings > 1 ? "s" : ""}` : ""
   }
 
-  line({ time, level, source, text }, jumps) {
+  line({ time, level, source, text, recording }, jumps) {
     const line = document.createElement("li")
     line.className = level
+    if (recording != null) line.classList.add("other")
     if (level !== "info") this.warnings++
     const at = document.createElement("span")
     if (jumps) {
@@ -63,8 +66,7 @@ export class Log {
       at.append(button)
     } else at.textContent = `${time.toFixed(3)} s`
     const who = document.createElement("span"), what = document.createElement("span")
-    who.textContent = source
-    who.title = source
+    who.textContent = who.title = recording == null ? source : `${recording}: ${source}`
     what.textContent = level === "info" ? text : `${level === "warn" ? "Warning" : "Error"}: ${text}`
     line.append(at, who, what)
     return line

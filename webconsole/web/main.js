@@ -143,7 +143,7 @@ async function begin(described) {
 function sayDragged({ kind, role, dragged = [], undragged = [] }) {
   $("undragged").hidden = kind === "recording" || role === "viewer"
   $("undragged").textContent = dragged.length
-    ? dragged.map(({ device, arm }) => `Lead ${device}, and drag the handle on the tip of ${arm}.`).join(" ")
+    ? dragged.map(({ device, arm, turns }) => `Lead ${device}, and drag the arrows on the tip of ${arm}${turns ? ", or turn its rings" : ""}.`).join(" ")
     : `No tip can be dragged: ${undragged.join("; ")}.`
 }
 

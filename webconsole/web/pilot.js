@@ -159,9 +159,9 @@ export class Pilot {
   }
 
   wish() {
-    const wish = { linear: [0, 0, 0], angular: [0, 0, 0], gripper: 0, dead_man: this.dragging, jaw: false }
+    const wish = { linear: [0, 0, 0], angular: [0, 0, 0], turn: [0, 0, 0], gripper: 0, dead_man: this.dragging, jaw: false }
     const add = (one) => {
-      for (const name of ["linear", "angular"]) one[name]?.forEach((share, i) => { wish[name][i] += share })
+      for (const name of ["linear", "angular", "turn"]) one[name]?.forEach((share, i) => { wish[name][i] += share })
       wish.gripper += one.gripper ?? 0
       wish.dead_man ||= one.dead_man ?? false
       wish.jaw ||= one.jaw ?? false
@@ -171,7 +171,7 @@ export class Pilot {
     if (pad) add(gamepad(pad))
     if (this.gizmo) add(this.gizmo.wish())
     const limit = (share) => Math.min(Math.max(share, -1), 1)
-    return { ...wish, linear: wish.linear.map(limit), angular: wish.angular.map(limit), gripper: limit(wish.gripper) }
+    return { ...wish, linear: wish.linear.map(limit), angular: wish.angular.map(limit), turn: wish.turn.map(limit), gripper: limit(wish.gripper) }
   }
 
   // How the devices that this page leads follow it now.

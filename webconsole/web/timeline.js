@@ -6,6 +6,7 @@ import { pathTo } from "./address.js"
 const $ = (id) => document.getElementById(id)
 
 const MOST_EVENTS = 500
+const LEVELS = { warn: "--warn", error: "--bad" }
 
 export class Timeline {
   constructor(show) {
@@ -14,6 +15,7 @@ export class Timeline {
     this.past = true // an instant is shown, and not what runs now
     this.time = this.start = this.end = 0
     this.events = []
+    this.others = [] // of a recording beside this one
     this.playing = false
     this.scrub = $("scrub")
     this.scrub.addEventListener("input", () => { this.pause(); this.go(Number(this.scrub.value)) })
@@ -47,9 +49,15 @@ export class Timeline {
     this.marks()
   }
 
+  beside(events) {
+    this.others = events
+    this.found?.(events)
+    this.marks()
+  }
+
   // Another session runs, and nothing of its past is known yet.
   reset() {
-    Object.assign(this, { live: true, past: false, begun: false, playing: false, time: null, events: [] })
+    Object.assign(this, { live: true, past: false, begun: false, playing: false, time: null, events: [], others: [] })
     $("timeline").hidden = true
     this.say()
   }
@@ -139,7 +147,7 @@ export class Timeline {
 
   jump(way) {
     this.pause()
-    const times = this.events.map(({ time }) => time).sort((a, b) => a - b), from = this.past ? this.time : Infinity
+    const times = [...this.events, ...this.others].map(({ time }) => time).sort((a, b) => a - b), from = this.past ? this.time : Infinity
     const found = way > 0 ? times.find((t) => t > from + 1e-6) : times.findLast((t) => t < from - 1e-6)
     if (found != null) this.go(found)
   }
@@ -158,10 +166,11 @@ export class Timeline {
     canvas.width = width * devicePixelRatio; canvas.height = height * devicePixelRatio
     const context = canvas.getContext("2d"), style = getComputedStyle(document.documentElement)
     context.scale(devicePixelRatio, devicePixelRatio)
-    for (const { time, level } of this.events) {
-      context.fillStyle = style.getPropertyValue(level === "info" ? "--soft" : level === "warn" ? "--warn" : "--bad")
+    for (const { time, level, recording } of [...this.events, ...this.others]) {
+      const own = recording == null
+      context.fillStyle = style.getPropertyValue(level !== "info" ? LEVELS[level] : own ? "--soft" : "--other")
       const share = (time - this.start) / (this.end - this.start || 1)
-      context.fillRect(8 + share * (width - 16) - 1, 2, 2, 7) // the thumb of the range is 16 px wide
+      context.fillRect(8 + share * (width - 16) - 1, own ? 2 : height - 9, 2, 7) // the thumb of the range is 16 px wide
     }
   }
 }
