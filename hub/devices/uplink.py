@@ -48,6 +48,7 @@ class DeviceUplink:
         self._name, self._run, self._thread, self._offset = name, run, thread, offset
         self._link = NetworkLink(planned.network_link)
         self._reported_ns = -_STATUS_NS
+        self._is_offset_reported = offset is None
         self._sequence = {port.name: 0 for port in planned.ports}
         outputs = [port for port in planned.ports if port.causality == "output"]
         self._publishers = {
@@ -82,7 +83,8 @@ class DeviceUplink:
                 for _, stamped in line.pop_arrivals(t):
                     self._publish(name, *stamped)
             self._receiver.write_arrived(t)
-        if now_ns - self._reported_ns >= _STATUS_NS:
+        # the hub measures no latency before it knows the offset, so the first one is reported at once
+        if now_ns - self._reported_ns >= _STATUS_NS or self._has_first_offset():
             self._reported_ns = now_ns
             self._report_status()
             self._receiver.want_all_but(
@@ -95,9 +97,13 @@ class DeviceUplink:
     def _publish(self, port: str, payload: bytes, stamp: bytes) -> None:
         self._publishers[port].put(payload, attachment=stamp)
 
+    def _has_first_offset(self) -> bool:
+        return not self._is_offset_reported and self._offset is not None and self._offset.best is not None
+
     def _report_status(self) -> None:
         best = None if self._offset is None else self._offset.best
         offset_ns, round_trip_ns = (0, -1) if best is None else (best.offset_ns, best.round_trip_ns)
+        self._is_offset_reported |= best is not None
         status = DeviceStatus(
             device=self._name,
             offset_ns=offset_ns,
