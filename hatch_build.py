@@ -28,8 +28,14 @@ _EXTENSIONS = (
     Extension(
         "engines.fem._solid",
         ["engines/fem/_solid.c", "engines/fem/_elements.c", "engines/fem/_contact.c"],
-        depends=["engines/fem/_solid.h", "engines/fem/_lanes.h"],
+        depends=["engines/fem/_solid.h", "engines/fem/_lanes.h", "engines/fem/_triangle.h"],
         extra_compile_args=[*_FLAGS, "/O2" if sys.platform == "win32" else "-O3"],
+    ),
+    Extension(
+        "engines.fem._probe",
+        ["engines/fem/_probe.c", "engines/fem/_near.c"],
+        depends=["engines/fem/_near.h", "engines/fem/_triangle.h"],
+        extra_compile_args=_FLAGS,
     ),
     Extension("schemas._cdr", ["schemas/_cdr.c"], include_dirs=[np.get_include()], extra_compile_args=_FLAGS),
 )

@@ -10,11 +10,13 @@ import numpy as np
 
 from engines.fem.organ import Organ
 from engines.fem.params import FemParams
-from engines.fem.probe import RIGID, Probe
+from engines.fem.probe import Probe
+from engines.fem.spheres import Spheres, near_faces
+from engines.tissue.elasticity.body_yield import BodyYield
 from engines.tissue.ports import node_ports, node_states
 from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
-from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, near_faces
-from engines.tissue.probes.sub_grid import SubGrid, Surface, warn_beyond
+from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS
+from engines.tissue.probes.sub_grid import Surface, warn_beyond
 from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port
@@ -67,7 +69,7 @@ class FemEngine(Stepped):
             self._sub_steps = max(self._sub_steps, -(-setup.period_ns // self.params.timestep))
         if any(self.params.has_series(name) for name in setup.bonds):
             self._surfaces = [
-                Surface(organ, self.params.organs[organ.name].elastic) for organ in self._organs
+                Surface(organ, self.params.organs[organ.name].elastic, BodyYield) for organ in self._organs
             ]
         self._bonded = dict(setup.bonds)
         return self._begin()
@@ -75,23 +77,20 @@ class FemEngine(Stepped):
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Press the organs along the predicted motion; return the reactions, and the nodes when due."""
         seconds, end = h * 1e-9, t + h
-        if self._probes:
-            path = np.concatenate([probe.begin(inputs, seconds) for probe in self._probes], axis=1)
-        else:
-            path = np.zeros((self._sub_steps + 1, 0, 3))
-        forces = np.zeros((self._sub_steps, path.shape[1], 3))
+        for probe in self._probes:
+            probe.begin(inputs, seconds)
+        forces = self._spheres.forces
+        forces[:] = 0.0
         for organ in self._organs:
-            forces += organ.advance(seconds, path, self._radii, self.params.gravity)
-        if not np.isfinite(forces).all():
-            for organ in self._organs:
-                organ.sample(end)  # says which is unstable
+            forces += organ.advance(seconds, self.params.gravity)
+        are_finite = [probe.end() for probe in self._probes]
         due, touch = end % self.params.node_period == 0, end // CONTACT_PERIOD_NS != t // CONTACT_PERIOD_NS
-        if due or touch:
+        if due or touch or not all(are_finite):
             for organ in self._organs:
-                organ.sample(end)
+                organ.sample(end)  # an unstable organ ends the session
         outputs = (node_states(self._organs, end) if due else {}) | self._unused
         for probe in self._probes:
-            outputs.update(probe.end(forces[:, probe.bodies], seconds))
+            outputs.update(probe.outputs)
         if touch:
             self._look()
         for grasp, _ in self._grasps:
@@ -102,9 +101,9 @@ class FemEngine(Stepped):
     def state_hash(self) -> int:
         """Return 64 bits of the displacements, and of the probes and grasps."""
         return state_hash(
-            *(probe.numbers for probe in self._probes),
+            *(probe.digest for probe in self._probes),
             *(grasp.numbers for grasp, _ in self._grasps),
-            *(organ.solid.displacement.tobytes() for organ in self._organs),
+            *(organ.digest for organ in self._organs),
         )
 
     def save(self) -> bytes:
@@ -157,42 +156,37 @@ class FemEngine(Stepped):
             for port, value in nothing_held(name).items()
         }
         outputs.update(self._unused)
+        bonds = [bond for bond in self.bonds if bond.name in self._bonded]
+        radii = [self.params.probes[bond.name].radii for bond in bonds]
+        self._spheres = Spheres(np.concatenate([np.zeros(0), *radii]), self._sub_steps)
         first = 0
-        for bond in self.bonds:
-            if plan := self._bonded.get(bond.name):
-                probe = Probe(self.params.probes[bond.name], bond, plan, first, self._sub_steps)
-                first += len(probe.radii)
-                self._probes.append(probe)
-                outputs.update(probe.idle)
-                if self.params.has_sub_grid(bond.name):
-                    probe.sub_grid = SubGrid(float(probe.radii[0]), RIGID, self._surfaces)
-                if grasp := self.params.probes[bond.name].grasp:
-                    self._grasps.append((Grasp(grasp, probe, self._organs, self._surfaces), probe))
-                    outputs.update(nothing_held(bond.name))
-        self._radii = np.concatenate([np.zeros(0), *(probe.radii for probe in self._probes)])
+        for bond in bonds:
+            name, params = bond.name, self.params.probes[bond.name]
+            surfaces = self._surfaces if self.params.has_sub_grid(name) else None
+            probe = Probe(params, bond, self._bonded[name], self._spheres, first, surfaces)
+            first += len(probe.radii)
+            self._probes.append(probe)
+            outputs.update(probe.outputs)
+            if params.grasp:
+                self._grasps.append((Grasp(params.grasp, probe, self._organs, self._surfaces), probe))
+                outputs.update(nothing_held(name))
         for organ in self._organs:
-            organ.meet(len(self._radii))
+            organ.meet(self._spheres)
         return outputs
 
     def _look(self) -> None:
         """Find the faces near each probe; set what touches, and the laws of springs in series."""
         for probe in self._probes:
             loose = np.flatnonzero(~probe.held)
-            reach = np.maximum(probe.radii[loose] + BAND_M, probe.sight)
-            probe.near = [
-                near_faces(probe.positions[loose], reach, organ.nodes, organ.touchable)
-                for organ in self._organs
-            ]
+            touched = probe.radii[loose] + BAND_M
+            reach, centres = np.maximum(touched, probe.sight), probe.positions[loose]
+            near = [near_faces(centres, reach, organ.nodes, organ.touchable) for organ in self._organs]
             probe.touching[:] = False
-            for near in probe.near:
-                probe.touching[loose[near.within(probe.radii[loose] + BAND_M).spheres]] = True
-            if probe.sub_grid is not None:
-                self._follow(probe, probe.sub_grid)
-
-    def _follow(self, probe: Probe, sub_grid: SubGrid) -> None:
-        sub_grid.update(probe.positions[0], probe.forces[0], probe.near)
-        if sub_grid.is_beyond:
-            warn_beyond(self.name, probe.name, float(probe.radii[0]))
+            for spheres, _, _, distances in near:
+                probe.touching[loose[spheres[distances < touched[spheres]]]] = True
+            probe.follow(near)
+            if probe.sub_grid is not None and probe.sub_grid.is_beyond:
+                warn_beyond(self.name, probe.name, float(probe.radii[0]))
 
     def _bond(self, name: str) -> BondSide:
         probe = self.params.probes[name]

@@ -6,8 +6,10 @@ from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
+from xxhash import xxh3_128_digest
 
 from engines.fem.solid import Branch, Solid, SphereWay
+from engines.fem.spheres import Spheres
 from engines.tissue.organs.params import OrganParams
 from schemas.errors import SessionError
 from schemas.vectors import Vector
@@ -63,12 +65,9 @@ class Organ:
         self.solid.stand()
         self.sample(0)
 
-    def advance(self, seconds: float, path: Vector, radii: Vector, gravity: float) -> Vector:
-        """Advance; return the force on each sphere in each sub-step, N, shape (k, n, 3).
-
-        path: centres at the ends of the sub-steps, m, shape (k + 1, n, 3).
-        """
-        return self.solid.advance(seconds, SphereWay(path, radii, self._free), self.friction, gravity)
+    def advance(self, seconds: float, gravity: float) -> Vector:
+        """Advance; return the force on each sphere in each sub-step, N, shape (k, n, 3)."""
+        return self.solid.advance(seconds, self._way, self.friction, gravity)
 
     def sample(self, time_ns: int) -> None:
         """Read the nodes. Raises SessionError if the tissue has become unstable by `time_ns`."""
@@ -96,13 +95,19 @@ class Organ:
         """Let a sphere press the organ, or pass through."""
         self._free[body] = on
 
-    def meet(self, spheres: int) -> None:
-        """Forget all spheres, and let so many press the organ."""
-        self._free = np.ones(spheres, np.uint8)
+    def meet(self, spheres: Spheres) -> None:
+        """Let these spheres press the organ."""
+        self._free = np.ones(len(spheres.radii), np.uint8)
+        self._way = SphereWay(spheres.path, spheres.radii, self._free)
 
     def held_by(self, bodies: Collection[int]) -> list[int]:
         """Return the nodes that these spheres hold."""
         return np.flatnonzero(np.isin(self.solid.holder, list(bodies))).tolist()
+
+    @property
+    def digest(self) -> bytes:
+        """16 bytes by the displacements."""
+        return xxh3_128_digest(self.solid.displacement.tobytes())
 
     @property
     def state(self) -> tuple[NDArray[np.float32] | NDArray[np.int32] | NDArray[np.uint8], ...]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pydantic import Field
 
+from engines.tissue.elasticity.body_yield import MOST_NODES
 from engines.tissue.params import PressedOrgansParams
 from schemas.quantity import Duration
 
@@ -12,6 +15,8 @@ __all__ = ["FemParams"]
 
 class FemParams(PressedOrgansParams):
     """Tissue in explicit dynamics."""
+
+    most_corrected_nodes: ClassVar[int] = MOST_NODES
 
     timestep: Duration | None = Field(
         default=None,

@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from engines.tissue.elasticity.compliance import MOST_NODES
+from engines.tissue.elasticity.dense_body_yield import MOST_NODES
 from engines.tissue.organs.anchors import WORLD, RigidParams
 from engines.tissue.organs.params import OrganParams
 from engines.tissue.probes.params import ProbeParams
@@ -22,6 +22,8 @@ class PressedOrgansParams(TissueParams):
     """Organs, probes, and numerics; an engine adds its own."""
 
     open_to_pages: ClassVar[bool] = True
+    most_corrected_nodes: ClassVar[int] = MOST_NODES
+    """Most nodes of organs whose force is corrected for their coarse mesh."""
 
     organs: dict[Name, OrganParams] = Field(min_length=1)
     rigid: dict[Name, RigidParams] = Field(
@@ -39,7 +41,7 @@ class PressedOrgansParams(TissueParams):
         default=True,
         description=(
             "whether a probe of one sphere feels the force of the tissue rather than of its coarse mesh, on"
-            " anchored organs of at most 1200 nodes"
+            " anchored organs of at most 1200 nodes, with kind fem 3500"
         ),
     )
 
@@ -71,7 +73,8 @@ class PressedOrgansParams(TissueParams):
     @property
     def _is_compliance_known(self) -> bool:
         return all(
-            len(organ.rest.nodes) <= MOST_NODES and any(tied.any() for tied in organ.anchored_nodes.values())
+            len(organ.rest.nodes) <= self.most_corrected_nodes
+            and any(tied.any() for tied in organ.anchored_nodes.values())
             for organ in self.organs.values()
         )
 
@@ -81,7 +84,7 @@ class PressedOrgansParams(TissueParams):
             if probe.grasp and probe.grasp.width is not None and not self._is_compliance_known:
                 raise ValueError(
                     f"probe '{name}': grasp.width needs organs that are anchored and have at most"
-                    f" {MOST_NODES} nodes; leave it out, and a pull is that of the mesh"
+                    f" {self.most_corrected_nodes} nodes; leave it out, and a pull is that of the mesh"
                 )
         return self
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engines.tissue.elasticity.compliance import MOST_NODES, SurfaceCompliance
+from engines.tissue.elasticity.compliance import SurfaceCompliance
+from engines.tissue.elasticity.dense_body_yield import MOST_NODES
 from engines.tissue.elasticity.half_space import DEEPEST, sphere_force
 from engines.tissue.organs.params import OrganParams
 

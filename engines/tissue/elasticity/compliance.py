@@ -13,16 +13,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.tissue.elasticity.half_space import point_displacement, point_stress
+from engines.tissue.elasticity.body_yield import BodyYield
+from engines.tissue.elasticity.dense_body_yield import DenseBodyYield
 from engines.tissue.elasticity.rims import MIRRORED, mirror_displacement, rims_of
 from engines.tissue.material import Material
 from engines.tissue.meshing.tet_mesh import Indices, TetMesh
 from schemas.vectors import Vector
 
-__all__ = ["MOST_NODES", "SurfaceCompliance"]
-
-MOST_NODES = 1200
-"""Most nodes: the compliance is a dense matrix, of 100 MB and some seconds at this size."""
+__all__ = ["SurfaceCompliance"]
 
 _DIGITS = 6
 """Significant digits kept: the rounding of a sum in another order must not matter."""
@@ -30,39 +28,27 @@ _DIGITS = 6
 _SAME_SIDE = 0.9
 """Least cosine between the normals of two faces on the same side of a rim."""
 
-_POINTS: Vector = np.array([[2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]])
-"""Barycentric coordinates of the points, of equal weight, for the integral of a quadratic function over a
-face (Strang and Fix, An Analysis of the Finite Element Method, 1973).
-"""
-
 
 class SurfaceCompliance:
     """Linear compliance of the surface of an anchored mesh about the resting shape."""
 
     def __init__(
-        self, mesh: TetMesh, anchored: NDArray[np.bool_], faces: Indices, material: Material
+        self,
+        mesh: TetMesh,
+        anchored: NDArray[np.bool_],
+        faces: Indices,
+        material: Material,
+        *,
+        body_yield: type[DenseBodyYield | BodyYield] = DenseBodyYield,
     ) -> None:
-        """`anchored`: shape (n,), some true; `faces`: free faces, (f, 3); at most `MOST_NODES` nodes."""
-        stiffness = _stiffness(mesh, material)
-        free, fixed = (np.flatnonzero(np.repeat(which, 3)) for which in (~anchored, anchored))
-        inverse: Vector = np.zeros_like(stiffness)
-        inverse[np.ix_(free, free)] = np.linalg.inv(stiffness[np.ix_(free, free)])
+        """`anchored`: shape (n,), some true; `faces`: free faces, (f, 3); `body_yield`: its solver."""
         self._surface = surface = np.unique(faces)
         self._place = np.zeros(len(mesh.nodes), dtype=np.int64)
         self._place[surface] = np.arange(len(surface))
-        blocks = inverse.reshape(len(mesh.nodes), 3, len(mesh.nodes), 3)
-        self._between = _rounded(blocks[surface][:, :, surface].transpose(0, 2, 1, 3))
-        tied = stiffness[:, fixed]
-
-        def body(node: int, inward: Vector) -> float:
-            """Return the displacement by the other boundaries under 1 N along `inward` on a node, m."""
-            if anchored[node]:
-                return 0.0
-            held = -point_displacement(mesh.nodes[anchored] - mesh.nodes[node], inward, material).ravel()
-            load = _cancelling_forces(mesh.nodes, faces, node, inward, material).ravel() - tied @ held
-            return float(inward @ blocks[node].reshape(3, -1) @ load)
-
+        solver = body_yield(mesh, anchored, faces, material)
+        self._between = _rounded(solver.between(surface))
         self._normals = normals = _normals(mesh, faces, surface)
+        body = solver.of_boundaries
         self._body = _rounded(
             np.array([body(*pair) for pair in zip(surface.tolist(), -normals, strict=True)])
         )
@@ -139,25 +125,13 @@ class SurfaceCompliance:
 
 
 def _rounded(values: Vector) -> Vector:
-    """Return values rounded to `_DIGITS` of the largest value."""
-    largest = float(np.abs(values).max(initial=0.0))
-    return values if largest == 0.0 else np.round(values / largest, _DIGITS) * largest
-
-
-def _stiffness(mesh: TetMesh, material: Material) -> Vector:
-    """Return the stiffness (N/m) of linear tetrahedra at rest, shape (3 n, 3 n)."""
-    tetrahedra, size = mesh.tetrahedra, 3 * len(mesh.nodes)
-    edges = mesh.nodes[tetrahedra[:, 1:]] - mesh.nodes[tetrahedra[:, :1]]
-    inverse = np.linalg.inv(edges)
-    gradients = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2).transpose(0, 2, 1)
-    mu, lambda_ = material.lame
-    dyads = np.einsum("mai,mbj->maibj", gradients, gradients)
-    blocks = lambda_ * dyads + mu * dyads.transpose(0, 1, 4, 3, 2)
-    blocks += mu * np.einsum("maibi,jk->majbk", dyads, np.eye(3))
-    blocks *= (np.linalg.det(edges) / 6.0)[:, None, None, None, None]
-    places = (3 * tetrahedra[:, :, None] + np.arange(3)).reshape(-1, 12)
-    cells = (places[:, :, None] * size + places[:, None, :]).ravel()
-    return np.bincount(cells, blocks.ravel(), size * size).astype(np.float64).reshape(size, size)
+    """Round values to `_DIGITS` of the largest value, in place, and return them."""
+    largest = max(float(values.max(initial=0.0)), -float(values.min(initial=0.0)))
+    if largest:
+        values /= largest
+        np.round(values, _DIGITS, out=values)
+        values *= largest
+    return values
 
 
 def _normals(mesh: TetMesh, faces: Indices, surface: Indices) -> Vector:
@@ -168,21 +142,3 @@ def _normals(mesh: TetMesh, faces: Indices, surface: Indices) -> Vector:
         [np.bincount(faces.ravel(), np.repeat(areas[:, i], 3), len(mesh.nodes)) for i in range(3)], axis=1
     )[surface]
     return sums / np.linalg.norm(sums, axis=1)[:, None]
-
-
-def _cancelling_forces(
-    nodes: Vector, faces: Indices, node: int, inward: Vector, material: Material
-) -> Vector:
-    """Return the forces (N), shape (n, 3), against the stress on the faces of 1 N along `inward` on a node.
-
-    Faces around the node itself are left out: they are the surface of the half-space.
-    """
-    others = faces[(faces != node).all(axis=1)]
-    corners = nodes[others]
-    areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    points = np.einsum("qa,fai->fqi", _POINTS, corners)
-    stress = point_stress((points - nodes[node]).reshape(-1, 3), inward, material).reshape(*points.shape, 3)
-    forces = -np.einsum("fqij,fj,qa->fai", stress, areas, _POINTS) / len(_POINTS)
-    total = np.zeros_like(nodes)
-    np.add.at(total, others, forces)
-    return total

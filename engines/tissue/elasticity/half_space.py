@@ -19,6 +19,7 @@ __all__ = [
     "patch_compliance",
     "point_displacement",
     "point_stress",
+    "point_traction",
     "sphere_force",
 ]
 
@@ -123,6 +124,24 @@ def point_stress(away: Vector, inward: Vector, material: Material) -> Vector:
         + shear[:, None, None] * (mixed + mixed.transpose(0, 2, 1))
     )
     return stress / (2.0 * np.pi)
+
+
+def point_traction(away: Vector, inward: Vector, areas: Vector, material: Material) -> Vector:
+    """Return the force (N) by `point_stress` on oriented areas (m^2), both of shape (n, 3).
+
+    Other arguments and source: see `point_displacement`.
+    """
+    free = 1.0 - 2.0 * material.poisson_ratio
+    R, z, across, above = _cylindrical_coordinates(away, inward)
+    square = np.maximum(np.einsum("ni,ni->n", across, across), 1e-24)
+    radial = free / (R * above) - 3.0 * square * z / R**5
+    hoop = free * (z / R**3 - 1.0 / (R * above))
+    axial, shear = -3.0 * z**3 / R**5, -3.0 * z**2 / R**5  # shear over the radius
+    along, out = areas @ inward, np.einsum("ni,ni->n", across, areas)
+    on_axis = (axial - hoop) * along + shear * out
+    off_axis = (radial - hoop) * out / square + shear * along
+    force = hoop[:, None] * areas + on_axis[:, None] * inward + off_axis[:, None] * across
+    return force / (2.0 * np.pi)
 
 
 def _cylindrical_coordinates(away: Vector, inward: Vector) -> tuple[Vector, Vector, Vector, Vector]:

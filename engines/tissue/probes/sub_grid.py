@@ -15,7 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from engines.tissue.elasticity.body_yield import BodyYield
 from engines.tissue.elasticity.compliance import SurfaceCompliance
+from engines.tissue.elasticity.dense_body_yield import DenseBodyYield
 from engines.tissue.elasticity.half_space import DEEPEST, sphere_force
 from engines.tissue.elasticity.rims import rim_share
 from engines.tissue.material import Material
@@ -26,9 +28,9 @@ from engines.tissue.probes.params import Coupling
 from engines.tissue.warn_once import warn_once
 from schemas.vectors import Vector
 
-__all__ = ["SubGrid", "Surface", "warn_beyond"]
+__all__ = ["LAW_POINTS", "SubGrid", "Surface", "warn_beyond"]
 
-_GRID = 160
+LAW_POINTS = 160
 """Number of points of the spring's law, dense at small forces with a steep law."""
 
 _GRID_DEPTH = 4.0
@@ -60,12 +62,19 @@ _RATIOS = (0.2, 2.0)
 class Surface:
     """The surface of an anchored organ at rest under its weight, with compliance."""
 
-    def __init__(self, organ: Body, material: Material) -> None:
-        """`organ`: a settled organ."""
+    def __init__(
+        self,
+        organ: Body,
+        material: Material,
+        body_yield: type[DenseBodyYield | BodyYield] = DenseBodyYield,
+    ) -> None:
+        """`organ`: a settled organ; `body_yield`: solver of its compliance."""
         self.organ, self.material = organ, material
         self.settled = organ.nodes
         """m, shape (n, 3)."""
-        self.compliance = SurfaceCompliance(organ.mesh, organ.anchored, organ.touchable, material)
+        self.compliance = SurfaceCompliance(
+            organ.mesh, organ.anchored, organ.touchable, material, body_yield=body_yield
+        )
 
 
 @dataclass(frozen=True)
@@ -92,7 +101,7 @@ class SubGrid:
 
     def __init__(self, radius: float, coupling: Coupling, surfaces: Sequence[Surface]) -> None:
         self._radius, self._coupling, self._surfaces = radius, coupling, surfaces
-        self._depths: Vector = np.linspace(0.0, 1.0, _GRID) ** 2 * _GRID_DEPTH * radius
+        self._depths: Vector = np.linspace(0.0, 1.0, LAW_POINTS) ** 2 * _GRID_DEPTH * radius
         self._half_spaces = [sphere_force(self._depths, radius, one.material) for one in surfaces]
         self.yielded = 0.0
         """How far the spring is compressed, m."""
@@ -114,13 +123,21 @@ class SubGrid:
         return np.array([self.yielded, self._speed, *self.inward, self.ratio, *last])
 
     @property
-    def numbers(self) -> Vector:
-        """Everything that the next step depends on, to be set again, shape (10 + 3 `_GRID`,)."""
-        flags = float(self._is_new), float(self.is_beyond), float(len(self._forces) == _GRID)
-        law = np.zeros((3, _GRID))
+    def law(self) -> Vector:
+        """Forces (N), yields of the spring and yields of the mesh (m), shape (3, `LAW_POINTS`).
+
+        Zeros away from tissue.
+        """
+        law = np.zeros((3, LAW_POINTS))
         law[:, : len(self._forces)] = self._forces, self._yields, self._mesh_yields
+        return law
+
+    @property
+    def numbers(self) -> Vector:
+        """Everything that the next step depends on, to be set again, shape (10 + 3 `LAW_POINTS`,)."""
+        flags = float(self._is_new), float(self.is_beyond), float(len(self._forces) == LAW_POINTS)
         return np.array(
-            [self.yielded, self._speed, *self.inward, self.ratio, self._rim, *flags, *law.ravel()]
+            [self.yielded, self._speed, *self.inward, self.ratio, self._rim, *flags, *self.law.ravel()]
         )
 
     @numbers.setter
@@ -128,7 +145,7 @@ class SubGrid:
         self.yielded, self._speed, self.ratio, self._rim = numbers[[0, 1, 5, 6]].tolist()
         self.inward = numbers[2:5].copy()
         self._is_new, self.is_beyond, has_law = (bool(flag) for flag in numbers[7:10].tolist())
-        law = numbers[10:].reshape(3, _GRID)[:, : _GRID if has_law else 1].copy()
+        law = numbers[10:].reshape(3, LAW_POINTS)[:, : LAW_POINTS if has_law else 1].copy()
         self._forces, self._yields, self._mesh_yields = law
 
     def give_way(self, spring: Vector, damper: Vector, since: float, *, keep: bool) -> None:
@@ -149,18 +166,6 @@ class SubGrid:
         damper -= coupling.damping * speed * inward
         if keep:
             self.yielded, self._speed, self._is_new = yielded, speed, False
-
-    def follow(self, pressed: float, rate: float) -> None:
-        """Let the yield go towards that of a force of `pressed` (N) by the share `rate` of the way.
-
-        For a sphere without a coupling, whose force falls as it yields: the share is that of a closed loop,
-        as the mesh's part of all compliance says.
-        """
-        force = max(pressed, 0.0)
-        wanted = float(np.interp(force, self._forces, self._yields))
-        mesh = float(np.interp(force, self._forces, self._mesh_yields))
-        whole = wanted + mesh
-        self.yielded += rate * (mesh / whole if whole > 0.0 else 1.0) * (wanted - self.yielded)
 
     def sight(self, velocity: Vector) -> float:
         """Return how far (m) from the centre of a sphere with this velocity (m/s) a face may soon be touched.
@@ -235,7 +240,7 @@ class SubGrid:
         return between
 
     def _missing(self, place: _Place, between: Vector, pressed: float) -> Vector:
-        """Return the body's depth less the yield of mesh and coupling, m, by force, shape (`_GRID`,).
+        """Return the body's depth less the yield of mesh and coupling, m, by force, shape (`LAW_POINTS`,).
 
         `pressed`: force of the present parts, N.
         """

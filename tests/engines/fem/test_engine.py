@@ -46,6 +46,13 @@ def test_the_force_is_that_of_converged_elements(radius, place):
         assert np.std([wrench[2] for wrench in rig.wrenches[-50:]]) < 1e-4 * rig.force[2]
 
 
+def test_the_force_of_a_fine_mesh_is_corrected_too():
+    with FemRig(params({**BLOCK, "nodes": 1500}), start=(0.0, 0.0, 6e-3)) as rig:
+        rig.move((0.0, 0.0, 2e-3), 0.05)
+        rig.hold(0.1)
+        assert rig.force[2] == pytest.approx(CONVERGED[5e-3][2], rel=0.03)
+
+
 def test_a_swinging_press_gives_back_no_more_than_it_took():
     with FemRig(params({**BLOCK, "nodes": 250}), start=(0.0, 0.0, 6e-3)) as rig:
         rig.move((0.0, 0.0, 2e-3), 0.1)

@@ -5,7 +5,10 @@ from math import pi
 import numpy as np
 import pytest
 
+from engines.tissue.elasticity.body_yield import BodyYield
 from engines.tissue.elasticity.compliance import SurfaceCompliance
+from engines.tissue.elasticity.dense_body_yield import DenseBodyYield
+from engines.tissue.elasticity.sparse_inverse import levels_of
 from engines.tissue.organs.params import OrganParams
 from tests.engines.bullet.finite_elements import Elements
 from tests.engines.bullet.rig import BLOCK, SMALL_BLOCK
@@ -13,11 +16,12 @@ from tests.engines.bullet.rig import BLOCK, SMALL_BLOCK
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def surface(block):
+def surface(block, body_yield=DenseBodyYield):
     organ = OrganParams.model_validate(block)
     anchored = np.any(list(organ.anchored_nodes.values()), axis=0)
     faces = organ.rest.triangles[~anchored[organ.rest.triangles].all(axis=1)]
-    return organ, anchored, SurfaceCompliance(organ.rest, anchored, faces, organ.elastic)
+    compliance = SurfaceCompliance(organ.rest, anchored, faces, organ.elastic, body_yield=body_yield)
+    return organ, anchored, compliance
 
 
 def top_near(organ, x, y, count=1):
@@ -62,3 +66,26 @@ def test_near_a_free_edge_the_body_gives_way_more():
     organ, _, compliance = surface(BLOCK)
     middle, near_the_edge = top_near(organ, 0.0, 0.0), top_near(organ, 32e-3, 0.0)
     assert compliance.of_body(near_the_edge, np.ones(1)) > compliance.of_body(middle, np.ones(1))
+
+
+@pytest.mark.parametrize("block", [BLOCK, {"shape": "liver-lobe", "nodes": 200}])
+def test_the_sparse_inverse_has_the_compliance_of_the_dense(block):
+    organ, _, dense = surface(block)
+    _, _, sparse = surface(block, BodyYield)
+    nodes = np.unique(organ.rest.triangles)
+    nodes = sparse.on_surface(nodes)
+    expected = dense.between(nodes)
+    np.testing.assert_allclose(sparse.between(nodes), expected, atol=3e-6 * np.abs(expected).max())
+    for node in nodes.tolist():
+        both = (one.of_body(np.array([node]), np.ones(1)) for one in (sparse, dense))
+        assert next(both) == pytest.approx(next(both), rel=1e-4, abs=1e-3 * expected.max())
+
+
+def test_two_parts_that_do_not_touch_have_levels_one_after_the_other():
+    mesh = OrganParams.model_validate(SMALL_BLOCK).rest
+    count = len(mesh.nodes)
+    nodes = np.concatenate([mesh.nodes, mesh.nodes + np.array([0.2, 0.0, 0.0])])
+    pairs = np.argwhere(np.ones((count, count)))
+    level = levels_of(nodes, np.concatenate([pairs, pairs + count]), np.ones(2 * count, bool))
+    assert level.min() == 0
+    assert level[:count].max() < level[count:].min()
