@@ -11,8 +11,10 @@ from rich.markup import escape
 
 from hub.command_line.display import LATENCY_COLUMNS, latency_rows, results, show_commands, show_tables, table
 from hub.observation.summary import Summary
+from hub.planning.foreign_code import foreign_code
 from hub.planning.limits import safe_text
 from hub.recording.profiles import profile_tables
+from hub.recording.recording import Recording
 from hub.recording.scores import score_tables
 from schemas.readable import label, readable
 
@@ -105,4 +107,11 @@ def _next_commands(again: str, summary: Summary) -> Iterator[tuple[str, str]]:
     yield f"trocar film {place}", "a film"
     if summary.scores:
         yield f"trocar score {place}", "all metrics and events"
-    yield f"trocar verify {place}", "simulate it again and compare every state"
+    trust = " --trust" if _has_foreign_code(path) else ""
+    yield f"trocar verify {place}{trust}", "simulate it again and compare every state"
+
+
+def _has_foreign_code(recording: Path) -> bool:
+    """Return whether a recording can be simulated with trust only."""
+    participants = Recording(recording).scenario().participants
+    return bool(foreign_code([spec.model_dump() for spec in participants.values()], {}))

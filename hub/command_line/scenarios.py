@@ -22,6 +22,8 @@ from schemas.keys import valid_name
 __all__ = ["list_scenarios", "new", "print_scenarios"]
 
 _SCHEMA = "scenario.schema.json"
+_LEADS = 17
+"""Width of the column with the kinds that lead, so that 80 columns have room for what happens."""
 
 
 def list_scenarios() -> None:
@@ -36,7 +38,12 @@ def print_scenarios() -> None:
         results.print(f"[bold]{escape(family)}[/]")
         for name in names:
             what, leads, long = _columns(read(installed[name]))
-            results.print(Text(f"  {name:18}{long:15}{leads:29}{what}"), no_wrap=True, overflow="ellipsis")
+            start = f"  {name:18}{long:13}"
+            if not results.is_terminal:  # a file has any width
+                results.print(Text(f"{start}{leads:29}{what}"), soft_wrap=True)
+                continue
+            leads = leads if len(leads) < _LEADS else f"{leads[: _LEADS - 2]}…"
+            results.print(Text(f"{start}{leads:{_LEADS}}{what}"), no_wrap=True, overflow="ellipsis")
         results.print()
     show_commands(
         [

@@ -134,9 +134,12 @@ def _import_kind(kind: Kind) -> Any:
     try:
         return kind.entry.load()
     except (Exception, SystemExit) as error:  # a module may raise anything on import
+        module = kind.entry.module.partition(".")[0]
+        unknown = isinstance(error, ModuleNotFoundError) and error.name == module
+        remedy = f"; state where {module}.py is: PYTHONPATH=DIR trocar ..." if unknown else ""
         raise ScenarioError(
             f"{kind.role} '{kind.name}' of '{kind.distribution}' cannot be loaded from {kind.entry.value}:"
-            f" {type(error).__name__}: {error}"
+            f" {type(error).__name__}: {error}{remedy}"
         ) from error
 
 

@@ -1,5 +1,6 @@
 """The way to a first run: scenarios listed, copied, recorded under a name of their own or over an old one."""
 
+import sys
 from itertools import chain
 
 import pytest
@@ -31,6 +32,7 @@ def test_they_are_listed_a_line_each(trocar):
     assert "expert" in lines["peg-board"]
     assert "simulated-touch, scripted" in lines["teleop"]
     assert "controller" not in out
+    assert "A recorded hand palpates a soft block with PSM1" in lines["palpation"], "whole, in a file"
     assert lines["cart"].split()[1:4] == ["2", "s", "The"], "nothing leads it"
     assert "until Ctrl-C" in lines["ros"]
     assert trocar("run")[1] == out, "also where a name is missing"
@@ -77,3 +79,39 @@ def test_a_recording_is_overwritten_on_demand_alone(trocar, here):
     code, _, err = trocar("run", "short.yaml", "--record", "one", "--overwrite")
     assert (code, "something else than a recording" in " ".join(err.replace("│", " ").split())) == (2, True)
     assert (here / "one" / "notes.txt").read_text() == "mine"
+
+
+OWN = """\
+step: 1 ms
+duration: 5 ms
+participants: {part: {kind: "part:Part"}}
+"""
+PART = """\
+from trocar import Controller, Params
+
+
+class Part(Controller):
+    params_model, ports = Params, ()
+
+    def configure(self, setup):
+        return {}
+
+    def step(self, t, h, inputs):
+        return {}
+"""
+
+
+def test_a_class_of_ones_own_is_found_and_verified_as_the_command_says(trocar, here, monkeypatch):
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (here / "own.yaml").write_text(f"name: own\n{OWN}")
+    code, _, err = trocar("check", "own.yaml")
+    assert code != 0
+    assert "state where part.py is: PYTHONPATH=DIR trocar" in err
+    (here / "code").mkdir()
+    (here / "code" / "part.py").write_text(PART)
+    sys.path.append(str(here / "code"))
+    code, out, _ = trocar("run", "own.yaml", "--record", "recorded")
+    assert code == 0
+    command = next(line for line in out.splitlines() if line.startswith("trocar verify"))
+    assert command.split("  ")[0] == "trocar verify recorded --trust"
+    assert trocar(*command.split("  ")[0].split()[1:])[0] == 0
