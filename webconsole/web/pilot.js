@@ -13,6 +13,7 @@ const KEYS = {
   " ": ["hold to move", { dead_man: true }],
   c: ["close", { gripper: -1, jaw: true }], v: ["open", { gripper: 1 }],
 }
+const CAPS = { " ": "space", arrowup: "↑", arrowdown: "↓", arrowleft: "←", arrowright: "→" }
 // Why a device holds (devices/browser/page_hand.py), and what to do.
 const WHY = {
   unled: "the device waits for this page",
@@ -92,7 +93,7 @@ export class Pilot {
     const keys = element("div", "keys")
     for (const [key, [text]] of Object.entries(KEYS)) {
       const one = element("span"), cap = element("kbd")
-      cap.textContent = key === " " ? "space" : key.replace("arrow", "arrow ")
+      cap.textContent = CAPS[key] ?? key
       one.append(cap, ` ${text}`)
       keys.append(one)
     }
