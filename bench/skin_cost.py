@@ -28,7 +28,7 @@ from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 from engines.mujoco.pictures.skin_mesh import SkinMesh
-from engines.mujoco.pictures.skins import SoftBody
+from engines.mujoco.pictures.soft_body import SoftBody
 from engines.tissue.meshing.grid import block
 from engines.tissue.meshing.tet_mesh import TetMesh
 from schemas.ros import Header

@@ -45,7 +45,10 @@ class Port(BaseModel):
     period_ns: int = Field(default=0, ge=0)
     """An output is produced at this period, a multiple of the step; 0: whenever the participant steps."""
     start: tuple[float, ...] | None = None
-    """Value of an input while nothing is connected (FMI's word); None: the input must be connected."""
+    """Value of an input while nothing is connected (FMI's word); None: the input must be connected.
+
+    An input of a message without a vector form has no value while nothing is connected: an empty tuple.
+    """
     limits: tuple[float, float] | None = None
     """Least and greatest value of a tunable parameter; None: the port is no tunable parameter.
 

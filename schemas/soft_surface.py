@@ -40,14 +40,23 @@ class SoftSurface(NamedTuple):
     @classmethod
     def of_first(cls, state: SoftBodyState) -> SoftSurface:
         """Return the surface of a first state. Raises MessageError if it has none, or an invalid one."""
-        count, triangles = state.nodes_m.size // 3, state.triangles
-        if state.nodes_m.size % 3 or not triangles.size or triangles.size % 3 or triangles.max() >= count:
+        if state.nodes_m.size % 3 or not state.triangles.size or state.triangles.size % 3:
             raise MessageError(
-                f"soft body '{state.body:.40}': {triangles.size} numbers are no triangles of"
-                f" {state.nodes_m.size / 3:g} nodes"
+                f"soft body '{state.body:.40}': {state.triangles.size} numbers of triangles,"
+                f" {state.nodes_m.size} of nodes, expected three for each"
             )
-        faces = triangles.astype(np.int32).reshape(-1, 3)
-        return cls(faces, np.zeros(len(faces), np.uint8), np.arange(count))
+        return cls.of_triangles(state.triangles.reshape(-1, 3), state.nodes_m.size // 3)
+
+    @classmethod
+    def of_triangles(cls, triangles: NDArray[np.uint32], nodes: int) -> SoftSurface:
+        """Return the surface of `triangles`, shape (f, 3). Raises MessageError for nodes beyond `nodes`."""
+        if triangles.max(initial=0) >= max(nodes, 1):
+            raise MessageError(f"the triangles are not three node indices each, below {nodes}")
+        return cls(triangles.astype(np.int32), np.zeros(len(triangles), np.uint8), np.arange(nodes))
+
+    def of_kind(self, kind: FaceKind) -> NDArray[np.int32]:
+        """Return the faces of a kind of tissue, without empty slots, shape (k, 3)."""
+        return self.faces[(self.kinds == kind) & (self.faces[:, 0] != _GONE)]
 
     def changed(self, change: SurfaceChange) -> SoftSurface:
         """Return the surface with a change. `self`: the surface of the first state.

@@ -11,8 +11,10 @@ from typing import Any
 from hub.devices.network_link_control import NetworkLinkRequest
 from hub.recording.bond_trace import Contact
 from hub.transport.control_messages import Empty, StepRequest
+from schemas.codec import decode
 from schemas.errors import MessageError, ScenarioError
-from schemas.trocar_msgs import ScoreCard
+from schemas.soft_surface import SoftSurface
+from schemas.trocar_msgs import ScoreCard, SoftBodyState
 from webconsole.changes import wrong_fields
 from webconsole.commands import Control, Fork, Network, Pick, Say, Start, Tune
 from webconsole.fork import fork_arguments, fork_modules
@@ -57,6 +59,8 @@ class Console:
         self._making = asyncio.Lock()
         self._wants: dict[object, frozenset[str]] = {}
         self._made: dict[str, tuple[Value, Section]] = {}
+        self._firsts: dict[str, SoftSurface] = {}
+        """Surfaces at time 0, by outlet of the nodes."""
 
     async def stage(self) -> Stage | None:
         """Return the stage of the present session; None without a session."""
@@ -69,7 +73,7 @@ class Console:
                     Stage, scenario, self.source.outlets, self.source.params
                 )
                 await asyncio.to_thread(lambda: self._stage and self._stage.packed_geometry)
-                self._generation, self._made = generation, {}
+                self._generation, self._made, self._firsts = generation, {}, {}
                 await asyncio.to_thread(self.drawable)
             return self._stage
 
@@ -93,6 +97,22 @@ class Console:
         held = self._made.get(name)
         if held is None or held[0] is not value:
             held = self._made[name] = value, stage.section(name, value)
+        return held[1]
+
+    def first_surface(self, name: str) -> SoftSurface | None:
+        """Return a soft surface at time 0, read once; None if unknown. Raises MessageError if invalid."""
+        if name not in self._firsts and (first := self.source.first(name)) is not None:
+            state = decode(SoftBodyState, first.payload)
+            if not state.triangles.size:
+                return None
+            self._firsts[name] = SoftSurface.of_first(state)
+        return self._firsts.get(name)
+
+    def change(self, stage: Stage, name: str, first: SoftSurface, value: Value) -> Section:
+        """Return the section with the changes of a surface, made once for all pages."""
+        held = self._made.get(stage.changes[name])
+        if held is None or held[0].payload != value.payload:
+            held = self._made[stage.changes[name]] = value, stage.change(name, first, value)
         return held[1]
 
     def poses(self, stage: Stage, participant: str, values: dict[str, Value]) -> Section:

@@ -18,11 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.errors import MessageError
+from schemas.trocar_msgs import SurfaceChange
 
 __all__ = [
     "VERSION",
     "Section",
     "SectionKind",
+    "change_content",
     "frame",
     "node_content",
     "parse_acknowledgement",
@@ -44,7 +46,7 @@ class SectionKind(IntEnum):
     POSES = 1
     """Poses of the bodies of a scene: `pose_content`."""
     SURFACE = 2
-    """u32 (f, 3): triangles of a soft surface, before the first nodes."""
+    """u32 (f, 3): triangles of a soft surface at time 0, before the first nodes."""
     NODES = 3
     """The nodes of a soft surface: `node_content`."""
     PICTURE = 4
@@ -57,6 +59,8 @@ class SectionKind(IntEnum):
     """All markers of a participant: `webconsole/markers.py`."""
     FELT = 8
     """f32: norm of the force (N) for the hand at a device."""
+    CHANGE = 9
+    """Difference of a soft surface from its triangles: `change_content`."""
 
 
 class Section(NamedTuple):
@@ -92,6 +96,15 @@ def node_content(nodes: NDArray[np.float32]) -> bytes:
     step = np.maximum((high - low) / np.float32(65535.0), np.float32(1e-12))
     steps: NDArray[np.uint16] = np.rint((columns - low) / step).astype("<u2")
     return low.astype("<f4").tobytes() + step.astype("<f4").tobytes() + steps.tobytes()
+
+
+def change_content(change: SurfaceChange) -> bytes:
+    """Return slots, u32 (k,), their faces as node indices, i32 (k, 3), and the kinds of the faces, u8 (k,).
+
+    A face of three times -1 is gone.
+    """
+    slots, faces = change.slots.astype("<u4"), change.faces.astype("<i4")
+    return slots.tobytes() + faces.tobytes() + change.kinds.tobytes()
 
 
 def frame(number: int, time_ns: int, parts: Sequence[Section]) -> bytes:

@@ -85,13 +85,16 @@ class NewSections:
             yield self._console.poses(stage, participant, values)
 
     def _surface(self, stage: Stage, name: str) -> Iterator[Section]:
+        first = self._console.first_surface(name)
+        if first is None:
+            return
         if name not in self._surfaces:
-            first = self._console.source.first(name)
-            surface = None if first is None else stage.surface(name, first)
-            if surface is None:
-                return
             self._surfaces.add(name)
-            yield surface
+            yield stage.surface(name, first)
+        if (outlet := stage.changes.get(name)) and (change := self._newest(outlet)):
+            before, self._sent[outlet] = self._sent.get(outlet), change
+            if before is None or before.payload != change.payload:
+                yield self._console.change(stage, name, first, change)
         yield from self._changed_section(stage, name)
 
     def _force_arrows(self, stage: Stage, bond: BondArrows) -> Iterator[Section]:

@@ -15,20 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hub.participant import Params
-from hub.participant.view import Rgb, Scene
+from hub.participant.view import TISSUE_COLOURS, Rgb, Scene
 from schemas.codec import decode
 from schemas.errors import TrocarError
 from schemas.message import Message
 from schemas.ros import CompressedImage
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import ShownMarkers, SoftBodyState
+from schemas.soft_surface import SoftSurface
+from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange
 from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
 from webconsole.bond_history import BondHistory
 from webconsole.drag import DraggedTip, dragged_tips
 from webconsole.felt import felt_wrenches
 from webconsole.followers import find_followers
-from webconsole.frame import Section, SectionKind, node_content
+from webconsole.frame import Section, SectionKind, change_content, node_content
 from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
 from webconsole.source import Outlet, Value
@@ -66,6 +67,13 @@ class Stage:
         signals = [one for one in outlets if one.port.variability == "signal"]
         self.surfaces = {name: colours.get(name, _FLESH) for name in _of_type(signals, SoftBodyState)}
         """Colour of each soft surface, by the outlet of the nodes."""
+        changes = _of_type(signals, SurfaceChange)
+        self.changes = {
+            name: change
+            for name in self.surfaces
+            if (change := f"{name.removesuffix('nodes')}surface") in changes
+        }
+        """Outlet of the changed surface, by the outlet of the nodes."""
         self.markers = _of_type(outlets, ShownMarkers)
         self.pictures = _of_type(outlets, CompressedImage)
         self.numbers = {one.name: VectorCodec(one.port) for one in signals if has_vector(one.port.type)}
@@ -87,7 +95,15 @@ class Stage:
         of_hands = (name for names in self.felt.values() for name in names)
         of_arrows = (name for bond in self.arrows for name in bond)
         self.shown = frozenset(
-            (*self._codecs, *self.surfaces, *self.markers, *of_arrows, *of_hands, *of_followers)
+            (
+                *self._codecs,
+                *self.surfaces,
+                *self.changes.values(),
+                *self.markers,
+                *of_arrows,
+                *of_hands,
+                *of_followers,
+            )
         )
         """The outlets needed for the scene itself."""
 
@@ -145,14 +161,15 @@ class Stage:
         picture = decode(CompressedImage, value.payload).data.tobytes()
         return Section(SectionKind.PICTURE, self.pictures.index(name), picture)
 
-    def surface(self, name: str, first: Value) -> Section | None:
-        """Return the triangles of a soft surface; None if this message has none."""
-        state = decode(SoftBodyState, first.payload)
-        if not state.triangles.size or state.triangles.max() >= state.nodes_m.size // 3:
-            return None
-        return Section(
-            SectionKind.SURFACE, [*self.surfaces].index(name), state.triangles.astype("<u4").tobytes()
-        )
+    def surface(self, name: str, first: SoftSurface) -> Section:
+        """Return the triangles of a soft surface at time 0."""
+        return Section(SectionKind.SURFACE, [*self.surfaces].index(name), first.faces.astype("<u4").tobytes())
+
+    def change(self, name: str, first: SoftSurface, value: Value) -> Section:
+        """Return the difference of a soft surface from time 0; raises MessageError if it does not fit."""
+        change = decode(SurfaceChange, value.payload)
+        first.changed(change)
+        return Section(SectionKind.CHANGE, [*self.surfaces].index(name), change_content(change))
 
     def is_numeric(self, name: str) -> bool:
         """Return whether an outlet can be plotted."""
@@ -184,7 +201,10 @@ class Stage:
         """Return the description for a page before the first frame, ready for JSON."""
         return {
             "scenes": [*self.scenes],
-            "surfaces": [{"name": name, "colour": rgb} for name, rgb in self.surfaces.items()],
+            "surfaces": [
+                {"name": name, "colours": [rgb, *TISSUE_COLOURS.values()]}
+                for name, rgb in self.surfaces.items()
+            ],
             "pictures": list(self.pictures),
             "felt": list(self.felt),
             "dragged": [tip._asdict() for tip in self.dragged],

@@ -12,12 +12,20 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from schemas.soft_surface import FaceKind
 from schemas.vectors import Vector
 
-__all__ = ["Camera", "Frame", "Part", "Rgb", "Scene"]
+__all__ = ["TISSUE_COLOURS", "Camera", "Frame", "Part", "Rgb", "Scene"]
 
 Rgb = tuple[float, float, float]
 """Red, green and blue, each from 0 to 1."""
+
+TISSUE_COLOURS: Mapping[FaceKind, Rgb] = {
+    FaceKind.CUT: (0.70, 0.06, 0.07),
+    FaceKind.COAGULATED: (0.84, 0.76, 0.64),
+    FaceKind.CHARRED: (0.11, 0.07, 0.05),
+}
+"""Colours of changed tissue, by eye: raw and wet in a cut, pale where coagulated, black where charred."""
 
 
 class Part(NamedTuple):

@@ -33,11 +33,11 @@ def check_declarations(participant: Stepped | Device) -> None:
     for port in ports:
         codec = PortCodec(port).vector  # raises MessageError for an unknown type
         if port.start is not None:
-            fits = codec is not None and len(port.start) == codec.size
+            fits = len(port.start) == (0 if codec is None else codec.size)
             require(
                 fits,
-                f"the start value of input '{port.name}' has one number for each of the port, but it is"
-                f" {port.start}",
+                f"the start value of input '{port.name}' has one number for each of the port, none for a"
+                f" message, but it is {port.start}",
             )
     params = participant.params
     try:

@@ -71,6 +71,7 @@ class mjtIntegrator(IntEnum):
     mjINT_IMPLICITFAST = ...
 
 class mjtObj(IntEnum):
+    mjOBJ_FLEX = ...
     mjOBJ_BODY = ...
     mjOBJ_XBODY = ...
     mjOBJ_JOINT = ...
@@ -244,6 +245,7 @@ class _Element:
     geomnum: NDArray[np.int32]
 
 class _Skin:
+    id: int
     vertadr: NDArray[np.int32]
     vertnum: NDArray[np.int32]
 
@@ -314,10 +316,21 @@ class MjModel:
     jnt_stiffness: _Array
     qpos_spring: _Array
     skin_vert: NDArray[np.float32]
+    skin_group: NDArray[np.int32]
+    flex_elem: NDArray[np.int32]
+    flex_elemadr: NDArray[np.int32]
+    flex_elemdataadr: NDArray[np.int32]
+    flex_elemnum: NDArray[np.int32]
+    flex_group: NDArray[np.int32]
+    flex_matid: NDArray[np.int32]
+    flex_shellnum: NDArray[np.int32]
+    flex_vertadr: NDArray[np.int32]
+    flex_vertnum: NDArray[np.int32]
     def actuator(self, name: str) -> _Element: ...
     def body(self, name: str | int) -> _Element: ...
     def equality(self, name: str | int) -> _Element: ...
     def skin(self, name: str) -> _Skin: ...
+    def material(self, name: str) -> _Element: ...
     def joint(self, name: str | int) -> _Element: ...
     def tendon(self, name: str | int) -> _Element: ...
     def sensor(self, name: str | int) -> _Element: ...
@@ -332,6 +345,7 @@ class _Contacts:
     frame: _Array
 
 class MjData:
+    flexvert_xpos: _Array
     contact: _Contacts
     efc_force: _Array
     efc_id: NDArray[np.int32]

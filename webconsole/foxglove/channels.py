@@ -20,9 +20,10 @@ from foxglove.messages import (
 )
 from numpy.typing import NDArray
 
-from hub.participant.view import Scene
+from hub.participant.view import TISSUE_COLOURS, Scene
 from schemas.codec import decode, ros2msg_definition
-from schemas.trocar_msgs import SoftBodyState
+from schemas.soft_surface import FaceKind, SoftSurface
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange
 from webconsole.source import Outlet, Source, Value
 from webconsole.stage import Stage
 
@@ -124,7 +125,7 @@ class _Shapes(Channel):
         for number, part in enumerate(self._scene.parts):
             shape = _triangles(part.vertices, part.faces, part.colour)
             frame = f"{self._participant}/{self._scene.bodies[part.body]}"
-            yield _scene_entity(f"{self._participant}/{number}", frame, shape, 0)
+            yield _scene_entity(f"{self._participant}/{number}", frame, [shape], 0)
 
 
 class _Surface(Channel):
@@ -132,19 +133,30 @@ class _Surface(Channel):
 
     def __init__(self, stage: Stage, name: str, source: Source, context: foxglove.Context) -> None:
         topic = f"/{name.replace('.', '/')}/surface"
-        super().__init__(topic, (name,), SceneUpdate.get_schema(), "protobuf", context)
-        self._name, self._source, self._colour = name, source, stage.surfaces[name]
+        change = stage.changes.get(name)
+        outlets = (name,) if change is None else (name, change)
+        super().__init__(topic, outlets, SceneUpdate.get_schema(), "protobuf", context)
+        self._name, self._change, self._source = name, change, source
+        self._colours = {FaceKind.OUTSIDE: stage.surfaces[name], **TISSUE_COLOURS}
 
     def _messages(self, values: dict[str, Value]) -> Iterator[bytes]:
         first, value = self._source.first(self._name), values.get(self._name)
         if first is None or value is None:
             return
         nodes = decode(SoftBodyState, value.payload).nodes_m.reshape(-1, 3)
-        faces = decode(SoftBodyState, first.payload).triangles.reshape(-1, 3)
-        if faces.size and faces.max() < len(nodes):
-            yield _scene_entity(
-                self._name, WORLD, _triangles(nodes, faces, (*self._colour, 1.0)), value.time_ns
-            )
+        start = decode(SoftBodyState, first.payload)
+        if not start.triangles.size:
+            return
+        surface = SoftSurface.of_first(start)
+        if change := values.get(self._change or ""):
+            surface = surface.changed(decode(SurfaceChange, change.payload))
+        shapes = [
+            _triangles(nodes, faces, (*colour, 1.0))
+            for kind, colour in self._colours.items()
+            if len(faces := surface.of_kind(kind))
+        ]
+        if surface.faces.max() < len(nodes):
+            yield _scene_entity(self._name, WORLD, shapes, value.time_ns)
 
 
 def channels_of(
@@ -173,15 +185,17 @@ def _stamp(time_ns: int) -> Timestamp:
     return Timestamp(*divmod(time_ns, 10**9))
 
 
-def _scene_entity(name: str, frame: str, shape: TriangleListPrimitive, time_ns: int) -> bytes:
+def _scene_entity(name: str, frame: str, shapes: list[TriangleListPrimitive], time_ns: int) -> bytes:
     made = SceneEntity(
-        timestamp=_stamp(time_ns), frame_id=frame, id=name, frame_locked=True, triangles=[shape]
+        timestamp=_stamp(time_ns), frame_id=frame, id=name, frame_locked=True, triangles=shapes
     )
     return SceneUpdate(entities=[made]).encode()
 
 
 def _triangles(
-    vertices: NDArray[np.float32], faces: NDArray[np.uint32], colour: tuple[float, float, float, float]
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.uint32] | NDArray[np.int32],
+    colour: tuple[float, float, float, float],
 ) -> TriangleListPrimitive:
     red, green, blue, opacity = colour
     return TriangleListPrimitive(

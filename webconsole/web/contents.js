@@ -3,6 +3,7 @@
 import * as THREE from "./vendor/three.module.js"
 import { creased, gathered, smooth } from "./mesh.js"
 
+const WET = 1 // the kind of face inside a cut: webconsole/stage.py has the colours by kind
 const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
 
 export class Contents {
@@ -15,7 +16,7 @@ export class Contents {
   clear() {
     for (const old of this.owned ?? []) {
       this.world.remove(old)
-      old.traverse((one) => { one.geometry?.dispose(); one.material?.dispose() })
+      old.traverse((one) => { one.geometry?.dispose(); for (const each of [one.material ?? []].flat()) each.dispose() })
     }
     this.owned = []
     this.bodies = [] // by scene: a group for each body
@@ -29,7 +30,7 @@ export class Contents {
     const size = new DataView(buffer).getUint32(0, true)
     const scenes = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)))
     for (const scene of scenes) this.add(scene, buffer, 4 + size)
-    this.surfaces = surfaces.map(({ colour }) => ({ colour, mesh: null, triangles: null }))
+    this.surfaces = surfaces.map(({ colours }) => ({ colours, mesh: null, triangles: null, changed: null, stale: false }))
     return scenes
   }
 
@@ -68,7 +69,15 @@ export class Contents {
 
   surface(index, triangles) {
     const surface = this.surfaces[index]
-    if (surface) surface.triangles = triangles
+    if (surface) Object.assign(surface, { triangles, changed: null, stale: true })
+  }
+
+  // `changed`: slots, faces and kinds that differ from the triangles; link.js, `changeOf`.
+  change(index, changed) {
+    const surface = this.surfaces[index]
+    if (!surface) return
+    Object.assign(surface, { changed, stale: true })
+    if (surface.mesh) this.nodes(index, surface.positions)
   }
 
   // Returns whether the surface is drawn from now on.
@@ -76,27 +85,61 @@ export class Contents {
     const surface = this.surfaces[index]
     if (!surface?.triangles) return false
     const first = !surface.mesh
-    if (first) {
-      const split = creased(positions, surface.triangles, SOFT)
-      surface.origin = split.origin
-      const made = new THREE.BufferGeometry()
-      made.setAttribute("position", attribute(3 * split.origin.length))
-      made.setAttribute("normal", attribute(3 * split.origin.length))
-      made.setIndex(new THREE.BufferAttribute(split.index, 1))
-      surface.mesh = new THREE.Mesh(made, this.material([...surface.colour, 1], THREE.DoubleSide))
-      surface.mesh.frustumCulled = false
-      this.own(surface.mesh)
-    }
+    if (surface.stale) this.renew(surface, positions)
+    surface.positions = positions
+    if (surface.stale || positions.length < 3 * surface.count) return false // the nodes of its faces are still to come
     const { position, normal } = surface.mesh.geometry.attributes
     gathered(positions, surface.origin, position.array)
     smooth(position.array, surface.mesh.geometry.index.array, normal.array)
     position.needsUpdate = normal.needsUpdate = true
     return first
   }
+
+  // Make the geometry of a surface that has changed, if all nodes of its faces are there.
+  renew(surface, positions) {
+    const { faces, kinds } = changedFaces(surface), count = faces.reduce((most, node) => Math.max(most, node + 1), 0)
+    if (positions.length < 3 * count) return
+    const split = creased(positions, faces, SOFT, kinds), made = new THREE.BufferGeometry()
+    made.setAttribute("position", attribute(3 * split.origin.length))
+    made.setAttribute("normal", attribute(3 * split.origin.length))
+    made.setIndex(new THREE.BufferAttribute(split.index, 1))
+    for (let from = 0, to = 0; from < kinds.length; from = to) {
+      while (to < kinds.length && kinds[to] === kinds[from]) to++
+      made.addGroup(3 * from, 3 * (to - from), kinds[from])
+    }
+    Object.assign(surface, { count, origin: split.origin, stale: false })
+    if (surface.mesh) {
+      surface.mesh.geometry.dispose()
+      surface.mesh.geometry = made
+      return
+    }
+    const materials = surface.colours.map((colour, kind) => this.material([...colour, 1], THREE.DoubleSide, kind === WET))
+    surface.mesh = new THREE.Mesh(made, materials)
+    surface.mesh.frustumCulled = false
+    this.own(surface.mesh)
+  }
 }
 
-function opaque([red, green, blue, opacity], side) {
+// The faces of a surface without those that are gone, by kind.
+function changedFaces({ triangles, changed }) {
+  if (!changed?.slots.length) return { faces: triangles, kinds: new Uint8Array(triangles.length / 3) }
+  const last = changed.slots.at(-1) + 1, count = Math.max(triangles.length / 3, last)
+  const nodes = new Int32Array(3 * count), every = new Uint8Array(count)
+  nodes.set(triangles)
+  changed.slots.forEach((slot, i) => {
+    nodes.set(changed.faces.subarray(3 * i, 3 * i + 3), 3 * slot)
+    every[slot] = changed.kinds[i]
+  })
+  const kept = Array.from(every.keys()).filter((slot) => nodes[3 * slot] >= 0).sort((a, b) => every[a] - every[b])
+  const faces = new Uint32Array(3 * kept.length)
+  kept.forEach((slot, i) => faces.set(nodes.subarray(3 * slot, 3 * slot + 3), 3 * i))
+  return { faces, kinds: Uint8Array.from(kept, (slot) => every[slot]) }
+}
+
+// `wet`: it has highlights.
+function opaque([red, green, blue, opacity], side, wet = false) {
   const colour = new THREE.Color().setRGB(red, green, blue, THREE.SRGBColorSpace)
+  if (wet) return new THREE.MeshPhongMaterial({ color: colour, side, specular: 0x777777, shininess: 60 })
   return new THREE.MeshLambertMaterial({ color: colour, side, transparent: opacity < 1, opacity })
 }
 

@@ -5,7 +5,7 @@ import { pathTo } from "./address.js"
 
 const MAGIC = 0x46435254 // "TRCF", little-endian
 const HEAD = 24
-export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7, FELT = 8
+export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7, FELT = 8, CHANGE = 9
 
 export function parseFrame(buffer) {
   const view = new DataView(buffer)
@@ -29,6 +29,13 @@ export function nodesOf(buffer, at, size) {
     for (let i = 0; i < count; i++) nodes[3 * i + axis] = low + step * steps[from + i]
   }
   return nodes
+}
+
+// Changed faces of a surface: their slots (u32), their nodes (i32, 3 each; -1: gone) and their kinds (u8).
+export function changeOf(buffer, at, size) {
+  const count = size / 17
+  return { slots: new Uint32Array(buffer, at, count), faces: new Int32Array(buffer, at + 4 * count, 3 * count),
+    kinds: new Uint8Array(buffer, at + 16 * count, count) }
 }
 
 const OTHER_SOURCE = 4001, NOT_SHOWN = 4002

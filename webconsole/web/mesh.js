@@ -1,8 +1,8 @@
 // Normals that are smooth where a surface is, and sharp where it has edges.
 
 // Split vertices where faces meet at more than the angle of `cosine`. Returns the index of the split vertices, and
-// for each of them the vertex that it was.
-export function creased(positions, faces, cosine) {
+// for each of them the vertex that it was. Faces of different `kinds` share none.
+export function creased(positions, faces, cosine, kinds = null) {
   const normals = faceNormals(positions, faces)
   const groups = new Map() // old vertex -> [{ vertex, nx, ny, nz }]
   const index = new Uint32Array(faces.length), origin = []
@@ -11,12 +11,14 @@ export function creased(positions, faces, cosine) {
     const nx = normals[f], ny = normals[f + 1], nz = normals[f + 2]
     let at = groups.get(vertex)
     if (!at) groups.set(vertex, (at = []))
+    const kind = kinds ? kinds[f / 3] : 0
     let group = at.find((g) => {
+      if (g.kind !== kind) return false
       const length = Math.hypot(g.nx, g.ny, g.nz) || 1
       return (g.nx * nx + g.ny * ny + g.nz * nz) / length > cosine
     })
     if (!group) {
-      group = { vertex: origin.length, nx: 0, ny: 0, nz: 0 }
+      group = { vertex: origin.length, kind, nx: 0, ny: 0, nz: 0 }
       at.push(group)
       origin.push(vertex)
     }

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from engines.mujoco.markers.store import shown_markers
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
-from engines.mujoco.pictures.skins import SoftBody
+from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.ports import position_count
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, event_out, signal_in, state_hash
 from robots.dvrk.endoscope import EYES, Eye, StereoCamera
@@ -27,7 +27,7 @@ from schemas.errors import MessageError, MissingExtraError, StateError
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import CameraInfo, CompressedImage, Header, Image, Time
-from schemas.trocar_msgs import ShownMarkers, SoftBodyState
+from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange
 
 if TYPE_CHECKING:
     from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
@@ -74,15 +74,25 @@ class Endoscope(Stepped):
         nodes = "positions of the nodes of a soft body; the first message brings its surface"
         shown = "all markers to draw, as a participant of kind `markers` publishes them"
         qpos = signal_in("qpos", description=positions, size=self._positions.size)
-        bodies = (signal_in(f"{organ}/nodes", SoftBodyState, nodes, frame="world") for organ in self._bodies)
+        changed = "difference of the surface from that of the first message; may be left unconnected"
+        bodies = (
+            port
+            for organ in self._bodies
+            for port in (
+                signal_in(f"{organ}/nodes", SoftBodyState, nodes, frame="world"),
+                signal_in(f"{organ}/surface", SurfaceChange, changed, frame="world", start=()),
+            )
+        )
         markers = signal_in("markers", ShownMarkers, shown, frame="world")
         return (qpos, *bodies, *((markers,) if self.params.markers else ()), *self._pictures)
 
-    def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
+    def configure(self, setup: Setup) -> Outputs:
         """Build the scene, unless soft bodies are missing from it.
 
         Without OpenGL it logs one warning and publishes no pictures.
         """
+        for organ, body in self._bodies.items():
+            body.may_change = f"{organ}/surface" in setup.connected
         if not self._pictures:
             return {}
         for package in ("mujoco", "PIL"):
@@ -119,7 +129,8 @@ class Endoscope(Stepped):
         """
         self._positions[:] = inputs["qpos"]
         for organ, body in self._bodies.items():
-            body.accept(inputs.message(f"{organ}/nodes"))
+            change = inputs.message(f"{organ}/surface") if body.may_change else None
+            body.accept(inputs.message(f"{organ}/nodes"), change)
         if self.params.markers:
             self._shown = cast("ShownMarkers | None", inputs.message("markers"))
         if not self._gl:

@@ -14,7 +14,8 @@ from engines.mujoco.markers.solids import Shape, extents, solids
 from engines.mujoco.markers.store import ShownMarker
 from engines.mujoco.model import spec
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
-from engines.mujoco.pictures.skins import Skins, SoftBody
+from engines.mujoco.pictures.skins import Skins
+from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.stereo import StereoRenderer
 from robots import rotation
 from robots.dvrk.endoscope import FAR, optical_in_roll
@@ -66,11 +67,11 @@ class EndoscopeScene:
     ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Return both pictures, shape (height, width, 3), at `positions`, shape (nq,), with `markers`."""
         model, data = self._model, self._data
-        self._skins.show(model)
         data.qpos[:] = positions
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
+        self._skins.show(model, data)
         pose = self._pose()
         shapes = [
             solid

@@ -15,7 +15,7 @@ from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.clearest_view import Sight, clearest_position
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
-from engines.mujoco.pictures.skins import SoftBody
+from engines.mujoco.pictures.soft_body import SoftBody
 from hub.recording.bag import BagMessage, output_port
 from hub.recording.moments import Moments
 from hub.recording.recording import Recording
@@ -24,7 +24,7 @@ from schemas.codec import decode
 from schemas.errors import MessageError, RecordingError, ScenarioError, TrocarError
 from schemas.message import Message
 from schemas.scenario import ParticipantSpec
-from schemas.trocar_msgs import ShownMarkers, SoftBodyState
+from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange
 from schemas.vectors import Vector, VectorCodec
 
 __all__ = ["Camera", "RecordedScene"]
@@ -179,13 +179,22 @@ class RecordedScene:
         params = params.model_copy(update=size)  # a file may be larger than a message
         positions = _Newest(self._recording, self._qpos)
         nodes = {name: _Newest(self._recording, self._nodes[name]) for name in bodies}
+        changes = {
+            name: _Newest(self._recording, topic)
+            for name in bodies
+            if (topic := self._change_topic(self._nodes[name])) is not None
+        }
         markers = [_Newest(self._recording, topic) for topic in self._markers]
         scene = EndoscopeScene(params, gl.name, bodies)
         try:
             for time_ns in times_ns:
                 for name, newest in nodes.items():
                     if (message := newest.at(time_ns)) is not None:
-                        bodies[name].accept(self._decoded(SoftBodyState, message))
+                        change = changes[name].at(time_ns) if name in changes else None
+                        bodies[name].accept(
+                            self._decoded(SoftBodyState, message),
+                            None if change is None else self._decoded(SurfaceChange, change),
+                        )
                 yield scene.draw(
                     self._positions(positions.at(time_ns), time_ns), self._shown(markers, time_ns)
                 )
@@ -217,9 +226,14 @@ class RecordedScene:
         for name, topic in self._nodes.items():
             first = next(self._recording.messages(topic), None)
             if first is not None and first.time_ns <= time_ns:
-                bodies[name] = SoftBody(topic)
+                bodies[name] = SoftBody(topic, may_change=self._change_topic(topic) is not None)
                 bodies[name].accept(self._decoded(SoftBodyState, first))
         return bodies
+
+    def _change_topic(self, nodes: str) -> str | None:
+        """Return the topic with the changes of the surface of a soft body; None without."""
+        topic = f"{nodes.removesuffix('nodes')}surface"
+        return topic if self._recording.topics.get(topic) == SurfaceChange.ros_type else None
 
     def _decoded(self, model: type[M], message: BagMessage) -> M:
         try:

@@ -38,21 +38,29 @@ class SkinMesh:
     A vertex on a sharp edge is listed once for each adjacent smooth face.
     """
 
-    def __init__(self, rest: Vector, triangles: Indices) -> None:
+    def __init__(
+        self,
+        rest: Vector,
+        triangles: Indices,
+        kinds: NDArray[np.uint8] | None = None,
+        most: int | None = None,
+    ) -> None:
         """Divide the surface until it looks smooth.
 
         Args:
             rest: the nodes at rest, shape (n, 3), m.
             triangles: of the surface, node indices, shape (f, 3), counter-clockwise from outside.
+            kinds: kinds of the triangles, shape (f,); an edge between two kinds is sharp. None: one kind.
+            most: largest number of divided triangles; None: any.
         """
-        faces, self._node = _split_vertices(rest, triangles)
+        faces, self._node = _split_vertices(rest, triangles, kinds)
         self._divisions: list[_Division] = []
-        while not self._divisions or 4 * len(faces) <= _ENOUGH:
+        while (not self._divisions or 4 * len(faces) <= _ENOUGH) and (most is None or 4 * len(faces) <= most):
             division = _Division(faces)
             self._divisions.append(division)
             faces = division.faces
         self.faces: Indices = faces
-        """Vertex indices, shape (m, 3), counter-clockwise from outside."""
+        """Vertex indices, shape (m, 3), counter-clockwise from outside; those of a triangle together."""
 
     def vertices(self, nodes: Vector) -> Vector:
         """Return the vertices, shape (v, 3), m, for `nodes`, shape (n, 3), m: those at nodes come first."""
@@ -94,7 +102,9 @@ class _Division:
         return np.concatenate([points, 0.5 * (points[start] + points[end]) - self._curved * bend])
 
 
-def _split_vertices(rest: Vector, triangles: Indices) -> tuple[Indices, Indices]:
+def _split_vertices(
+    rest: Vector, triangles: Indices, kinds: NDArray[np.uint8] | None
+) -> tuple[Indices, Indices]:
     """Return the triangles as vertex indices, shape (f, 3), and the node of each vertex, shape (v,).
 
     Two corners at a node are one vertex if a path across edges that are not sharp leads from one to the
@@ -103,7 +113,7 @@ def _split_vertices(rest: Vector, triangles: Indices) -> tuple[Indices, Indices]
     a, b, c = (rest[triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-    one, other = _smooth_pairs(triangles, normals)
+    one, other = _smooth_pairs(triangles, normals, kinds)
     label = np.arange(triangles.size)
     while True:
         lowest = np.minimum(label[one], label[other])
@@ -116,7 +126,9 @@ def _split_vertices(rest: Vector, triangles: Indices) -> tuple[Indices, Indices]
     return corners.reshape(-1, 3), triangles.ravel()[kept]
 
 
-def _smooth_pairs(triangles: Indices, normals: Vector) -> tuple[Indices, Indices]:
+def _smooth_pairs(
+    triangles: Indices, normals: Vector, kinds: NDArray[np.uint8] | None
+) -> tuple[Indices, Indices]:
     """Return pairs of corners, shape (p,) each, that share a node and an edge that is not sharp.
 
     A corner has the number 3 face + corner.
@@ -131,5 +143,7 @@ def _smooth_pairs(triangles: Indices, normals: Vector) -> tuple[Indices, Indices
     order = np.argsort(edge_of, kind="stable")
     pairs = order[(count == 2)[edge_of[order]]].reshape(-1, 2)  # (e, 2): the two sides of each inner edge
     flat = np.einsum("ij,ij->i", normals[pairs[:, 0] // 3], normals[pairs[:, 1] // 3]) > cos(_CREASE)
+    if kinds is not None:
+        flat &= kinds[pairs[:, 0] // 3] == kinds[pairs[:, 1] // 3]
     one, other = ends[pairs[flat, 0]], ends[pairs[flat, 1]]  # (e, 2)
     return one.ravel(), other.ravel()

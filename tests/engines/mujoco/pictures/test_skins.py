@@ -14,7 +14,8 @@ from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope import Endoscope
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.skin_params import SkinParams
-from engines.mujoco.pictures.skins import Skins, SoftBody
+from engines.mujoco.pictures.skins import Skins
+from engines.mujoco.pictures.soft_body import SoftBody
 from engines.tissue.meshing.grid import block
 from hub.participant import Inputs, Outputs, Setup
 from hub.testing import check_engine
@@ -111,9 +112,9 @@ def skin_of(
     skins = Skins(scene, {"organ": body}, {"organ": SkinParams()})
     model = scene.compile()
     body.accept(message(moved))
-    skins.show(model)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
+    skins.show(model, data)
     drawn = mujoco.MjvScene(model, 10)
     mujoco.mjv_updateScene(
         model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, drawn
