@@ -4,6 +4,7 @@ import { make } from "./started.js"
 
 const FILM_PER_S = 30, BITS_PER_S = 16e6
 const PATIENCE_MS = 500 // for the picture of the last instant: none comes where nothing has changed
+const ENCODING_MS = 1000 // MediaRecorder forgets pictures that are not encoded when it is stopped
 const KINDS = ["video/mp4;codecs=avc1.640028", "video/webm;codecs=vp9", "video/webm", "video/mp4"]
 
 export class Capture {
@@ -52,7 +53,7 @@ export class Capture {
     this.recorder.onstop = () => {
       for (const track of stream.getTracks()) track.stop() // not before: pictures are still being encoded
       const kind = this.kind.split(";")[0]
-      save(new Blob(parts, { type: kind }), `${this.name(from, this.page().time)}.${kind.split("/")[1]}`)
+      save(new Blob(parts, { type: kind }), `${this.name(from, this.ended)}.${kind.split("/")[1]}`)
     }
     this.plays = this.timeline.past && !this.timeline.playing
     if (this.plays) this.timeline.play()
@@ -87,8 +88,11 @@ export class Capture {
 
   stop() {
     if (this.plays && this.timeline.playing) this.timeline.pause()
-    this.recorder.stop()
+    const { recorder } = this
+    this.ended = this.page().time
     this.recorder = null
+    this.button.disabled = true
+    setTimeout(() => { recorder.stop(); this.button.disabled = false }, ENCODING_MS)
     this.button.textContent = "Film"
     this.button.setAttribute("aria-pressed", "false")
   }
