@@ -20,7 +20,7 @@ class FaceKind(IntEnum):
     """Kind of tissue of a face of a surface."""
 
     OUTSIDE = 0
-    """As at the start of the session."""
+    """Unchanged since the start of the session."""
     CUT = 1
     """Inside of a cut or tear."""
     COAGULATED = 2

@@ -67,7 +67,7 @@ class Stage:
         signals = [one for one in outlets if one.port.variability == "signal"]
         self.surfaces = {name: colours.get(name, _FLESH) for name in _of_type(signals, SoftBodyState)}
         """Colour of each soft surface, by the outlet of the nodes."""
-        changes = _of_type(signals, SurfaceChange)
+        changes = _of_type(outlets, SurfaceChange)
         self.changes = {
             name: change
             for name in self.surfaces

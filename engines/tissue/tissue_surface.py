@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from engines.tissue.meshing.tet_mesh import Indices
 from schemas.ros import Header, Time
+from schemas.soft_surface import FaceKind
 from schemas.trocar_msgs import SurfaceChange
 
 __all__ = ["SurfaceState", "TissueSurface"]
@@ -95,6 +96,20 @@ class TissueSurface:
     def remove(self, slots: NDArray[np.integer]) -> None:
         """Empty these slots: the tissue is gone."""
         self.faces[slots] = _GONE
+        self.version += 1
+
+    def follow(self, faces: NDArray[np.int32], origins: NDArray[np.int32]) -> None:
+        """Take the faces of an engine that keeps them by slot; appended faces are the inside of a cut.
+
+        faces: shape (f, 3), -1 where tissue is gone. origins: node of the mesh at the resting place of each
+        node, shape (n,).
+        """
+        appended = len(faces) - len(self.faces)
+        if not appended and len(origins) == self.node_count and np.array_equal(faces, self.faces):
+            return
+        self.faces = faces.copy()
+        self.kinds = np.concatenate([self.kinds, np.full(appended, FaceKind.CUT, np.uint8)])
+        self.origins = origins[self._first_nodes :].copy()
         self.version += 1
 
     def change(self, body: str, time_ns: int) -> SurfaceChange:

@@ -320,6 +320,7 @@ class MjModel:
     flex_elem: NDArray[np.int32]
     flex_elemadr: NDArray[np.int32]
     flex_elemdataadr: NDArray[np.int32]
+    flex_edgenum: NDArray[np.int32]
     flex_elemnum: NDArray[np.int32]
     flex_group: NDArray[np.int32]
     flex_matid: NDArray[np.int32]

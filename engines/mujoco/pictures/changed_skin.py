@@ -67,6 +67,10 @@ class ChangedSkin:
         has_faces = is_changed and bool((self._body.surface.faces >= 0).any())
         model.flex_group[flex] = SHOWN if has_faces else HIDDEN
         if not has_faces:
+            # MuJoCo updates hidden elements too
+            for count in (model.flex_elemnum, model.flex_vertnum, model.flex_edgenum, model.flex_shellnum):
+                count[flex] = 0
+            self._mesh = None
             return is_changed
         if self._mesh is None or self._version != self._body.version:
             self._mesh = self._renew(model, flex)
@@ -89,7 +93,7 @@ class ChangedSkin:
         model.flex_matid[first : first + count] = self._materials(model)[kinds].repeat(count // len(kinds))
         model.flex_elemnum[flex] = count
         model.flex_vertnum[flex] = int(mesh.faces.max()) + 1
-        model.flex_shellnum[flex] = 0
+        model.flex_edgenum[flex] = model.flex_shellnum[flex] = 0
         return mesh
 
     def _materials(self, model: mujoco.MjModel) -> NDArray[np.int32]:

@@ -61,6 +61,9 @@ class StereoRenderer:
         self._options, self._anywhere = mujoco.MjvOption(), mujoco.MjvCamera()
         self._options.sitegroup[:] = 0
         self._shadows = shadows
+        self._counts = model.flex_elemnum, model.flex_vertnum, model.flex_edgenum, model.flex_shellnum
+        self._flex_room = [count.copy() for count in self._counts]
+        """Counts of the compiled model, as many as a flex may have later."""
         self._scene = self._new_scene(model.ngeom + _SPARE_GEOMS)
         self._viewport = mujoco.MjrRect(0, 0, width, height)
         self._pixels = np.zeros((height, width, 3), np.uint8)
@@ -72,8 +75,13 @@ class StereoRenderer:
         self._reaches = np.where(model.geom_rbound > 0.0, model.geom_rbound, np.inf)  # 0: a plane
 
     def _new_scene(self, room: int) -> mujoco.MjvScene:
-        """Return a scene for both eyes, with room for as many geoms."""
+        """Return a scene for both eyes, with room for as many geoms, and for all that a flex may have."""
+        present = [count.copy() for count in self._counts]
+        for count, most in zip(self._counts, self._flex_room, strict=True):
+            count[:] = most
         scene = mujoco.MjvScene(self._model, room)
+        for count, now in zip(self._counts, present, strict=True):
+            count[:] = now
         scene.stereo = mujoco.mjtStereo.mjSTEREO_SIDEBYSIDE
         for flag in _NO_SHADOWS:
             scene.flags[flag] = self._shadows

@@ -112,6 +112,21 @@ def test_a_saved_state_does_not_change_with_the_surface() -> None:
     assert surface.faces.tolist() == TETRAHEDRON.tolist()
 
 
+def test_it_follows_an_engine_that_keeps_faces_by_slot() -> None:
+    surface = TissueSurface(TETRAHEDRON, NODES)
+    surface.follow(TETRAHEDRON.astype(np.int32), np.arange(NODES, dtype=np.int32))
+    assert surface.version == 0
+    faces = np.concatenate([TETRAHEDRON, [[0, 1, 4]]]).astype(np.int32)
+    faces[2] = -1
+    surface.follow(faces, np.array([0, 1, 2, 3, 1], np.int32))
+    assert surface.version == 1
+    faces[0] = 0  # the engine goes on to write in its arrays
+    found = drawn(surface)
+    assert found.faces.tolist() == [[0, 2, 1], [0, 1, 3], [-1, -1, -1], [0, 3, 2], [0, 1, 4]]
+    assert found.kinds.tolist() == [0, 0, 0, 0, FaceKind.CUT]
+    assert found.origins.tolist() == [0, 1, 2, 3, 1]
+
+
 def test_the_ports_name_the_organ() -> None:
     class Liver:
         name = "liver"

@@ -184,3 +184,15 @@ def test_an_edge_between_two_kinds_is_sharp_and_the_room_is_kept() -> None:
     assert len(one.faces) == len(two.faces) == 8
     assert len(two.vertices(nodes)) == len(one.vertices(nodes)) + 3  # two corners and a middle
     assert len(SkinMesh(nodes, triangles, most=7).faces) == 2
+
+
+def test_a_larger_scene_keeps_the_room_for_new_faces(gl: str, cut_block: CutBlock) -> None:
+    """MuJoCo allocates by the present counts, which are those of the surface drawn last."""
+    with make() as endoscope:
+        configure(endoscope, "liver/surface")
+        step(endoscope, nodes_of(cut_block.mesh.nodes, cut_block.mesh.triangles), None)
+        assert endoscope._scene is not None
+        renderer = endoscope._scene._renderer
+        room = renderer._scene.flexfacenum.copy()
+        assert room[0] >= 24_000
+        assert np.array_equal(renderer._new_scene(1000).flexfacenum, room)

@@ -20,6 +20,7 @@ from hub.session.launch import launch
 from schemas.codec import decode
 from schemas.errors import RecordingError
 from schemas.ros import Image as Picture
+from tests.webconsole.recorded_cut import CUT_AT, STEP_NS, write_cut
 
 pytestmark = pytest.mark.xdist_group(
     "recorded scene"
@@ -234,3 +235,17 @@ def test_a_scene_on_the_cart_is_drawn_as_it_was_stated(tmp_path: Path) -> None:
     launch(load(str(file)), endpoint="tcp/127.0.0.1:0", record=tmp_path / "bag").run()
     picture = RecordedScene(Recording(tmp_path / "bag")).picture(0, camera="left", size=(40, 30))
     assert picture.shape == (30, 40, 3)
+
+
+def test_a_cut_is_drawn_from_its_instant_on(tmp_path: Path) -> None:
+    if not opengl.find().name:
+        pytest.skip("no OpenGL")
+    write_cut(tmp_path / "cut")
+    scene = RecordedScene(Recording(tmp_path / "cut"))
+    view = {"position": (0.0, -0.01, 0.12), "target": (0.0, 0.0, 0.0)}
+    times = [0, (CUT_AT - 1) * STEP_NS, 2 * CUT_AT * STEP_NS]
+    whole, before, after = scene.pictures(times, "overview", (160, 120), **view)
+    assert np.array_equal(whole, before)
+    alone = scene.picture(times[-1], "overview", (160, 120), **view)
+    assert np.array_equal(alone, after)
+    assert (after.astype(int) - before.astype(int) != 0).any(axis=2).mean() > 0.01
