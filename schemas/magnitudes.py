@@ -28,6 +28,7 @@ MAGNITUDES = {
     "Pa": Magnitude(1e-3, 1e13, "from a foam to ten times diamond"),
     "kg/m^3": Magnitude(1e-3, 1e5, "from a gas to four times osmium"),
     "N": Magnitude(1e-9, 1e6, "from a cell to a hundred tonnes"),
+    "W": Magnitude(1e-9, 1e6, "from a cell to a locomotive"),
     "N/m": Magnitude(1e-6, 1e9, "from a cell to a machine's frame"),
     "N*s/m": Magnitude(1e-9, 1e7, "from a cell to a vehicle's damper"),
     "rad": Magnitude(0.0, 1e5, "to 16 000 turns"),

@@ -27,6 +27,7 @@ __all__ = [
     "Force",
     "Length",
     "Mass",
+    "Power",
     "Pressure",
     "Speed",
     "Stiffness",
@@ -151,6 +152,7 @@ def _to_nanoseconds(value: Any) -> int:
 
 Length = Annotated[float, *_quantity_type("m", "80 mm")]
 Mass = Annotated[float, *_quantity_type("kg", "20 g")]
+Power = Annotated[float, *_quantity_type("W", "30 W")]
 Pressure = Annotated[float, *_quantity_type("Pa", "10 kPa")]
 Density = Annotated[float, *_quantity_type("kg/m^3", "1000 kg/m^3")]
 Force = Annotated[float, *_quantity_type("N", "2 N")]

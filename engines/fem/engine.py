@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import accumulate
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from engines.fem.heat.heating import Heating, heat_ports
 from engines.fem.organ import Organ
 from engines.fem.params import FemParams
 from engines.fem.probe import Probe
@@ -42,12 +44,14 @@ class FemEngine(Stepped):
         """Outputs of grasping probes without a bond."""
         self._bonded: dict[str, BondPlan] = {}
         self._surfaces: list[Surface] = []
+        self._heating: Heating | None = None
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The nodes of every organ; for every probe with fingers, the grasp."""
+        """The nodes of every organ; for every probe with fingers, the grasp; for electrodes, the heat."""
         grasping = (name for name, probe in self.params.probes.items() if probe.grasp)
-        return *node_ports(self.params), *(port for name in grasping for port in grasp_ports(name))
+        grasps = (port for name in grasping for port in grasp_ports(name))
+        return *node_ports(self.params), *grasps, *heat_ports(self.params)
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
@@ -96,6 +100,8 @@ class FemEngine(Stepped):
         for grasp, _ in self._grasps:
             grasp.update(end, looked=touch)
             outputs.update(grasp.outputs)
+        if self._heating is not None:
+            outputs.update(self._heating.step(inputs, t, h))
         return outputs
 
     def state_hash(self) -> int:
@@ -104,6 +110,7 @@ class FemEngine(Stepped):
             *(probe.digest for probe in self._probes),
             *(grasp.numbers for grasp, _ in self._grasps),
             *(organ.digest for organ in self._organs),
+            *(array.tobytes() for array in self._heat_state),
         )
 
     def save(self) -> bytes:
@@ -126,6 +133,8 @@ class FemEngine(Stepped):
         for organ in self._organs:
             for array in organ.state:
                 array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
+        for array in self._heat_state:
+            array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
         for probe in self._probes:
             probe.numbers = np.frombuffer(next(parts))
         for grasp, probe in self._grasps:
@@ -138,11 +147,17 @@ class FemEngine(Stepped):
         """Yield the parts of a saved state in order."""
         for organ in self._organs:
             yield from (array.tobytes() for array in organ.state)
+        yield from (array.tobytes() for array in self._heat_state)
         yield from (probe.numbers.tobytes() for probe in self._probes)
         yield from (grasp.numbers.tobytes() for grasp, _ in self._grasps)
 
+    @property
+    def _heat_state(self) -> tuple[NDArray[Any], ...]:
+        return () if self._heating is None else self._heating.state
+
     def close(self) -> None:
         """Forget the organs."""
+        self._heating = None
         for kept in (self._organs, self._probes, self._grasps, self._surfaces):
             kept.clear()
 
@@ -172,6 +187,9 @@ class FemEngine(Stepped):
                 outputs.update(nothing_held(name))
         for organ in self._organs:
             organ.meet(self._spheres)
+        if any(self.params.probes[bond.name].energy for bond in bonds):
+            self._heating = Heating(self.params, self._organs, self._probes)
+            outputs.update(self._heating.outputs)
         return outputs
 
     def _look(self) -> None:

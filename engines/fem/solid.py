@@ -123,6 +123,20 @@ class Solid:
         """Longest sub-step, s."""
 
     @property
+    def elements(self) -> tuple[Indices, Vector, Vector]:
+        """Corners, gradients and volumes of the elements at rest, in the order of the blocks.
+
+        Shapes (m, 4); (m, 9), 1/m, of the shape functions of corners 1 to 3; (m,), m^3. An element that fills
+        up the last block has no volume.
+        """
+        corners, gradients, volume = self._arrays[8:11]
+        return (
+            _by_element(corners).astype(np.int64),
+            _by_element(gradients).astype(np.float64),
+            volume.astype(np.float64),
+        )
+
+    @property
     def nodes(self) -> Vector:
         """Present nodes, m, in `world`, shape (n, 3)."""
         return self._rest + self.displacement[:, :3]
@@ -189,6 +203,11 @@ def _by_place(mesh: TetMesh) -> Indices:
 def _in_blocks(values: NDArray[_Number]) -> NDArray[_Number]:
     """Return rows of one element each as blocks with the elements in lanes, shape (b, columns, lanes)."""
     return values.reshape(-1, _LANES, values.shape[1]).transpose(0, 2, 1)
+
+
+def _by_element(blocks: NDArray[_Number]) -> NDArray[_Number]:
+    """Undo `_in_blocks`."""
+    return blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])
 
 
 def _floats(values: NDArray[np.floating[Any]] | Indices) -> NDArray[np.float32]:

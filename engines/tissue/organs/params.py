@@ -156,13 +156,20 @@ class OrganParams(BaseModel):
                 _DENSITY if density is None else density,
                 damping,
             )
-        name = self.material or self.body.material
+        name = self.material_name
         if name is None:
             raise ValueError(
                 "the material is missing: state young_modulus, or a material (`trocar organs` lists them)"
             )
         known = preset(name)
         return Material(known.young_modulus, known.poisson_ratio, known.density, damping)
+
+    @property
+    def material_name(self) -> str | None:
+        """Name of the material, as stated or of the shape; None: a modulus or a file."""
+        if self.young_modulus is not None or self.material_file is not None:
+            return None
+        return self.material or self.body.material
 
     @cached_property
     def contact_friction(self) -> float:

@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from engines.tissue.probes.energy import EnergyParams
 from schemas.quantity import Damping, Force, Length, Mass, Stiffness
 from schemas.vectors import Vector
 
@@ -137,6 +138,9 @@ class ProbeParams(BaseModel):
         default=None, gt=0, description="b of the virtual coupling; default: critical, 2 sqrt(k m)"
     )
     grasp: GraspParams | None = Field(default=None, description="lets the spheres grasp tissue, as fingers")
+    energy: EnergyParams | None = Field(
+        default=None, description="makes the spheres electrodes that heat tissue; kind fem"
+    )
 
     @model_validator(mode="after")
     def _a_radius_for_each(self) -> ProbeParams:
@@ -153,6 +157,15 @@ class ProbeParams(BaseModel):
             raise ValueError(
                 f"{self.spheres or 1} spheres on {self.grasp.fingers} fingers: every finger needs the same"
                 " number of them"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _two_poles(self) -> ProbeParams:
+        if self.energy is not None and self.energy.mode == "bipolar" and (self.spheres or 1) % 2:
+            raise ValueError(
+                f"{self.spheres or 1} spheres for bipolar energy: one half of them is one jaw, the other half"
+                " the other jaw"
             )
         return self
 

@@ -1,0 +1,1 @@
+"""Heat in soft tissue, and the instruments that bring it."""

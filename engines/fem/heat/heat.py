@@ -1,0 +1,181 @@
+"""Heat of a body of linear tetrahedra: temperature, boiling, char, and damage; `_heat.c` steps it."""
+
+from __future__ import annotations
+
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.fem.heat.tissue import BODY, HeatTissue
+from engines.tissue.meshing.tet_mesh import Indices
+from schemas.vectors import Vector
+
+__all__ = ["CHARRED", "COAGULATED", "HEAT_PERIOD_NS", "Heat"]
+
+HEAT_PERIOD_NS = 10_000_000
+"""Period of the steps of heat."""
+COAGULATED, CHARRED = 2, 3
+"""Kinds of tissue on a surface."""
+_VAPORISED = 2
+"""Stage of an element in `_heat.c`."""
+_FASTEST = 1e3
+"""A sliver evens out no faster, 1/s: the step of heat has at most ten sub-steps."""
+_COLD = 1e-2
+"""Largest rise of a body that counts as cold, K."""
+_GIVEN, _PERFUSED, _BOILED, _VAPORISED_M3, _HOTTEST, _EJECTED = range(6)
+"""Places in the book."""
+
+
+class Heat:
+    """Arrays of a body.
+
+    Elements keep their numbers; a cut adds nodes (`copy_nodes`, then `rebind`), and an element that goes has
+    no volume.
+    """
+
+    def __init__(
+        self, tissue: HeatTissue, corners: Indices, gradients: Vector, volumes: Vector, nodes: int
+    ) -> None:
+        """Bind a cold body; for the arrays see `rebind`."""
+        from engines.fem import _heat  # built together with `_solid`, which says so where it is missing
+
+        self._compiled = _heat
+        self.tissue = tissue
+        self._constants = tissue.constants
+        m = len(corners)
+        self._volume = np.zeros(m, np.float32)
+        self.rise = np.zeros(nodes)
+        """Rise of every node above the temperature of the body, K, shape (n,)."""
+        self.water = np.ones(m, np.float32)
+        """Share of the water left in every element, shape (m,)."""
+        self.excess = np.zeros(m, np.float32)
+        """Excess of a dry element over the mean of its corners, K, shape (m,)."""
+        self.damage = np.zeros((2, m), np.float32)
+        """Damage integrals of colour and of cells, shape (2, m)."""
+        self.stage = np.zeros(m, np.uint8)
+        """0 tissue, 1 charred, 2 vaporised, shape (m,)."""
+        self.book = np.zeros(6)
+        """Heat given, perfused and boiled (J), volume vaporised (m^3), hottest rise (K), heat gone (J)."""
+        self.rebind(corners, gradients, volumes)
+
+    def rebind(self, corners: Indices, gradients: Vector, volumes: Vector) -> None:
+        """Take over a changed mesh.
+
+        Args:
+            corners: nodes of every element, shape (m, 4).
+            gradients: gradients of the shape functions of corners 1 to 3 at rest, 1/m, shape (m, 9).
+            volumes: volumes at rest, m^3, 0 of an element that has gone, shape (m,).
+        """
+        gone = (self._volume > 0.0) & (volumes == 0.0)
+        if gone.any():
+            kept_heat = self.tissue.capacity * self.rise[self._corners[gone]].mean(axis=1)
+            dry_heat = self._constants[4] * self.excess[gone]
+            self.book[_EJECTED] += float(((kept_heat + dry_heat) * self._volume[gone]).sum())
+        self._corners = np.ascontiguousarray(corners, np.int32)
+        self._volume = np.ascontiguousarray(volumes, np.float32)
+        self._conductance = np.zeros((len(corners), 6), np.float32)
+        self._capacity = np.zeros(len(self.rise), np.float32)
+        self._scratch = np.zeros((2, len(self.rise)), np.float32)
+        arrays = self._corners, np.ascontiguousarray(gradients, np.float32), self._volume
+        self._rate = self._compiled.bind(
+            (*arrays, self._conductance, self._capacity), self._constants, _FASTEST
+        )
+        self._no_power = np.zeros(len(corners), np.float32)
+
+    def copy_nodes(self, parents: Indices) -> None:
+        """Append nodes as warm as their parents; `rebind` must follow."""
+        self.rise = np.concatenate([self.rise, self.rise[parents]])
+
+    @property
+    def is_cold(self) -> bool:
+        """Whether the whole body is at its own temperature, so that no step is needed."""
+        return self.book[_HOTTEST] == 0.0
+
+    def advance(self, seconds: float, power: NDArray[np.float32] | None = None) -> float:
+        """Advance by `seconds` with a power (W) in every element, shape (m,); return the smoke, kg.
+
+        Smoke is steam, and the dry rest of vaporised elements.
+        """
+        if power is None and self.is_cold:
+            return 0.0
+        boiled, vaporised = self.book[[_BOILED, _VAPORISED_M3]].tolist()
+        sub_steps = max(1, ceil(seconds * self._rate))
+        arrays = (
+            self._corners,
+            self._conductance,
+            self._volume,
+            self._capacity,
+            self._no_power if power is None else power,
+            self.rise,
+            self.water,
+            self.excess,
+            self.damage,
+            self.stage,
+            self._scratch,
+        )
+        self._compiled.advance(arrays, self._constants, self.book[:_EJECTED], seconds / sub_steps, sub_steps)
+        if power is None and self.book[_HOTTEST] < _COLD:
+            self._cool_down()
+        return float(
+            self.tissue.steam_per_joule * (self.book[_BOILED] - boiled)
+            + self.tissue.residue * (self.book[_VAPORISED_M3] - vaporised)
+        )
+
+    def spread(self, nodes: Vector, poles: Vector, reach: float) -> tuple[NDArray[np.float32], float]:
+        """Return the share of a current's heat in every element, shape (m,), and the sum of the shares.
+
+        A share is volume times square of the current density, as in a homogeneous body of infinite extent.
+
+        Args:
+            nodes: present nodes, m, shape (n, 3).
+            poles: centre (m), radius (m) and signed current of every pole, shape (p, 5).
+            reach: distance from the poles beyond which nothing is heated, m.
+        """
+        shares = np.zeros(len(self._corners), np.float32)
+        arrays = self._corners, self._volume, np.ascontiguousarray(nodes), np.ascontiguousarray(poles), shares
+        return shares, self._compiled.spread(arrays, reach)
+
+    @property
+    def temperature(self) -> Vector:
+        """Temperature of every node, degrees C, shape (n,)."""
+        return BODY + self.rise
+
+    @property
+    def hottest(self) -> float:
+        """Highest temperature of nodes and dry elements, degrees C."""
+        return BODY + float(self.book[_HOTTEST])
+
+    @property
+    def kinds(self) -> NDArray[np.uint8]:
+        """0, or `COAGULATED` or `CHARRED` for every element, shape (m,)."""
+        found = np.where(self.damage[0] >= 1.0, COAGULATED, 0).astype(np.uint8)
+        found[self.stage > 0] = CHARRED
+        return found
+
+    def vaporised(self) -> Indices:
+        """Return the numbers of elements to be removed."""
+        return np.flatnonzero((self.stage == _VAPORISED) & (self._volume > 0.0))
+
+    @property
+    def stored(self) -> float:
+        """Heat above the temperature of the body, without the heat of steam, J."""
+        wet = self._capacity.astype(np.float64) @ self.rise
+        return float(wet + self._constants[4] * (self._volume.astype(np.float64) @ self.excess))
+
+    @property
+    def imbalance(self) -> float:
+        """Heat given, less the heat stored and lost, J: an error of the method."""
+        lost = self.book[_PERFUSED] + self.book[_BOILED] + self.book[_EJECTED]
+        return float(self.book[_GIVEN] - lost - self.stored)
+
+    @property
+    def state(self) -> tuple[NDArray[np.float32] | NDArray[np.uint8] | Vector, ...]:
+        """Arrays that the next step depends on, to be written."""
+        return self.rise, self.water, self.excess, self.damage, self.stage, self.book
+
+    def _cool_down(self) -> None:
+        self.book[_EJECTED] += self.stored
+        self.rise[:] = 0.0
+        self.excess[:] = 0.0
+        self.book[_HOTTEST] = 0.0

@@ -1,0 +1,142 @@
+"""The heat of all organs, and the instruments that bring it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.fem.heat.heat import HEAT_PERIOD_NS, Heat
+from engines.fem.heat.instrument import EnergyInstrument, energy_ports
+from engines.fem.heat.tissue import tissue_of
+from engines.fem.organ import Organ
+from engines.tissue.params import PressedOrgansParams
+from hub.participant import Inputs, Value, signal_out
+from schemas.ports import Port
+from schemas.vectors import Vector
+
+__all__ = ["ElectrodeSpheres", "Heating", "heat_ports"]
+
+
+def heat_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
+    """Return the ports of instruments and of heated organs; none without an instrument."""
+    instruments = [name for name, probe in params.probes.items() if probe.energy]
+    if not instruments:
+        return ()
+    organs = (
+        port
+        for organ in params.organs
+        for port in (
+            signal_out(f"{organ}/hottest", description="highest temperature of the organ", unit="degC"),
+            signal_out(f"{organ}/smoke", description="steam and smoke of the organ", unit="g/s"),
+        )
+    )
+    return *(port for name in instruments for port in energy_ports(name)), *organs
+
+
+class ElectrodeSpheres(Protocol):
+    """The spheres of a probe."""
+
+    @property
+    def name(self) -> str:
+        """Name of the probe."""
+        ...
+
+    @property
+    def radii(self) -> Vector:
+        """m, shape (n,)."""
+        ...
+
+    @property
+    def positions(self) -> Vector:
+        """Centres, m, in `world`, shape (n, 3)."""
+        ...
+
+    @property
+    def touching(self) -> NDArray[np.bool_]:
+        """Spheres near tissue, shape (n,)."""
+        ...
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Spheres that hold tissue, shape (n,)."""
+        ...
+
+
+class Heating:
+    """A step of heat every 10 ms for each organ that is not cold."""
+
+    def __init__(
+        self, params: PressedOrgansParams, organs: Sequence[Organ], probes: Iterable[ElectrodeSpheres]
+    ) -> None:
+        """Begin with cold organs."""
+        self._organs = organs
+        self.heats = [
+            Heat(tissue_of(params.organs[organ.name].material_name), *organ.solid.elements, len(organ.nodes))
+            for organ in organs
+        ]
+        self._instruments = [
+            (EnergyInstrument(probe.name, energy, probe.radii), probe)
+            for probe in probes
+            if (energy := params.probes[probe.name].energy)
+        ]
+        self._edge = max(organ.mean_edge for organ in organs)
+        self._elapsed = np.zeros(1)
+        """Time since the last step of heat, s."""
+        self._smoke = np.zeros(len(organs))
+        """Smoke of every organ in the last step of heat, g/s."""
+
+    def step(self, inputs: Inputs, t: int, h: int) -> dict[str, Value]:
+        """Advance by `h` ns from `t`; return the outputs."""
+        for instrument, _ in self._instruments:
+            instrument.listen(inputs, h * 1e-9)
+        self._elapsed += h * 1e-9
+        if (t + h) // HEAT_PERIOD_NS == t // HEAT_PERIOD_NS:
+            return self.outputs
+        seconds = float(self._elapsed[0])
+        self._elapsed[:] = 0.0
+        power = self._power(seconds)
+        for i, heat in enumerate(self.heats):
+            self._smoke[i] = 1e3 / seconds * heat.advance(seconds, power[i] if power else None)
+        return self.outputs
+
+    @property
+    def outputs(self) -> dict[str, Value]:
+        """Temperatures, smoke, and heat given."""
+        found: dict[str, Value] = {}
+        for organ, heat, smoke in zip(self._organs, self.heats, self._smoke, strict=True):
+            found[f"{organ.name}/hottest"] = np.array([heat.hottest])
+            found[f"{organ.name}/smoke"] = np.array([smoke])
+        for instrument, _ in self._instruments:
+            found[f"{instrument.name}/delivered"] = instrument.numbers[1:].copy()
+        return found
+
+    @property
+    def state(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that the next step depends on, to be written."""
+        return (
+            self._elapsed,
+            self._smoke,
+            *(instrument.numbers for instrument, _ in self._instruments),
+            *(array for heat in self.heats for array in heat.state),
+        )
+
+    def _power(self, seconds: float) -> list[NDArray[np.float32]]:
+        """Return the mean power (W) in every element of every organ, shapes (m,); empty: none."""
+        power: list[NDArray[np.float32]] = []
+        nodes: list[Vector] = []
+        for instrument, probe in self._instruments:
+            if not instrument.numbers[0]:
+                continue
+            nodes = nodes or [organ.solid.nodes for organ in self._organs]
+            poles = instrument.poles(probe.positions, probe.touching | probe.held)
+            given = instrument.deposit(self.heats, nodes, poles, self._edge)
+            for i, heat in enumerate(given):
+                shares = (heat / np.float32(seconds)).astype(np.float32)
+                if len(power) > i:
+                    power[i] += shares
+                else:
+                    power.append(shares)
+        return power
