@@ -31,16 +31,13 @@ _EXTENSIONS = (
         depends=["engines/fem/_solid.h", "engines/fem/_lanes.h", "engines/fem/_triangle.h"],
         extra_compile_args=[*_FLAGS, "/O2" if sys.platform == "win32" else "-O3"],
     ),
-<<<<<<< HEAD
     Extension(
         "engines.fem._probe",
         ["engines/fem/_probe.c", "engines/fem/_near.c"],
         depends=["engines/fem/_near.h", "engines/fem/_triangle.h"],
         extra_compile_args=_FLAGS,
     ),
-=======
     Extension("engines.fem._heat", ["engines/fem/_heat.c"], extra_compile_args=_FLAGS),
->>>>>>> bba9f044 (Heat in tissue of fem: conduction, blood, boiling, char, damage; electrosurgical instruments bring it)
     Extension("schemas._cdr", ["schemas/_cdr.c"], include_dirs=[np.get_include()], extra_compile_args=_FLAGS),
 )
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from engines.bullet.elasticity.stable_step import longest_step
 from engines.tissue.params import PressedOrgansParams
@@ -44,3 +45,10 @@ class BulletParams(PressedOrgansParams):
         )
         halves = (_LONGEST_NS >> i for i in range(_HALVES + 1))
         return next((step for step in halves if step <= limit * 1e9), _LONGEST_NS >> _HALVES)
+
+    @model_validator(mode="after")
+    def _no_energy(self) -> Self:
+        for name, probe in self.probes.items():
+            if probe.energy is not None:
+                raise ValueError(f"probe '{name}': energy heats tissue of kind fem only; leave it out here")
+        return self

@@ -5,6 +5,7 @@ import logging
 import numpy as np
 import pytest
 
+from engines.bullet.params import BulletParams
 from engines.fem.engine import FemEngine
 from engines.fem.heat.heat import COAGULATED, Heat
 from engines.fem.heat.instrument import EnergyInstrument
@@ -151,3 +152,8 @@ def test_the_engine_keeps_its_contract_with_power():
 def test_half_of_the_spheres_is_a_jaw():
     with pytest.raises(ValueError, match="one half of them is one jaw"):
         params(SLAB, {"spheres": 3, "energy": {"mode": "bipolar"}})
+
+
+def test_tissue_in_bullet_is_not_heated():
+    with pytest.raises(ValueError, match="kind fem only"):
+        BulletParams.model_validate({"organs": {"block": SLAB}, "probes": {"probe": cautery()}})
