@@ -35,6 +35,16 @@ class BulletParams(PressedOrgansParams):
         ),
     )
 
+    @model_validator(mode="after")
+    def _does_not_relax(self) -> Self:
+        for name, organ in self.organs.items():
+            if organ.prony:
+                raise ValueError(
+                    f"organ '{name}': the material of kind bullet does not relax: leave prony out, or take"
+                    " kind fem"
+                )
+        return self
+
     @cached_property
     def sub_step(self) -> int:
         """The sub-step, ns: as stated, or the longest stable sub-step among 1 ms and its halves."""

@@ -21,7 +21,7 @@ typedef struct {
     PyObject_HEAD
     Py_buffer kept[20];
     int count;
-    int spheres, size, sub_steps, all, first, points, prediction, is_mean;
+    int spheres, size, sub_steps, all, first, points, terms, prediction, is_mean;
     double *motion;     /* position (3 spheres), velocity (size), its slope (size), reaction at the end (3 spheres) */
     double *clock;      /* duration of the last step, whether there was one, work */
     double *reaction;   /* (size,): output */
@@ -31,6 +31,8 @@ typedef struct {
     double *position;   /* (spheres, 3): centres in the tissue at the end of the step */
     double *spring;     /* direction (3) and yield of the spring under the first sphere */
     double *law;        /* (3, points): forces, yields of the spring, yields of the mesh */
+    double *series;     /* (terms, 2): relaxing moduli over the long-term modulus, and their times; 0: none */
+    double *relaxing;   /* (terms + 1,): forces of the terms, elastic force */
     double *compliance; /* (3, 3): of the spring in series with the held spheres; zeros: none */
     const uint8_t *held;   /* (spheres,) */
     double *path;          /* (sub_steps + 1, all, 3): of all probes */
@@ -58,11 +60,28 @@ static double interpolate(double x, const double *at, const double *values, int 
     return values[low] + (x - at[low]) / (at[high] - at[low]) * (values[high] - values[low]);
 }
 
+/* Return the force that bears the present dent when all has relaxed: the series of the tissue, solved for it. */
+static double elastic_force(Probe *self, double force)
+{
+    double *elastic = self->relaxing + self->terms, before = *elastic, stiffness = 1.0;
+    for (int i = 0; i < self->terms; i++) {
+        double share = self->series[2 * i], kept = self->series[2 * i + 1] / (self->series[2 * i + 1] + self->clock[0]);
+        force -= kept * (self->relaxing[i] - share * before);
+        stiffness += kept * share;
+    }
+    *elastic = force / stiffness;
+    for (int i = 0; i < self->terms; i++) {
+        double kept = self->series[2 * i + 1] / (self->series[2 * i + 1] + self->clock[0]);
+        self->relaxing[i] = kept * (self->relaxing[i] + self->series[2 * i] * (*elastic - before));
+    }
+    return *elastic;
+}
+
 /* Let the spring under a single sphere follow the force: an open loop's law, so the rate is that of the closed loop, by
 the mesh's part of all yield. */
 static void follow(Probe *self, double rate)
 {
-    double force = dot3(self->force, self->spring);
+    double force = elastic_force(self, dot3(self->force, self->spring));
     force = force > 0.0 ? force : 0.0;
     const double *forces = self->law, *yields = forces + self->points, *mesh_yields = yields + self->points;
     double wanted = interpolate(force, forces, yields, self->points);
@@ -177,9 +196,9 @@ static int initialise(Probe *self, PyObject *args, PyObject *Py_UNUSED(named))
     PyObject *arrays;
     if (!PyArg_ParseTuple(args, "Oiip", &arrays, &self->first, &self->prediction, &self->is_mean))
         return -1;
-    void *at[13];
-    Py_ssize_t bytes[13];
-    for (int i = 0; i < 13; i++) {
+    void *at[15];
+    Py_ssize_t bytes[15];
+    for (int i = 0; i < 15; i++) {
         PyObject *array = PySequence_GetItem(arrays, i);
         if (array == NULL)
             return -1;
@@ -193,9 +212,10 @@ static int initialise(Probe *self, PyObject *args, PyObject *Py_UNUSED(named))
     }
     self->motion = at[0], self->clock = at[1], self->reaction = at[2], self->offset = at[3], self->force = at[4];
     self->target = at[5], self->position = at[6], self->spring = at[7], self->law = at[8], self->compliance = at[9];
-    self->held = at[10], self->path = at[11], self->tissue = at[12];
+    self->held = at[10], self->series = at[11], self->relaxing = at[12], self->path = at[13], self->tissue = at[14];
     self->size = (int)(bytes[2] / 8), self->spheres = (int)(bytes[3] / 24), self->points = (int)(bytes[8] / 24);
-    self->sub_steps = (int)(bytes[12] / (bytes[11] - bytes[12])), self->all = (int)((bytes[11] - bytes[12]) / 24);
+    self->terms = (int)(bytes[11] / 16);
+    self->sub_steps = (int)(bytes[14] / (bytes[13] - bytes[14])), self->all = (int)((bytes[13] - bytes[14]) / 24);
     return 0;
 }
 

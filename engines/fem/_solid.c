@@ -7,7 +7,7 @@ docs/decisions/0125-tissue-of-our-own.md.
 
 #include "_solid.h"
 
-#define MOST_NEAR 4096 /* faces near one sphere */
+#define MOST_NEAR 16384 /* faces near one sphere: all of the largest mesh */
 
 typedef struct {
     PyObject_HEAD

@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.fem.heat.heating import Heating, heat_ports
-from engines.fem.organ import Organ
+from engines.fem.organ import Organ, relaxation
 from engines.fem.params import FemParams
 from engines.fem.probe import Probe
-from engines.fem.spheres import Spheres, near_faces
+from engines.fem.spheres import MOST_CONTACTS, Spheres, near_faces
 from engines.tissue.elasticity.body_yield import BodyYield
 from engines.tissue.ports import node_ports, node_states
 from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
 from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS
 from engines.tissue.probes.sub_grid import Surface, warn_beyond
+from engines.tissue.warn_once import warn_once
 from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port
@@ -45,6 +46,7 @@ class FemEngine(Stepped):
         self._bonded: dict[str, BondPlan] = {}
         self._surfaces: list[Surface] = []
         self._heating: Heating | None = None
+        self._warn_of_coupling()
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -73,7 +75,7 @@ class FemEngine(Stepped):
             self._sub_steps = max(self._sub_steps, -(-setup.period_ns // self.params.timestep))
         if any(self.params.has_series(name) for name in setup.bonds):
             self._surfaces = [
-                Surface(organ, self.params.organs[organ.name].elastic, BodyYield) for organ in self._organs
+                Surface(organ, self.params.organs[organ.name].relaxed, BodyYield) for organ in self._organs
             ]
         self._bonded = dict(setup.bonds)
         return self._begin()
@@ -174,11 +176,12 @@ class FemEngine(Stepped):
         bonds = [bond for bond in self.bonds if bond.name in self._bonded]
         radii = [self.params.probes[bond.name].radii for bond in bonds]
         self._spheres = Spheres(np.concatenate([np.zeros(0), *radii]), self._sub_steps)
+        series = [relaxation(organ) for organ in self.params.organs.values()]
         first = 0
         for bond in bonds:
             name, params = bond.name, self.params.probes[bond.name]
             surfaces = self._surfaces if self.params.has_sub_grid(name) else None
-            probe = Probe(params, bond, self._bonded[name], self._spheres, first, surfaces)
+            probe = Probe(params, bond, self._bonded[name], self._spheres, first, surfaces, series)
             first += len(probe.radii)
             self._probes.append(probe)
             outputs.update(probe.outputs)
@@ -202,9 +205,29 @@ class FemEngine(Stepped):
             probe.touching[:] = False
             for spheres, _, _, distances in near:
                 probe.touching[loose[spheres[distances < touched[spheres]]]] = True
+            for spheres, *_ in near:
+                if len(spheres) > MOST_CONTACTS and np.bincount(spheres).max() > MOST_CONTACTS:
+                    self._warn_of_fine_faces(probe)
             probe.follow(near)
             if probe.sub_grid is not None and probe.sub_grid.is_beyond:
                 warn_beyond(self.name, probe.name, float(probe.radii[0]))
+
+    def _warn_of_fine_faces(self, probe: Probe) -> None:
+        warn_once(
+            f"participant '{self.name}', probe '{probe.name}': a sphere is near more than {MOST_CONTACTS}"
+            " faces, and touches no more: take a coarser mesh, or smaller spheres"
+        )
+
+    def _warn_of_coupling(self) -> None:
+        """Warn of parameters that mean a virtual coupling, which this engine does not have."""
+        for name, probe in self.params.probes.items():
+            stated = [key for key in ("stiffness", "mass", "damping") if getattr(probe, key) is not None]
+            if stated:
+                warn_once(
+                    f"participant '{self.name}', probe '{name}': {', '.join(stated)} of a virtual coupling"
+                    " without effect in kind fem, whose spheres go where the instrument goes: leave out, or"
+                    " take kind bullet"
+                )
 
     def _bond(self, name: str) -> BondSide:
         probe = self.params.probes[name]

@@ -12,9 +12,10 @@ from engines.fem.solid import Branch, Solid, SphereWay
 from engines.fem.spheres import Spheres
 from engines.tissue.organs.params import OrganParams
 from schemas.errors import SessionError
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
-__all__ = ["Organ"]
+__all__ = ["Organ", "relaxation"]
 
 _VISCOUS_SHARE = 1.0
 """Shear modulus of the branch for `damping`, over that of the material. The damping of a branch is modulus
@@ -24,6 +25,12 @@ _SETTLED_PERIODS = 3.0
 """Time of settling under weight, in periods of the slowest swing, which drag damps critically."""
 _LEAST_SETTLING_S = 0.1
 _NO_SPHERES = np.zeros(0), np.zeros(0, np.uint8)
+
+
+def relaxation(params: OrganParams) -> list[Branch]:
+    """Return the branches of the organ's Prony series."""
+    remaining = 1.0 - plain_sum(term.share for term in params.series)
+    return [Branch(term.share / remaining, term.seconds) for term in params.series]
 
 
 class Organ:
@@ -40,9 +47,10 @@ class Organ:
         )
         self.mean_edge = float(np.linalg.norm(edges, axis=2).mean())
         self.friction = params.contact_friction
-        damping = params.elastic.damping
-        branches = [Branch(_VISCOUS_SHARE, damping)] if damping else []
-        self.solid = Solid(self.mesh, self.anchored, self.touchable, params.elastic, branches)
+        material = params.relaxed
+        branches = [Branch(_VISCOUS_SHARE, material.damping)] if material.damping else []
+        branches += relaxation(params)
+        self.solid = Solid(self.mesh, self.anchored, self.touchable, material, branches)
         self._inverse_mass = self.solid.inverse_mass.copy()
         self._slowest = params.frequencies[1]
         self._free = np.ones(0, np.uint8)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from xxhash import xxh3_128_digest
 
+from engines.fem.solid import Branch
 from engines.fem.spheres import Spheres
 from engines.tissue.probes.near_faces import NearFaces
 from engines.tissue.probes.params import Coupling, ProbeParams
@@ -42,8 +43,12 @@ class Probe:
         spheres: Spheres,
         first: int,
         surfaces: Sequence[Surface] | None = None,
+        series: Sequence[Sequence[Branch]] = (),
     ) -> None:
-        """`first`: number of the first sphere among all; `surfaces`: stated for a spring in series."""
+        """`first`: number of the first sphere among all; `surfaces`: stated for a spring in series.
+
+        series: relaxation of each surface.
+        """
         from engines.fem._probe import Probe as Compiled
 
         n, size = len(params.radii), bond.size
@@ -51,10 +56,14 @@ class Probe:
         self.bodies = list(range(first, first + n))
         self.sub_grid = None if surfaces is None else SubGrid(float(self.radii[0]), RIGID, surfaces)
         points = 0 if surfaces is None else LAW_POINTS
-        sizes = (6 * n + 2 * size, 3, 3 * n, 3 * n, 3 * n, 3 * n, 4, 3 * points, 9)
+        self._terms: list[Vector] = [
+            np.array([[one.share, one.seconds] for one in branches]).reshape(-1, 2) for branches in series
+        ]
+        most = max((len(terms) for terms in self._terms), default=0)
+        sizes = (6 * n + 2 * size, 3, 3 * n, 3 * n, 3 * n, 3 * n, 4, 3 * points, 9, 2 * most, most + 1)
         self._state: Vector = np.zeros(sum(sizes))
         ends = list(accumulate(sizes))
-        motion, clock, offsets, forces, targets, positions, spring, law, compliance = (
+        motion, clock, offsets, forces, targets, positions, spring, law, compliance, terms, relaxing = (
             self._state[end - count : end] for end, count in zip(ends, sizes, strict=True)
         )
         self.targets, self.positions, self.forces = (
@@ -63,6 +72,7 @@ class Probe:
         self.targets[:] = self.positions[:] = _FAR_M
         self._spring, self._law = spring, law.reshape(3, points)
         self._compliance = compliance.reshape(3, 3)
+        self._series, self._elastic_force = terms.reshape(most, 2), relaxing[most:]
         self._velocity = motion[3 * n : 3 * n + 3]
         self.held: NDArray[np.bool_] = np.zeros(n, dtype=np.bool_)
         self.touching: NDArray[np.bool_] = np.zeros(n, dtype=np.bool_)
@@ -83,6 +93,8 @@ class Probe:
                 self._law,
                 compliance,
                 self.held,
+                terms,
+                relaxing,
                 spheres.path,
                 spheres.forces,
             ),
@@ -118,11 +130,22 @@ class Probe:
     def follow(self, near: Sequence[NearFaces]) -> None:
         """Set the law of the spring in series at the place of the sphere, with these faces in its sight."""
         if self.sub_grid is not None:
-            self.sub_grid.update(self.positions[0], self.forces[0], near)
+            self._relax(near)
+            force = self._elastic_force * self.sub_grid.inward if len(self._series) else self.forces[0]
+            self.sub_grid.update(self.positions[0], force, near)
             self._law[:] = self.sub_grid.law
             self._spring[:3] = self.sub_grid.inward
             if not self.sub_grid.inward.any():
                 self._spring[3] = 0.0
+
+    def _relax(self, near: Sequence[NearFaces]) -> None:
+        """Take the relaxation of the nearest organ."""
+        distances = [faces.distances.min(initial=np.inf) for faces in near]
+        nearest = int(np.argmin(distances))
+        if len(self._series) and np.isfinite(distances[nearest]):
+            terms = self._terms[nearest]
+            self._series[:] = 0.0
+            self._series[: len(terms)] = terms
 
     @property
     def digest(self) -> bytes:

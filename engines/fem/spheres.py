@@ -8,7 +8,10 @@ from engines.tissue.meshing.tet_mesh import Indices
 from engines.tissue.probes.near_faces import NearFaces
 from schemas.vectors import Vector
 
-__all__ = ["Spheres", "near_faces"]
+__all__ = ["MOST_CONTACTS", "Spheres", "near_faces"]
+
+MOST_CONTACTS = 512
+"""Most contacts of a sphere, as in `_solid.h`."""
 
 _PAIRS = 1024
 """Pairs of a sphere and a near face for which there is room at first."""

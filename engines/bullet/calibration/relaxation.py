@@ -23,13 +23,18 @@ class Prony:
     shares: tuple[float, float]
     times: tuple[float, float]
 
+    @property
+    def remaining(self) -> float:
+        """Share of the force that does not relax."""
+        return 1.0 - plain_sum(self.shares)
+
     def relaxed(self, time: Vector, elastic: Vector) -> Vector:
         """Return the force at `time` (s, shape (n,), increasing) of the elastic force, shape (n,).
 
         Exact where the elastic force is linear between the samples; before the first there was none.
         """
         steps, rises = np.diff(time), np.diff(elastic, prepend=0.0)
-        force = (1.0 - plain_sum(self.shares)) * elastic
+        force = self.remaining * elastic
         for share, tau in zip(self.shares, self.times, strict=True):
             decay = np.exp(-steps / tau)
             gain = share * tau * -np.expm1(-steps / tau) / steps

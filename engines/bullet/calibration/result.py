@@ -6,10 +6,15 @@ from typing import Any
 
 from engines.bullet.calibration.fit import Calibration
 from engines.bullet.calibration.indentation import Indenter
+from engines.bullet.calibration.relaxation import Prony
 from engines.tissue.organs.material_file import MaterialFile
+from engines.tissue.organs.prony import PronyTerm
 from schemas.errors import RecordingError
 
 __all__ = ["material_file"]
+
+_LEAST_SHARE = 1e-4
+"""Least share of a term: the fit may leave a term without any."""
 
 
 def material_file(
@@ -17,8 +22,8 @@ def material_file(
 ) -> MaterialFile:
     """Return the content of the file.
 
-    Bullet's material does not relax, and its damping is proportional to its stiffness. The file has the
-    stiffness and the loss of the tissue at `frequency` (Hz).
+    Bullet's material does not relax, and its damping is proportional to its stiffness. For kind bullet the
+    file has the stiffness and the loss of the tissue at `frequency` (Hz), for kind fem the relaxation.
 
     Args:
         found: the calibration.
@@ -58,10 +63,21 @@ def material_file(
             density=density,
             damping=float(f"{damping:.4g}"),
             friction=None if found.friction is None else float(f"{found.friction:.4g}"),
+            long_term_young_modulus=float(f"{found.young_modulus * found.relaxation.remaining:.5g}"),
+            prony=_terms(found.relaxation),
             fit=fit,
         )
     except ValueError as error:
         raise RecordingError(f"no tissue explains '{data}': {error}") from error
+
+
+def _terms(relaxation: Prony) -> tuple[PronyTerm, ...]:
+    """Return the terms that relax at all."""
+    return tuple(
+        PronyTerm(share=float(f"{share:.5g}"), seconds=float(f"{time:.5g}"))
+        for share, time in zip(relaxation.shares, relaxation.times, strict=True)
+        if share >= _LEAST_SHARE
+    )
 
 
 def _value(found: Calibration, name: str, value: float) -> dict[str, float]:

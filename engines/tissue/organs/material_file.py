@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from engines.tissue.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio
+from engines.tissue.organs.prony import PronySeries
 from schemas.yaml_model import load_yaml_model, yaml_text
 
 __all__ = ["MaterialFile"]
@@ -29,6 +30,10 @@ class MaterialFile(BaseModel):
     """Ratio of damping to stiffness, s, for the loss at the frequency of `fit`."""
     friction: Annotated[float, Field(ge=0.0, le=2.0, allow_inf_nan=False)] | None = None
     """Coulomb's coefficient; None: not measured."""
+    long_term_young_modulus: TissueModulus | None = None
+    """Young's modulus when all of `prony` has relaxed, Pa; None: no relaxation."""
+    prony: PronySeries = ()
+    """Relaxation, instead of `young_modulus` and `damping` at a single frequency: for kind fem."""
     fit: dict[str, Any] = Field(default_factory=dict[str, Any])
     """Measured values with deviations, and quality of the fit; for the reader."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Literal, Self
@@ -22,6 +23,7 @@ from engines.tissue.organs.catalogue import SHAPES, block_shape
 from engines.tissue.organs.material_file import MaterialFile
 from engines.tissue.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
 from engines.tissue.organs.organ_file import OrganFile
+from engines.tissue.organs.prony import PronySeries, PronyTerm
 from engines.tissue.organs.shape import Shape
 from engines.tissue.organs.surface_mesh import mesh_surface
 from robots import rotation
@@ -102,6 +104,13 @@ class OrganParams(BaseModel):
         le=1_000_000_000,
         description="stiffness-proportional damping: ratio of damping to stiffness, a time",
     )
+    prony: PronySeries = Field(
+        default=(),
+        description=(
+            "relaxation, kind fem: up to three terms of share (of the instantaneous shear modulus) and"
+            " seconds; the Young's modulus is that after all relaxation; default: that of the material_file"
+        ),
+    )
     friction: float = Field(default=0.3, ge=0, le=2, description="Coulomb coefficient against probes")
 
     @field_validator("mesh", "material_file")
@@ -170,6 +179,20 @@ class OrganParams(BaseModel):
         if self.young_modulus is not None or self.material_file is not None:
             return None
         return self.material or self.body.material
+
+    @cached_property
+    def relaxed(self) -> Material:
+        """The material after all relaxation by `series`."""
+        own = self._own_material
+        if own is None or own.long_term_young_modulus is None or self.prony:
+            return self.elastic
+        return replace(self.elastic, young_modulus=own.long_term_young_modulus, damping=self.damping * 1e-9)
+
+    @cached_property
+    def series(self) -> tuple[PronyTerm, ...]:
+        """Relaxation: as stated, else from the material file, if any."""
+        own = self._own_material
+        return self.prony if self.prony or own is None else own.prony
 
     @cached_property
     def contact_friction(self) -> float:

@@ -11,10 +11,13 @@ import pytest
 
 from engines.bullet.params import BulletParams
 from engines.fem.engine import FemEngine
+from engines.fem.organ import relaxation
 from engines.fem.params import FemParams
+from engines.fem.solid import Branch
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from schemas.errors import ScenarioError, SessionError, StateError
+from schemas.files import Files
 from tests.engines.bullet.rig import IMPULSE
 from tests.engines.fem.rig import BLOCK, MS, FemRig, params
 
@@ -51,6 +54,55 @@ def test_the_force_of_a_fine_mesh_is_corrected_too():
         rig.move((0.0, 0.0, 2e-3), 0.05)
         rig.hold(0.1)
         assert rig.force[2] == pytest.approx(CONVERGED[5e-3][2], rel=0.03)
+
+
+SERIES = [{"share": 0.3, "seconds": 0.05}, {"share": 0.2, "seconds": 0.3}]
+
+
+def test_a_held_press_relaxes_as_its_series_says():
+    """From 0.1 s on: earlier the bulk, which does not relax, bears a part of the force."""
+    tissue = {**BLOCK, "nodes": 250, "poisson_ratio": 0.4, "prony": SERIES}
+    with FemRig(params(tissue), start=(0.0, 0.0, 5.1e-3)) as rig:
+        rig.move((0.0, 0.0, 3e-3), 0.02)
+        force = rig.hold(1.5)[:, 2]
+
+    def left(t):
+        return 1.0 + sum(one["share"] / 0.5 * np.exp(-(t + 0.01) / one["seconds"]) for one in SERIES)
+
+    for t in (0.1, 0.2, 0.4, 0.8):
+        ratio = force[round(t * 1e3)] / force[-1]
+        assert ratio == pytest.approx(left(t) / left(1.5), rel=0.025)
+
+
+def test_parameters_without_effect_are_said_once(caplog):
+    model = params(probe={"stiffness": "500 N/m", "mass": "1 kg"}, node_period="32 ms")
+    FemEngine("here", model)
+    FemEngine("here", model)
+    assert [record.getMessage().count("stiffness, mass") for record in caplog.records] == [1]
+
+
+def test_a_material_file_has_its_relaxation_for_fem_alone(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "young_modulus: 8000.0\npoisson_ratio: 0.45\ndensity: 1000.0\ndamping: 0.02\n"
+        "long_term_young_modulus: 5000.0\nprony: [{share: 0.4, seconds: 0.1}]\n"
+    )
+    given = {"organs": {"block": {"size": BLOCK["size"], "material_file": "mine.yaml"}}}
+    organ, in_bullet = (
+        model.model_validate(given, context=Files(tmp_path).context).organs["block"]
+        for model in (FemParams, BulletParams)
+    )
+    assert (organ.elastic.young_modulus, organ.elastic.damping) == (8e3, 0.02)
+    assert (organ.relaxed.young_modulus, organ.relaxed.damping) == (5e3, 1e-3)
+    assert relaxation(organ) == [Branch(pytest.approx(2 / 3), 0.1)]
+    assert in_bullet.elastic == organ.elastic
+
+
+def test_bullet_refuses_a_series_and_a_series_leaves_a_solid():
+    with pytest.raises(ValueError, match="does not relax"):
+        BulletParams.model_validate({"organs": {"block": {**BLOCK, "prony": SERIES}}})
+    with pytest.raises(ValueError, match="sum to at most"):
+        params({**BLOCK, "prony": [{"share": 0.6, "seconds": 1.0}] * 2})
 
 
 def test_a_swinging_press_gives_back_no_more_than_it_took():
