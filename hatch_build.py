@@ -27,7 +27,7 @@ _EXTENSIONS = (
     ),
     Extension(
         "engines.fem._solid",
-        ["engines/fem/_solid.c", "engines/fem/_elements.c", "engines/fem/_contact.c"],
+        [f"engines/fem/_{part}.c" for part in ("solid", "elements", "contact", "topology", "cut", "blade")],
         depends=["engines/fem/_solid.h", "engines/fem/_lanes.h", "engines/fem/_triangle.h"],
         extra_compile_args=[*_FLAGS, "/O2" if sys.platform == "win32" else "-O3"],
     ),

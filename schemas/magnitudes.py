@@ -27,6 +27,7 @@ MAGNITUDES = {
     "kg": Magnitude(1e-6, 1e4, "from a piece of suture to a lorry"),
     "Pa": Magnitude(1e-3, 1e13, "from a foam to ten times diamond"),
     "kg/m^3": Magnitude(1e-3, 1e5, "from a gas to four times osmium"),
+    "J/m^2": Magnitude(1e-3, 1e7, "from a gel to a hundred times steel"),
     "N": Magnitude(1e-9, 1e6, "from a cell to a hundred tonnes"),
     "W": Magnitude(1e-9, 1e6, "from a cell to a locomotive"),
     "N/m": Magnitude(1e-6, 1e9, "from a cell to a machine's frame"),

@@ -46,6 +46,8 @@ class Organ:
         self.touchable = mesh.triangles[~self.anchored[mesh.triangles].all(axis=1)]
         self.held = np.zeros(len(mesh.nodes), dtype=np.bool_)
         """Nodes held by a grasp, shape (n,)."""
+        self.origins = np.arange(len(mesh.nodes))
+        """Node of the mesh at the resting place of each node, shape (n,)."""
         edges = mesh.nodes[mesh.triangles] - mesh.nodes[np.roll(mesh.triangles, 1, axis=1)]
         self.mean_edge = float(np.linalg.norm(edges, axis=2).mean())
         """Mean length of an edge of the surface, m."""

@@ -57,8 +57,13 @@ class BulletParams(PressedOrgansParams):
         return next((step for step in halves if step <= limit * 1e9), _LONGEST_NS >> _HALVES)
 
     @model_validator(mode="after")
-    def _no_energy(self) -> Self:
+    def _what_fem_alone_has(self) -> Self:
         for name, probe in self.probes.items():
             if probe.energy is not None:
                 raise ValueError(f"probe '{name}': energy heats tissue of kind fem only; leave it out here")
+            if probe.blades:
+                raise ValueError(f"probe '{name}': blades cut tissue of kind fem only; leave them out here")
+        for name, organ in self.organs.items():
+            if organ.cutting is not None:
+                raise ValueError(f"organ '{name}': only tissue of kind fem is cut; leave `cutting` out here")
         return self

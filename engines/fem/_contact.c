@@ -40,6 +40,8 @@ int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_step
     }
     int found = 0;
     for (int t = 0; t < body->faces && found < most; t++) {
+        if (body->surface[3 * t] < 0)
+            continue; /* its element has gone */
         float x[3][3];
         int is_near = 1;
         for (int a = 0; a < 3; a++)

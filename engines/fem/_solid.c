@@ -8,17 +8,20 @@ docs/decisions/0125-tissue-of-our-own.md.
 #include "_solid.h"
 
 #define MOST_NEAR 16384 /* faces near one sphere: all of the largest mesh */
+#define MOST_TORN 64      /* faces at a time */
+#define LARGEST_MOVE 0.25f
 
 typedef struct {
     PyObject_HEAD
     Body body;
-    Py_buffer held[16];
+    Py_buffer held[24];
     int count;
 } Solid;
 
 /* Move the nodes that a sphere holds with the sphere; write the force on the sphere. */
-static void carry(const Body *body, const Spheres *spheres, int sub_step, float seconds, const float *mass, float gravity)
+static void carry(const Body *body, const Spheres *spheres, int sub_step, float seconds, float gravity)
 {
+    const float *mass = body->mass;
     for (int i = 0; i < body->nodes; i++) {
         int sphere = body->holder[i];
         if (sphere < 0)
@@ -34,11 +37,16 @@ static void carry(const Body *body, const Spheres *spheres, int sub_step, float 
     }
 }
 
+/* Move the nodes; of a body that may be cut by no more in a sub-step than a part of the least height of an element. */
 static void move(const Body *body, float seconds)
 {
+    float sharpness = body->limits[1], fastest = sharpness > 0.0f ? LARGEST_MOVE / (sqrtf(sharpness) * seconds) : INFINITY;
     for (int i = 0; i < body->nodes; i++)
-        for (int k = 0; k < 3; k++)
-            body->displacement[4 * i + k] += seconds * body->velocity[4 * i + k];
+        for (int k = 0; k < 3; k++) {
+            float *v = body->velocity + 4 * i + k;
+            *v = *v > fastest ? fastest : *v < -fastest ? -fastest : *v;
+            body->displacement[4 * i + k] += seconds * *v;
+        }
 }
 
 static void accelerate(const Body *body, float seconds, float gravity, float drag)
@@ -55,51 +63,93 @@ static void accelerate(const Body *body, float seconds, float gravity, float dra
     }
 }
 
-PyDoc_STRVAR(advance_doc, "advance(path, radius, free, force, friction, mass, seconds, sub_steps, gravity, drag)\n--\n\n\
-Advance by sub-steps of `seconds` while spheres go along `path`, shape (sub_steps + 1, n, 3), m; add the force on each\n\
-sphere to `force`, shape (sub_steps, n, 3), N. `mass`: shape (nodes,), kg, also of held nodes.");
+/* Memory of a step. */
+typedef struct {
+    int *near;         /* faces near the spheres */
+    double *begun;     /* fronts at the start, (edges, samples, 3) */
+    double *impulses;  /* (edges, samples, 3) */
+    double *triangles; /* (2 edges samples, 3, 3) */
+} Scratch;
 
-static PyObject *advance(Solid *self, PyObject *args)
+static int find_scratch(const Spheres *spheres, const Edges *edges, Scratch *scratch)
 {
-    Py_buffer path, radius, free_, force, mass;
-    Spheres spheres;
-    float seconds, gravity, drag;
-    int sub_steps;
-    if (!PyArg_ParseTuple(args, "y*y*y*w*fy*fiff", &path, &radius, &free_, &force, &spheres.friction, &mass, &seconds,
-                          &sub_steps, &gravity, &drag))
-        return NULL;
-    const Body *body = &self->body;
-    spheres.count = (int)(radius.len / (Py_ssize_t)sizeof(double));
-    spheres.path = path.buf, spheres.radius = radius.buf, spheres.free = free_.buf, spheres.force = force.buf;
-    int *near = PyMem_Malloc(sizeof(int) * (size_t)(spheres.count + 1) * (MOST_NEAR + 1));
-    if (near != NULL) {
-        Py_BEGIN_ALLOW_THREADS;
-        for (int s = 0; s < spheres.count; s++) {
-            int *found = near + s * (MOST_NEAR + 1);
-            *found = spheres.free[s] ? find_near(body, &spheres, s, sub_steps, found + 1, MOST_NEAR) : 0;
+    size_t fronts = 3 * (size_t)(edges->count * edges->samples + 1);
+    scratch->near = PyMem_RawMalloc(sizeof(int) * (size_t)(spheres->count + 1) * (MOST_NEAR + 1));
+    scratch->begun = PyMem_RawCalloc(fronts, sizeof(double));
+    scratch->impulses = PyMem_RawCalloc(fronts, sizeof(double));
+    scratch->triangles = PyMem_RawCalloc(6 * fronts, sizeof(double));
+    return scratch->near && scratch->begun && scratch->impulses && scratch->triangles;
+}
+
+static void free_scratch(Scratch *scratch)
+{
+    PyMem_RawFree(scratch->near);
+    PyMem_RawFree(scratch->begun);
+    PyMem_RawFree(scratch->impulses);
+    PyMem_RawFree(scratch->triangles);
+}
+
+/* Advance by sub-steps; return how many faces have been cut open, or -1 without memory. */
+static int run(Body *body, const Spheres *spheres, const Edges *edges, int sub_steps, float seconds, float gravity,
+               float drag)
+{
+    Scratch scratch;
+    int opened = -1;
+    if (find_scratch(spheres, edges, &scratch)) {
+        for (int s = 0; s < spheres->count; s++) {
+            int *found = scratch.near + s * (MOST_NEAR + 1);
+            *found = spheres->free[s] ? find_near(body, spheres, s, sub_steps, found + 1, MOST_NEAR) : 0;
         }
+        engage(body, spheres, edges, sub_steps, scratch.begun);
         for (int k = 0; k < sub_steps; k++) {
             elastic_forces(body, seconds);
             accelerate(body, seconds, gravity, drag);
-            carry(body, &spheres, k, seconds, mass.buf, gravity);
-            for (int s = 0; s < spheres.count; s++) {
-                int *found = near + s * (MOST_NEAR + 1);
+            carry(body, spheres, k, seconds, gravity);
+            for (int s = 0; s < spheres->count; s++) {
+                int *found = scratch.near + s * (MOST_NEAR + 1);
                 if (*found)
-                    press(body, &spheres, s, k, seconds, found + 1, *found);
+                    press(body, spheres, s, k, seconds, found + 1, *found);
             }
+            slice(body, spheres, edges, k, seconds, scratch.impulses);
             move(body, seconds);
+            follow(body, spheres, edges, k, seconds, scratch.impulses);
         }
-        Py_END_ALLOW_THREADS;
-        PyMem_Free(near);
+        int swept = sweep(body, spheres, edges, sub_steps, scratch.begun, scratch.triangles);
+        opened = swept ? cut_along(body, scratch.triangles, swept) : 0;
     }
-    PyBuffer_Release(&path);
-    PyBuffer_Release(&radius);
-    PyBuffer_Release(&free_);
-    PyBuffer_Release(&force);
-    PyBuffer_Release(&mass);
-    if (near == NULL)
-        return PyErr_NoMemory();
-    Py_RETURN_NONE;
+    free_scratch(&scratch);
+    return opened;
+}
+
+PyDoc_STRVAR(advance_doc, "advance(path, radius, free, force, friction, seconds, sub_steps, gravity, drag, ends, \
+toughness, element, front, ahead, book)\n--\n\n\
+Advance by sub-steps of `seconds` while spheres go along `path`, shape (sub_steps + 1, n, 3), m; add the force on each\n\
+sphere to `force`, shape (sub_steps, n, 3), N. The last arguments are edges of blades: `ends`, shape (e, 2), are\n\
+spheres; `element`, shape (e, samples), `front` and `ahead`, shape (e, samples, 3), and `book` are their state.\n\
+Return how many faces have been cut open.");
+
+static PyObject *advance(Solid *self, PyObject *args)
+{
+    Py_buffer held[9];
+    Spheres spheres;
+    Edges edges;
+    float seconds, gravity, drag;
+    int sub_steps, opened;
+    if (!PyArg_ParseTuple(args, "y*y*y*w*ffiffy*dw*w*w*w*", held, held + 1, held + 2, held + 3, &spheres.friction, &seconds,
+                          &sub_steps, &gravity, &drag, held + 4, &edges.toughness, held + 5, held + 6, held + 7, held + 8))
+        return NULL;
+    spheres.count = (int)(held[1].len / (Py_ssize_t)sizeof(double));
+    spheres.path = held[0].buf, spheres.radius = held[1].buf, spheres.free = held[2].buf, spheres.force = held[3].buf;
+    edges.count = (int)(held[4].len / 8);
+    edges.samples = edges.count ? (int)(held[5].len / 4) / edges.count : 0;
+    edges.ends = held[4].buf, edges.element = held[5].buf, edges.front = held[6].buf, edges.ahead = held[7].buf;
+    edges.book = held[8].buf;
+    Py_BEGIN_ALLOW_THREADS;
+    opened = run(&self->body, &spheres, &edges, sub_steps, seconds, gravity, drag);
+    Py_END_ALLOW_THREADS;
+    for (int k = 0; k < 9; k++)
+        PyBuffer_Release(held + k);
+    return opened < 0 ? PyErr_NoMemory() : PyLong_FromLong(opened);
 }
 
 PyDoc_STRVAR(forces_doc, "forces(seconds)\n--\n\nSet the forces of the elements on the nodes, N; viscous strains \
@@ -112,6 +162,102 @@ static PyObject *forces(Solid *self, PyObject *seconds)
         return NULL;
     elastic_forces(&self->body, (float)step);
     Py_RETURN_NONE;
+}
+
+typedef int (*Change)(Body *, const int32_t *, int);
+
+/* Apply a change to numbers, each below `most`, given as an array of 32 bits. */
+static PyObject *change(Solid *self, PyObject *numbers, Change apply, int most)
+{
+    Py_buffer given;
+    int changed = -1;
+    if (PyObject_GetBuffer(numbers, &given, PyBUF_SIMPLE))
+        return NULL;
+    const int32_t *number = given.buf;
+    int count = (int)(given.len / 4), valid = self->body.node_room > self->body.nodes;
+    for (int k = 0; k < count; k++)
+        valid &= number[k] >= 0 && number[k] < most;
+    if (valid)
+        changed = apply(&self->body, number, count);
+    PyBuffer_Release(&given);
+    if (!valid)
+        return PyErr_Format(PyExc_ValueError, "numbers are 0 to %d, in a body with room for its pieces", most - 1);
+    return changed < 0 ? PyErr_NoMemory() : PyLong_FromLong(changed);
+}
+
+PyDoc_STRVAR(open_doc, "open(faces)\n--\n\nOpen faces between elements; return how many were closed.");
+
+static PyObject *open_method(Solid *self, PyObject *faces)
+{
+    return change(self, faces, open_faces, 16 * self->body.blocks);
+}
+
+PyDoc_STRVAR(remove_doc, "remove(elements)\n--\n\nLet elements go; return how many were there.");
+
+static PyObject *remove_method(Solid *self, PyObject *elements)
+{
+    return change(self, elements, remove_elements, 4 * self->body.blocks);
+}
+
+PyDoc_STRVAR(tear_doc, "tear(stretch)\n--\n\nOpen a face of each element that is stretched beyond `stretch` and more \
+than its neighbours;\nreturn how many.");
+
+static PyObject *tear(Solid *self, PyObject *stretch)
+{
+    int32_t faces[MOST_TORN];
+    double limit = PyFloat_AsDouble(stretch);
+    if (PyErr_Occurred())
+        return NULL;
+    int found = find_torn(&self->body, (float)limit, faces, MOST_TORN);
+    int opened = found > 0 ? open_faces(&self->body, faces, found) : found;
+    return opened < 0 ? PyErr_NoMemory() : PyLong_FromLong(opened);
+}
+
+PyDoc_STRVAR(measure_doc, "measure()\n--\n\nReturn the largest sharpness of an element, 1/m^2, and the fastest swing of \
+a mean volume\nover lambda, 1/s^2/Pa.");
+
+static PyObject *measure_method(Solid *self, PyObject *Py_UNUSED(none))
+{
+    float sharpness, rate;
+    if (measure(&self->body, &sharpness, &rate))
+        return PyErr_NoMemory();
+    return Py_BuildValue("ff", sharpness, rate);
+}
+
+PyDoc_STRVAR(pieces_doc, "pieces(labels)\n--\n\nNumber the pieces of the body by element; -1: an element that has gone.");
+
+static PyObject *pieces(Solid *self, PyObject *labels)
+{
+    Py_buffer given;
+    int32_t *stack = PyMem_RawMalloc(sizeof(int32_t) * 4 * (size_t)self->body.blocks);
+    if (stack == NULL)
+        return PyErr_NoMemory();
+    if (PyObject_GetBuffer(labels, &given, PyBUF_WRITABLE) == 0) {
+        label_pieces(&self->body, given.buf, stack);
+        PyBuffer_Release(&given);
+    }
+    PyMem_RawFree(stack);
+    if (PyErr_Occurred())
+        return NULL;
+    Py_RETURN_NONE;
+}
+
+static PyObject *get_counts(Solid *self, void *Py_UNUSED(closure))
+{
+    return Py_BuildValue("ii", self->body.nodes, self->body.faces);
+}
+
+static int set_counts(Solid *self, PyObject *counts, void *Py_UNUSED(closure))
+{
+    int nodes, faces;
+    if (!PyArg_ParseTuple(counts, "ii", &nodes, &faces))
+        return -1;
+    if (nodes < 0 || nodes > self->body.node_room || faces < 0 || faces > 16 * self->body.blocks) {
+        PyErr_SetString(PyExc_ValueError, "more nodes or faces than there is room for");
+        return -1;
+    }
+    self->body.nodes = nodes, self->body.faces = faces;
+    return 0;
 }
 
 /* Take an array of the body from a sequence; it is kept until the body goes. */
@@ -130,31 +276,43 @@ static void *array_of(Solid *self, PyObject *arrays, int writable, Py_ssize_t *b
     return held->buf;
 }
 
+/* Set a field of the body to the next array, and `size` to its bytes; else return from the function. */
+#define NEXT(field, writable)                                                                                          \
+    if ((body->field = array_of(self, arrays, writable, &size)) == NULL)                                               \
+    return -1
+
 static int initialise(Solid *self, PyObject *args, PyObject *Py_UNUSED(named))
 {
     PyObject *arrays;
-    Py_ssize_t n, size, b, f, m;
+    Py_ssize_t size;
     Body *body = &self->body;
-    if (!PyArg_ParseTuple(args, "O", &arrays))
+    if (!PyArg_ParseTuple(args, "Oii", &arrays, &body->nodes, &body->faces))
         return -1;
-    if ((body->rest = array_of(self, arrays, 0, &n)) == NULL ||
-        (body->displacement = array_of(self, arrays, 1, &size)) == NULL ||
-        (body->velocity = array_of(self, arrays, 1, &size)) == NULL ||
-        (body->force = array_of(self, arrays, 1, &size)) == NULL ||
-        (body->inverse_mass = array_of(self, arrays, 0, &size)) == NULL ||
-        (body->inverse_volume = array_of(self, arrays, 0, &size)) == NULL ||
-        (body->bulk = array_of(self, arrays, 0, &size)) == NULL ||
-        (body->holder = array_of(self, arrays, 0, &size)) == NULL ||
-        (body->corners = array_of(self, arrays, 0, &b)) == NULL ||
-        (body->gradients = array_of(self, arrays, 0, &size)) == NULL ||
-        (body->volumes = array_of(self, arrays, 0, &size)) == NULL ||
-        (body->shear = array_of(self, arrays, 0, &size)) == NULL ||
-        (body->strains = array_of(self, arrays, 1, &size)) == NULL ||
-        (body->branch = array_of(self, arrays, 0, &m)) == NULL ||
-        (body->surface = array_of(self, arrays, 0, &f)) == NULL)
-        return -1;
-    body->nodes = (int)(n / 16), body->blocks = (int)(b / 64);
-    body->branches = (int)(m / 8), body->faces = (int)(f / 12);
+    NEXT(rest, 1);
+    body->node_room = (int)(size / 16), body->skin = body->faces;
+    NEXT(displacement, 1);
+    NEXT(velocity, 1);
+    NEXT(force, 1);
+    NEXT(mass, 1);
+    NEXT(inverse_mass, 1);
+    NEXT(inverse_volume, 1);
+    NEXT(bulk, 1);
+    NEXT(holder, 1);
+    NEXT(origin, 1);
+    NEXT(flags, 1);
+    NEXT(corners, 1);
+    body->blocks = (int)(size / 64);
+    NEXT(gradients, 1);
+    NEXT(volumes, 1);
+    NEXT(element_mass, 1);
+    NEXT(shear, 1);
+    NEXT(strains, 1);
+    NEXT(branch, 0);
+    body->branches = (int)(size / 8);
+    NEXT(across, 1);
+    NEXT(surface, 1);
+    NEXT(owner, 1);
+    NEXT(limits, 0);
     return 0;
 }
 
@@ -168,7 +326,17 @@ static void finish(Solid *self)
 static PyMethodDef methods[] = {
     {"advance", (PyCFunction)advance, METH_VARARGS, advance_doc},
     {"forces", (PyCFunction)forces, METH_O, forces_doc},
+    {"open", (PyCFunction)open_method, METH_O, open_doc},
+    {"remove", (PyCFunction)remove_method, METH_O, remove_doc},
+    {"tear", (PyCFunction)tear, METH_O, tear_doc},
+    {"measure", (PyCFunction)measure_method, METH_NOARGS, measure_doc},
+    {"pieces", (PyCFunction)pieces, METH_O, pieces_doc},
     {NULL, NULL, 0, NULL},
+};
+
+static PyGetSetDef fields[] = {
+    {"counts", (getter)get_counts, (setter)set_counts, "Numbers of nodes and of faces of the surface.", NULL},
+    {NULL, NULL, NULL, NULL, NULL},
 };
 
 static PyTypeObject solid_type = {
@@ -180,6 +348,7 @@ static PyTypeObject solid_type = {
     .tp_init = (initproc)initialise,
     .tp_dealloc = (destructor)finish,
     .tp_methods = methods,
+    .tp_getset = fields,
 };
 
 static struct PyModuleDef definition = {

@@ -2,7 +2,7 @@
 
 Nodes have four numbers each, the fourth of a displacement is the pressure at the node, that of a force the sum of
 volumes around it. Elements stand in blocks of four: number k of corner, gradient, or strain of the element in lane l
-is at 4 k + l.
+is at 4 k + l. Face 4 e + k of element e is opposite to its corner k.
 */
 
 #define PY_SSIZE_T_CLEAN
@@ -13,25 +13,37 @@ is at 4 k + l.
 
 #define MOST_BRANCHES 4
 #define MOST_CONTACTS 512 /* of one sphere */
+#define MOST_SAMPLES 64   /* of one edge */
 
 typedef struct {
     int nodes, blocks, faces, branches;
-    const float *rest;           /* (nodes, 4) */
+    int node_room;               /* a body that may be cut has room for a node of its own at every corner */
+    int skin;                    /* faces of the uncut mesh */
+    float *rest;                 /* (nodes, 4) */
     float *displacement;         /* (nodes, 4) */
     float *velocity;             /* (nodes, 4) */
     float *force;                /* (nodes, 4) */
-    const float *inverse_mass;   /* (nodes,): 0 of an anchored node */
-    const float *inverse_volume; /* (nodes,): of all elements around */
-    const float *bulk;           /* (nodes,): Lame's lambda of the energy */
-    const int32_t *holder;       /* (nodes,): the sphere that holds the node, or -1 */
-    const int32_t *corners;      /* (blocks, 4, 4) */
-    const float *gradients;      /* (blocks, 9, 4): of the shape functions of corners 1 to 3 */
-    const float *volumes;        /* (blocks, 4): 0 of a lane without an element */
-    const float *shear;          /* (blocks, 4): Lame's mu of the energy */
+    float *mass;                 /* (nodes,) */
+    float *inverse_mass;         /* (nodes,): 0 of an anchored, held or loose node */
+    float *inverse_volume;       /* (nodes,): of all elements around */
+    float *bulk;                 /* (nodes,): Lame's lambda of the energy */
+    int32_t *holder;             /* (nodes,): the sphere that holds the node, or -1 */
+    int32_t *origin;             /* (nodes,): the node of the uncut mesh */
+    uint8_t *flags;              /* (nodes,): FIXED, PLACED */
+    int32_t *corners;            /* (blocks, 4, 4) */
+    float *gradients;            /* (blocks, 9, 4): of the shape functions of corners 1 to 3 */
+    float *volumes;              /* (blocks, 4): 0 of a lane without an element */
+    float *element_mass;         /* (blocks, 4) */
+    float *shear;                /* (blocks, 4): Lame's mu of the energy */
     float *strains;              /* (branches, blocks, 6, 4): viscous strains */
     const float *branch;         /* (branches, 2): share of the shear modulus, relaxation time */
-    const int32_t *surface;      /* (faces, 3) */
+    int32_t *across;             /* (4 blocks, 4): the face on the other side, or ~slot of a face of the surface */
+    int32_t *surface;            /* (faces, 3): nodes by slot; -1 of a face that has gone */
+    int32_t *owner;              /* (faces,): face of an element by slot */
+    const float *limits;         /* (4,): lambda; largest sharpness, bulk rate and edge (m) of the uncut mesh */
 } Body;
+
+enum { FIXED = 1, PLACED = 2 }; /* anchored; moved onto a cut */
 
 typedef struct {
     int count;
@@ -42,6 +54,44 @@ typedef struct {
     float friction;
 } Spheres;
 
+/* Edges of blades: each has `samples` points from one sphere to another. */
+typedef struct {
+    int count, samples;
+    const int32_t *ends; /* (count, 2): spheres */
+    double toughness;    /* J/m^2 */
+    int32_t *element;    /* (count, samples): where the front of the cut is; -1: nowhere; -2 - e: it has left e */
+    double *front;       /* (count, samples, 3): the front of the cut in the resting body */
+    double *ahead;       /* (count, samples, 3): direction of its advance, a unit vector */
+    double *book;        /* (2,): swept area, m^2, and work, J */
+} Edges;
+
+static inline int32_t *corner_of(const Body *body, int element, int corner)
+{
+    return body->corners + 16 * (element / 4) + 4 * corner + element % 4;
+}
+
+static inline int is_gone(const Body *body, int element)
+{
+    return body->volumes[element] == 0.0f;
+}
+
 void elastic_forces(const Body *body, float seconds);
 void press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count);
 int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_steps, int *near, int most);
+
+int open_faces(Body *body, const int32_t *faces, int count);
+int remove_elements(Body *body, const int32_t *elements, int count);
+int measure(const Body *body, float *sharpness, float *bulk_rate);
+int find_torn(const Body *body, float stretch, int32_t *faces, int most);
+void label_pieces(const Body *body, int32_t *labels, int32_t *stack);
+int cut_along(Body *body, const double *triangles, int count);
+
+double rest_gradients(const Body *body, int element, double gradients[9]);
+double sharpness_of(const double gradients[9]);
+
+void engage(const Body *body, const Spheres *spheres, const Edges *edges, int sub_steps, double *begun);
+void slice(const Body *body, const Spheres *spheres, const Edges *edges, int sub_step, float seconds, double *impulses);
+void follow(const Body *body, const Spheres *spheres, const Edges *edges, int sub_step, float seconds,
+            const double *impulses);
+int sweep(const Body *body, const Spheres *spheres, const Edges *edges, int sub_steps, const double *begun,
+          double *triangles);

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 class Solid:
-    def __init__(self, arrays: Sequence[NDArray[np.generic]], /) -> None: ...
+    counts: tuple[int, int]
+    def __init__(self, arrays: Sequence[NDArray[np.generic]], nodes: int, faces: int, /) -> None: ...
     def advance(
         self,
         path: NDArray[np.float64],
@@ -12,11 +13,21 @@ class Solid:
         free: NDArray[np.uint8],
         force: NDArray[np.float64],
         friction: float,
-        mass: NDArray[np.float32],
         seconds: float,
         sub_steps: int,
         gravity: float,
         drag: float,
+        ends: NDArray[np.int32],
+        toughness: float,
+        element: NDArray[np.int32],
+        front: NDArray[np.float64],
+        ahead: NDArray[np.float64],
+        book: NDArray[np.float64],
         /,
-    ) -> None: ...
+    ) -> int: ...
     def forces(self, seconds: float, /) -> None: ...
+    def open(self, faces: NDArray[np.int32], /) -> int: ...
+    def remove(self, elements: NDArray[np.int32], /) -> int: ...
+    def tear(self, stretch: float, /) -> int: ...
+    def measure(self) -> tuple[float, float]: ...
+    def pieces(self, labels: NDArray[np.int32], /) -> None: ...

@@ -15,7 +15,7 @@ from engines.fem.params import FemParams
 from engines.fem.probe import Probe
 from engines.fem.spheres import MOST_CONTACTS, Spheres, near_faces
 from engines.tissue.elasticity.body_yield import BodyYield
-from engines.tissue.ports import node_ports, node_states
+from engines.tissue.ports import node_ports, node_states, surface_changes, surface_ports
 from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
 from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS
 from engines.tissue.probes.sub_grid import Surface, warn_beyond
@@ -50,10 +50,11 @@ class FemEngine(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The nodes of every organ; for every probe with fingers, the grasp; for electrodes, the heat."""
+        """Nodes of every organ, changed surfaces, grasps of probes with fingers, and heat of electrodes."""
         grasping = (name for name, probe in self.params.probes.items() if probe.grasp)
         grasps = (port for name in grasping for port in grasp_ports(name))
-        return *node_ports(self.params), *grasps, *heat_ports(self.params)
+        surfaces = surface_ports(self.params) if self.params.changes_surfaces else ()
+        return *node_ports(self.params), *surfaces, *grasps, *heat_ports(self.params)
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
@@ -94,17 +95,25 @@ class FemEngine(Stepped):
         if due or touch or not all(are_finite):
             for organ in self._organs:
                 organ.sample(end)  # an unstable organ ends the session
-        outputs = (node_states(self._organs, end) if due else {}) | self._unused
+        outputs = (self._pictured(end) if due else {}) | self._unused
         for probe in self._probes:
             outputs.update(probe.outputs)
         if touch:
+            for organ in self._organs:
+                organ.tear()
             self._look()
         for grasp, _ in self._grasps:
             grasp.update(end, looked=touch)
             outputs.update(grasp.outputs)
         if self._heating is not None:
+            self._heating.follow()
             outputs.update(self._heating.step(inputs, t, h))
         return outputs
+
+    def _pictured(self, t: int) -> dict[str, Value]:
+        """Return nodes, and changed surfaces, of all organs at `t` ns."""
+        changes = surface_changes(self._organs, t) if self.params.changes_surfaces else {}
+        return node_states(self._organs, t) | changes
 
     def state_hash(self) -> int:
         """Return 64 bits of the displacements, and of the probes and grasps."""
@@ -117,26 +126,28 @@ class FemEngine(Stepped):
 
     def save(self) -> bytes:
         """Return the bytes of all arrays, organs first."""
-        return b"".join(self._parts())
+        parts = [part.tobytes() for part in self._parts()]
+        sizes = np.array([len(parts), *map(len, parts)])
+        return b"".join([sizes.tobytes(), *parts])
 
     def restore(self, state: bytes) -> None:
         """Go back to a saved state, bit for bit.
 
         Raises StateError for the state of other organs or probes.
         """
-        sizes = [len(part) for part in self._parts()]
-        if len(state) != sum(sizes):
+        try:
+            self._restore_parts(iter(_split(state, sum(1 for _ in self._parts()))))
+        except ValueError as error:
             raise StateError(
-                f"participant '{self.name}': a saved state of {len(state)} bytes, expected {sum(sizes)}; was"
+                f"participant '{self.name}': a saved state of {len(state)} bytes does not fit: {error}; was"
                 " it saved elsewhere?"
-            )
-        ends = accumulate(sizes)
-        parts = iter([state[end - size : end] for size, end in zip(sizes, ends, strict=True)])
+            ) from error
+
+    def _restore_parts(self, parts: Iterator[bytes]) -> None:
         for organ in self._organs:
-            for array in organ.state:
-                array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
-        for array in self._heat_state:
-            array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
+            organ.restore(parts)
+        if self._heating is not None:
+            self._heating.restore(parts)
         for probe in self._probes:
             probe.numbers = np.frombuffer(next(parts))
         for grasp, probe in self._grasps:
@@ -145,13 +156,14 @@ class FemEngine(Stepped):
                 np.frombuffer(next(parts)), [(organ, nodes, nodes) for organ, nodes in held if nodes]
             )
 
-    def _parts(self) -> Iterator[bytes]:
+    def _parts(self) -> Iterator[NDArray[np.generic]]:
         """Yield the parts of a saved state in order."""
         for organ in self._organs:
-            yield from (array.tobytes() for array in organ.state)
-        yield from (array.tobytes() for array in self._heat_state)
-        yield from (probe.numbers.tobytes() for probe in self._probes)
-        yield from (grasp.numbers.tobytes() for grasp, _ in self._grasps)
+            yield from organ.parts
+        if self._heating is not None:
+            yield from self._heating.state
+        yield from (probe.numbers for probe in self._probes)
+        yield from (grasp.numbers for grasp, _ in self._grasps)
 
     @property
     def _heat_state(self) -> tuple[NDArray[Any], ...]:
@@ -165,7 +177,7 @@ class FemEngine(Stepped):
 
     def _begin(self) -> Outputs:
         """Make the probes of the bonds beside the settled organs; return the outputs at time 0."""
-        outputs = node_states(self._organs, 0)
+        outputs = self._pictured(0)
         self._unused = {
             port: value
             for name, probe in self.params.probes.items()
@@ -177,11 +189,12 @@ class FemEngine(Stepped):
         radii = [self.params.probes[bond.name].radii for bond in bonds]
         self._spheres = Spheres(np.concatenate([np.zeros(0), *radii]), self._sub_steps)
         series = [relaxation(organ) for organ in self.params.organs.values()]
-        first = 0
+        first, blades = 0, list[tuple[int, int]]()
         for bond in bonds:
             name, params = bond.name, self.params.probes[bond.name]
             surfaces = self._surfaces if self.params.has_sub_grid(name) else None
             probe = Probe(params, bond, self._bonded[name], self._spheres, first, surfaces, series)
+            blades += [(first + a, first + b) for a, b in params.blades]
             first += len(probe.radii)
             self._probes.append(probe)
             outputs.update(probe.outputs)
@@ -189,7 +202,7 @@ class FemEngine(Stepped):
                 self._grasps.append((Grasp(params.grasp, probe, self._organs, self._surfaces), probe))
                 outputs.update(nothing_held(name))
         for organ in self._organs:
-            organ.meet(self._spheres)
+            organ.meet(self._spheres, blades)
         if any(self.params.probes[bond.name].energy for bond in bonds):
             self._heating = Heating(self.params, self._organs, self._probes)
             outputs.update(self._heating.outputs)
@@ -252,3 +265,13 @@ class FemEngine(Stepped):
                 f"{where}: kind fem has no rigid parts yet ({', '.join(self.params.rigid)}); anchor the"
                 " organs to 'world', or take kind bullet"
             )
+
+
+def _split(state: bytes, count: int) -> list[bytes]:
+    """Return the parts of a saved state. Raises ValueError for another number of parts or bytes."""
+    head = np.frombuffer(state[: 8 * (count + 1)], np.int64)
+    sizes: list[int] = head[1:].tolist()
+    if len(head) != count + 1 or head[0] != count or min(sizes) < 0 or len(state) != head.nbytes + sum(sizes):
+        raise ValueError(f"expected {count} parts")
+    ends = [end + head.nbytes for end in accumulate(sizes)]
+    return [state[end - size : end] for size, end in zip(sizes, ends, strict=True)]

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from xxhash import xxh3_128_digest
 
+from engines.fem.edges import NO_EDGES, Edges
 from engines.fem.solid import Branch, Solid, SphereWay
 from engines.fem.spheres import Spheres
+from engines.tissue.meshing.tet_mesh import Indices
 from engines.tissue.organs.params import OrganParams
+from engines.tissue.tissue_surface import SurfaceState, TissueSurface
+from engines.tissue.warn_once import warn_once
 from schemas.errors import SessionError
 from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
@@ -25,6 +29,8 @@ _SETTLED_PERIODS = 3.0
 """Time of settling under weight, in periods of the slowest swing, which drag damps critically."""
 _LEAST_SETTLING_S = 0.1
 _NO_SPHERES = np.zeros(0), np.zeros(0, np.uint8)
+_SAMPLES = 40
+"""Points along a blade: the width of a cut is known to a fortieth of the blade's length."""
 
 
 def relaxation(params: OrganParams) -> list[Branch]:
@@ -38,10 +44,9 @@ class Organ:
 
     def __init__(self, name: str, params: OrganParams) -> None:
         self.name, self.mesh = name, params.rest
-        self.anchored: NDArray[np.bool_] = np.zeros(len(self.mesh.nodes), dtype=np.bool_)
+        self._anchored: NDArray[np.bool_] = np.zeros(len(self.mesh.nodes), dtype=np.bool_)
         for tied in params.anchored_nodes.values():
-            self.anchored |= tied
-        self.touchable = self.mesh.triangles[~self.anchored[self.mesh.triangles].all(axis=1)]
+            self._anchored |= tied
         edges = (
             self.mesh.nodes[self.mesh.triangles] - self.mesh.nodes[np.roll(self.mesh.triangles, 1, axis=1)]
         )
@@ -50,12 +55,28 @@ class Organ:
         material = params.relaxed
         branches = [Branch(_VISCOUS_SHARE, material.damping)] if material.damping else []
         branches += relaxation(params)
-        self.solid = Solid(self.mesh, self.anchored, self.touchable, material, branches)
-        self._inverse_mass = self.solid.inverse_mass.copy()
+        self._cutting = params.cutting
+        divisible = params.cutting is not None
+        self.solid = Solid(self.mesh, self._anchored, material, branches, divisible=divisible)
+        self.surface = TissueSurface(self.mesh.triangles, len(self.mesh.nodes))
+        """Faces as seen, with the kind of tissue of each."""
+        self.touchable = self._touchable_faces()
+        """Faces with a free node, shape (f, 3)."""
+        self._edges = NO_EDGES
         self._slowest = params.frequencies[1]
         self._free = np.ones(0, np.uint8)
         self._reach = float(np.linalg.norm(np.ptp(self.mesh.nodes, axis=0)))
         self.nodes: Vector = self.mesh.nodes
+
+    @property
+    def anchored(self) -> NDArray[np.bool_]:
+        """Anchored nodes, shape (n,)."""
+        return self._anchored[self.solid.origin]
+
+    @property
+    def origins(self) -> NDArray[np.int32]:
+        """Node of the mesh at the resting place of each node, shape (n,)."""
+        return self.solid.origin
 
     @property
     def held(self) -> NDArray[np.bool_]:
@@ -75,12 +96,29 @@ class Organ:
 
     def advance(self, seconds: float, gravity: float) -> Vector:
         """Advance; return the force on each sphere in each sub-step, N, shape (k, n, 3)."""
-        return self.solid.advance(seconds, self._way, self.friction, gravity)
+        forces = self.solid.advance(seconds, self._way, self.friction, gravity)
+        if self.solid.counts[1] != len(self.surface.faces):
+            self._note_change()
+        return forces
+
+    def tear(self) -> None:
+        """Open faces that are stretched beyond the limit of the tissue, if there is one."""
+        limit = None if self._cutting is None else self._cutting.tear_stretch
+        if limit is not None and self.solid.tear(limit):
+            self._note_change()
+
+    def remove(self, elements: Indices) -> None:
+        """Let elements go."""
+        if self.solid.remove(elements):
+            self._note_change()
 
     def sample(self, time_ns: int) -> None:
         """Read the nodes. Raises SessionError if the tissue has become unstable by `time_ns`."""
         self.nodes = self.solid.nodes
-        moved = float(np.abs(self.solid.displacement[:, :3]).max())
+        moved = self._largest_move()
+        if self.solid.divisible and moved >= self._reach:
+            self._drop_loose_pieces(time_ns)
+            moved = self._largest_move()
         if not moved < self._reach:
             raise SessionError(
                 f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from"
@@ -88,25 +126,63 @@ class Organ:
                 " tissue's timestep"
             )
 
+    def colour(self, kinds: NDArray[np.uint8]) -> None:
+        """Show the kind of tissue of burnt elements, shape (m,), on their faces; 0: not burnt."""
+        found = kinds[self.solid.owners]
+        burnt = np.flatnonzero((found > 0) & (found != self.surface.kinds))
+        if burnt.size:
+            self.surface.replace(burnt, self.surface.faces[burnt], found[burnt])
+
+    def _largest_move(self) -> float:
+        """Return the largest displacement of a node with mass, m."""
+        moves = np.abs(self.solid.displacement[self.solid.mass > 0.0, :3])
+        return float(moves.max()) if moves.size else 0.0
+
+    def _drop_loose_pieces(self, time_ns: int) -> None:
+        """Take away loose pieces that have fallen farther than the organ is large."""
+        far = np.abs(self.solid.displacement[:, :3]).max(axis=1) >= self._reach
+        corners, pieces = self.solid.tetrahedra, self.solid.pieces
+        fixed = self.anchored | self.held
+        tied = np.unique(pieces[fixed[corners].any(axis=1)])
+        fallen = np.setdiff1d(np.unique(pieces[far[corners].any(axis=1)]), [-1, *tied])
+        elements = np.flatnonzero(np.isin(pieces, fallen))
+        if elements.size:
+            warn_once(
+                f"organ '{self.name}': at {time_ns * 1e-9:.6g} s a loose piece has fallen out of sight and is"
+                " taken away, and so are those that follow"
+            )
+            self.remove(elements)
+
+    def _note_change(self) -> None:
+        """Bring surface, nodes and touchable faces up to date."""
+        self.surface.follow(self.solid.faces, self.solid.origin)
+        self.nodes = self.solid.nodes
+        self.touchable = self._touchable_faces()
+
+    def _touchable_faces(self) -> Indices:
+        faces = self.surface.present.astype(np.int64)
+        return faces[~self.anchored[faces].all(axis=1)]
+
     def anchor(self, node: int, body: int) -> int:
         """Tie a node to a sphere; return the node."""
-        self.solid.holder[node] = body
-        self.solid.inverse_mass[node] = 0.0
+        self.solid.hold(node, body)
         return node
 
     def release(self, node: int, anchor: int) -> None:  # noqa: ARG002  a tie is its node
         """Undo `anchor`."""
-        self.solid.holder[node] = -1
-        self.solid.inverse_mass[node] = self._inverse_mass[node]
+        self.solid.let_go(node)
 
     def let_touch(self, body: int, *, on: bool) -> None:
         """Let a sphere press the organ, or pass through."""
         self._free[body] = on
 
-    def meet(self, spheres: Spheres) -> None:
-        """Let these spheres press the organ."""
+    def meet(self, spheres: Spheres, blades: Sequence[tuple[int, int]] = ()) -> None:
+        """Let these spheres press the organ, and blades between some of them cut it, if it may be cut."""
         self._free = np.ones(len(spheres.radii), np.uint8)
-        self._way = SphereWay(spheres.path, spheres.radii, self._free)
+        if self._cutting is not None and blades:
+            self._free[np.unique(blades)] = 0
+            self._edges = Edges(blades, _SAMPLES, self._cutting.toughness)
+        self._way = SphereWay(spheres.path, spheres.radii, self._free, self._edges)
 
     def held_by(self, bodies: Collection[int]) -> list[int]:
         """Return the nodes that these spheres hold."""
@@ -118,6 +194,34 @@ class Organ:
         return xxh3_128_digest(self.solid.displacement.tobytes())
 
     @property
-    def state(self) -> tuple[NDArray[np.float32] | NDArray[np.int32] | NDArray[np.uint8], ...]:
-        """Arrays that the next step depends on, to be written."""
-        return *self.solid.state, self.solid.holder, self.solid.inverse_mass, self._free
+    def edges(self) -> Edges:
+        """Blades in this organ, and their books."""
+        return self._edges
+
+    @property
+    def parts(self) -> Iterator[NDArray[np.generic]]:
+        """Arrays that the next step depends on, in the order of `restore`."""
+        yield np.array(self.solid.counts)
+        yield from self.solid.state
+        yield self._free
+        yield from self._edges.state
+        yield from self.surface.state
+
+    def restore(self, parts: Iterator[bytes]) -> None:
+        """Go back to saved `parts`. Raises ValueError for those of another organ."""
+        nodes, faces = np.frombuffer(next(parts), np.int64).tolist()
+        self.solid.counts = nodes, faces
+        for array in (*self.solid.state, self._free, *self._edges.state):
+            array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
+        version, faces, kinds, origins = (
+            np.frombuffer(next(parts), kept.dtype).reshape(-1, *kept.shape[1:]) for kept in self.surface.state
+        )
+        self.surface.restore(
+            SurfaceState(
+                version.astype(np.int64),
+                faces.astype(np.int32),
+                kinds.astype(np.uint8),
+                origins.astype(np.int32),
+            )
+        )
+        self.touchable = self._touchable_faces()

@@ -23,3 +23,9 @@ class FemParams(PressedOrgansParams):
         ge=10_000,
         description="longest sub-step; the mesh may need shorter ones, which the engine works out",
     )
+
+    @property
+    def changes_surfaces(self) -> bool:
+        """Whether an organ may be divided or burnt."""
+        divided = any(organ.cutting for organ in self.organs.values())
+        return divided or any(probe.energy for probe in self.probes.values())

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil, sqrt
-from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.fem.arrays import aligned_floats, aligned_integers, in_blocks
+from engines.fem.edges import NO_EDGES, Edges
+from engines.fem.faces import Faces
 from engines.tissue.material import Material
 from engines.tissue.meshing.tet_mesh import Indices, TetMesh, volumes
 from schemas.errors import ScenarioError
@@ -17,19 +19,23 @@ from schemas.vectors import Vector
 
 __all__ = ["Branch", "Solid", "SphereWay"]
 
-_Number = TypeVar("_Number", bound=np.generic)
-
 _LANES = 4
 """Elements of a block, as in `_lanes.h`."""
-_ALIGNMENT = 16
-"""Bytes: loads of four numbers at once need it."""
 _STEP_SHARE = 0.7
 """Sub-step over the longest stable one of the resting mesh, 2 / highest frequency: a compressed mesh is
 stiffer.
 """
+_PIECE_SHARE = 0.9
+"""Sub-step over that for a bound of the highest frequency of every piece of the body."""
+_SHARPER = 2.5
+"""Sharpness of an element that a cut may shape, over the largest of the uncut mesh: the square of the
+frequency.
+"""
 _POWER_ITERATIONS = 80
 _PROBE_STRAIN = 1e-4
 """Size of the displacements that measure the stiffness, in the body's extent."""
+_FIXED = 1
+"""Flag of an anchored node, as in `_solid.h`."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,8 @@ class SphereWay:
     """m, shape (n,)."""
     free: NDArray[np.uint8]
     """0 for a sphere that passes through the body, shape (n,)."""
+    edges: Edges = field(default=NO_EDGES)
+    """Sharp edges between spheres."""
 
 
 class Solid:
@@ -64,11 +72,12 @@ class Solid:
         self,
         mesh: TetMesh,
         anchored: NDArray[np.bool_],
-        faces: Indices,
         material: Material,
         branches: Sequence[Branch] = (),
+        *,
+        divisible: bool = False,
     ) -> None:
-        """`anchored`: fixed nodes, shape (n,); `faces`: what spheres touch, shape (f, 3)."""
+        """`anchored`: fixed nodes, shape (n,); `divisible`: whether faces may open and elements go."""
         try:
             from engines.fem._solid import Solid as Compiled
         except ImportError as error:
@@ -78,49 +87,112 @@ class Solid:
             ) from error
         self.middle: Vector = 0.5 * (mesh.nodes.min(axis=0) + mesh.nodes.max(axis=0))
         """Origin of the arrays in `world`, m."""
-        self._rest = mesh.nodes
-        tetrahedra = _by_place(mesh)
-        blocks = -(-len(tetrahedra) // _LANES)
-        missing = blocks * _LANES - len(tetrahedra)
-        tetrahedra = np.concatenate([tetrahedra, np.repeat(tetrahedra[-1:], missing, axis=0)])
-        volume = volumes(mesh.nodes, tetrahedra)
-        volume[len(volume) - missing :] = 0.0
-        around = np.bincount(tetrahedra.ravel(), np.repeat(volume, 4), len(mesh.nodes))
-        edges = mesh.nodes[tetrahedra[:, 1:]] - mesh.nodes[tetrahedra[:, :1]]
-        gradients: Vector = np.asarray(np.linalg.inv(edges), np.float64).transpose(0, 2, 1).reshape(-1, 9)
-        mu, lambda_ = material.neo_hookean_lame
-        n = len(mesh.nodes)
-        self.mass = _floats(material.density * around / 4.0)
-        """kg, shape (n,)."""
-        self.displacement, self.velocity, self.force = (_floats(np.zeros((n, 4))) for _ in range(3))
-        """m and pressure (Pa), m/s, N: shape (n, 4)."""
-        self.inverse_mass = _floats(np.where(anchored, 0.0, 4.0 / (material.density * around)))
-        """1/kg, 0 for fixed and held nodes, shape (n,)."""
-        self.holder = _integers(np.full(n, -1))
-        """Number of the sphere that holds a node, or -1, shape (n,)."""
-        self.strains = _floats(np.zeros((len(branches), blocks, 6, _LANES)))
-        """Viscous strains."""
-        branch = _floats(np.array([[one.share, one.seconds] for one in branches]).reshape(-1, 2))
-        self._arrays = (
-            _floats(np.concatenate([mesh.nodes - self.middle, np.zeros((n, 1))], axis=1)),
-            self.displacement,
-            self.velocity,
-            self.force,
-            self.inverse_mass,
-            _floats(1.0 / around),
-            _floats(np.full(n, lambda_)),
-            self.holder,
-            _integers(_in_blocks(tetrahedra)),
-            _floats(_in_blocks(gradients)),
-            _floats(volume),
-            _floats(np.full(len(tetrahedra), mu)),
-            self.strains,
-            branch,
-            _integers(faces),
-        )
-        self._compiled = Compiled(self._arrays)
+        self.divisible = divisible
+        tetrahedra, volume = _in_whole_blocks(mesh)
+        self._set_nodes(mesh, anchored, tetrahedra, volume, material)
+        self._set_elements(mesh, tetrahedra, volume, material, branches)
+        faces = Faces(mesh, tetrahedra[volume > 0.0], len(volume))
+        self._across, self._surface, self._owner = faces.across, faces.surface, faces.owner
+        longest = float(np.linalg.norm(_edges_of(mesh), axis=1).max())
+        self._limits = aligned_floats(np.array([material.neo_hookean_lame[1], 0.0, 0.0, longest]))
+        self._compiled = Compiled(self._arrays, len(mesh.nodes), len(mesh.triangles))
         self.longest_step = _STEP_SHARE * 2.0 / self._highest_frequency()
         """Longest sub-step, s."""
+        if divisible:
+            self._limits[1:3] = self._compiled.measure()
+            self._limits[1] *= _SHARPER
+            self.longest_step = min(self.longest_step, _PIECE_SHARE * 2.0 / self._piece_frequency(material))
+
+    def _set_nodes(
+        self,
+        mesh: TetMesh,
+        anchored: NDArray[np.bool_],
+        tetrahedra: Indices,
+        volume: Vector,
+        material: Material,
+    ) -> None:
+        n, room = len(mesh.nodes), tetrahedra.size if self.divisible else len(mesh.nodes)
+        around = np.bincount(tetrahedra.ravel(), np.repeat(volume, 4), n)
+        mass = material.density * around / 4.0
+        self._rest, self._displacement, self._velocity, self._force = (
+            aligned_floats(np.zeros((room, 4))) for _ in range(4)
+        )
+        self._rest[:n, :3] = mesh.nodes - self.middle
+        self._mass, self._inverse_mass, self._inverse_volume, self._bulk = (
+            aligned_floats(np.zeros(room)) for _ in range(4)
+        )
+        self._mass[:n], self._inverse_volume[:n] = mass, 1.0 / around
+        self._inverse_mass[:n] = np.where(anchored, 0.0, 1.0 / mass)
+        self._bulk[:] = material.neo_hookean_lame[1]
+        self._holder = aligned_integers(np.full(room, -1))
+        self._origin = aligned_integers(np.arange(room))
+        self._flags = np.zeros(room, np.uint8)
+        self._flags[:n][anchored] = _FIXED
+
+    def _set_elements(
+        self,
+        mesh: TetMesh,
+        tetrahedra: Indices,
+        volume: Vector,
+        material: Material,
+        branches: Sequence[Branch],
+    ) -> None:
+        edges = mesh.nodes[tetrahedra[:, 1:]] - mesh.nodes[tetrahedra[:, :1]]
+        gradients: Vector = np.asarray(np.linalg.inv(edges), np.float64).transpose(0, 2, 1).reshape(-1, 9)
+        self._corners = aligned_integers(in_blocks(tetrahedra, _LANES))
+        self._gradients = aligned_floats(in_blocks(gradients, _LANES))
+        self._volumes = aligned_floats(volume)
+        self._element_mass = aligned_floats(material.density * volume)
+        self._shear = aligned_floats(np.full(len(volume), material.neo_hookean_lame[0]))
+        self.strains = aligned_floats(np.zeros((len(branches), len(volume) // _LANES, 6, _LANES)))
+        """Viscous strains."""
+        self._branch = aligned_floats(np.array([[one.share, one.seconds] for one in branches]).reshape(-1, 2))
+
+    @property
+    def _arrays(self) -> tuple[NDArray[np.generic], ...]:
+        """All arrays, in the order of `_solid.c`."""
+        return (
+            *(self._rest, self._displacement, self._velocity, self._force),
+            *(self._mass, self._inverse_mass, self._inverse_volume, self._bulk),
+            *(self._holder, self._origin, self._flags),
+            *(self._corners, self._gradients, self._volumes, self._element_mass, self._shear),
+            *(self.strains, self._branch, self._across, self._surface, self._owner, self._limits),
+        )
+
+    @property
+    def displacement(self) -> NDArray[np.float32]:
+        """Displacements and pressures, m and Pa, shape (n, 4)."""
+        return self._displacement[: self._compiled.counts[0]]
+
+    @property
+    def velocity(self) -> NDArray[np.float32]:
+        """Velocities, m/s, shape (n, 4)."""
+        return self._velocity[: self._compiled.counts[0]]
+
+    @property
+    def force(self) -> NDArray[np.float32]:
+        """Forces of the elements on the nodes, N, shape (n, 4)."""
+        return self._force[: self._compiled.counts[0]]
+
+    @property
+    def mass(self) -> NDArray[np.float32]:
+        """Mass at the nodes, kg, shape (n,)."""
+        return self._mass[: self._compiled.counts[0]]
+
+    @property
+    def inverse_mass(self) -> NDArray[np.float32]:
+        """1/kg, 0 for fixed and held nodes, shape (n,)."""
+        return self._inverse_mass[: self._compiled.counts[0]]
+
+    @property
+    def origin(self) -> NDArray[np.int32]:
+        """Node of the uncut mesh at the place of each node, shape (n,)."""
+        return self._origin[: self._compiled.counts[0]]
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """Faces of the surface by slot, the uncut mesh's first; -1: has gone, shape (f, 3)."""
+        return self._surface[: self._compiled.counts[1]]
 
     @property
     def elements(self) -> tuple[Indices, Vector, Vector]:
@@ -129,17 +201,40 @@ class Solid:
         Shapes (m, 4); (m, 9), 1/m, of the shape functions of corners 1 to 3; (m,), m^3. An element that fills
         up the last block has no volume.
         """
-        corners, gradients, volume = self._arrays[8:11]
+        gradients = self._gradients.transpose(0, 2, 1).reshape(-1, 9)
         return (
-            _by_element(corners).astype(np.int64),
-            _by_element(gradients).astype(np.float64),
-            volume.astype(np.float64),
+            self.tetrahedra.astype(np.int64),
+            gradients.astype(np.float64),
+            self._volumes.astype(np.float64),
         )
+
+    @property
+    def owners(self) -> NDArray[np.int32]:
+        """Element of each face of the surface by slot, shape (f,)."""
+        return self._owner[: self._compiled.counts[1]] // 4
 
     @property
     def nodes(self) -> Vector:
         """Present nodes, m, in `world`, shape (n, 3)."""
-        return self._rest + self.displacement[:, :3]
+        n = self._compiled.counts[0]
+        return self.middle + self._rest[:n, :3].astype(np.float64) + self._displacement[:n, :3]
+
+    @property
+    def holder(self) -> NDArray[np.int32]:
+        """Number of the sphere that holds a node, or -1, shape (n,)."""
+        return self._holder[: self._compiled.counts[0]]
+
+    @property
+    def tetrahedra(self) -> NDArray[np.int32]:
+        """Nodes of the elements in the body's order, those that have gone included, shape (m, 4)."""
+        return self._corners.transpose(0, 2, 1).reshape(-1, 4)
+
+    @property
+    def pieces(self) -> NDArray[np.int32]:
+        """Piece of the body by element; -1: an element that has gone, shape (m,)."""
+        labels = np.zeros(len(self._volumes), np.int32)
+        self._compiled.pieces(labels)
+        return labels
 
     def sub_steps(self, seconds: float) -> int:
         """Return the least number of sub-steps of a step of `seconds`."""
@@ -152,7 +247,7 @@ class Solid:
 
         gravity: along -z, m/s^2. drag: damping over mass, 1/s.
         """
-        sub_steps, spheres = len(way.path) - 1, way.path.shape[1]
+        sub_steps, spheres, edges = len(way.path) - 1, way.path.shape[1], way.edges
         forces = np.zeros((sub_steps, spheres, 3))
         self._compiled.advance(
             np.ascontiguousarray(way.path - self.middle),
@@ -160,27 +255,70 @@ class Solid:
             way.free,
             forces,
             friction,
-            self.mass,
             seconds / sub_steps,
             sub_steps,
             gravity,
             drag,
+            *(edges.ends, edges.toughness, edges.element, edges.front, edges.ahead, edges.book),
         )
         return forces
 
+    def tear(self, stretch: float) -> int:
+        """Open faces stretched beyond `stretch`; return how many."""
+        return self._compiled.tear(stretch)
+
+    def remove(self, elements: Indices) -> int:
+        """Let elements go; return how many were there."""
+        return self._compiled.remove(np.ascontiguousarray(elements, np.int32))
+
+    def hold(self, node: int, sphere: int) -> None:
+        """Let a node go with a sphere."""
+        self._holder[node], self._inverse_mass[node] = sphere, 0.0
+
+    def let_go(self, node: int) -> None:
+        """Let a node, and all nodes cut from it, move freely."""
+        nodes = np.flatnonzero((self.origin == self._origin[node]) & (self.holder == self._holder[node]))
+        self._holder[nodes] = -1
+        free = (self._flags[nodes] & _FIXED == 0) & (self._mass[nodes] > 0.0)
+        self._inverse_mass[nodes[free]] = 1.0 / self._mass[nodes[free]]
+
     def stand(self) -> None:
         """Stop all nodes; viscous strains stay."""
-        self.velocity[:] = 0.0
+        self._velocity[:] = 0.0
 
     @property
-    def state(self) -> tuple[NDArray[np.float32], ...]:
-        """Displacements, velocities, and viscous strains."""
-        return self.displacement, self.velocity, self.strains
+    def state(self) -> tuple[NDArray[np.generic], ...]:
+        """Arrays that change, in the order of `restore`: `counts` gives the shapes of a divided body."""
+        n, f = self._compiled.counts
+        moving = (self._displacement[:n], self._velocity[:n], self.strains)
+        held = (self._holder[:n], self._inverse_mass[:n])
+        if not self.divisible:
+            return *moving, *held
+        nodes = (self._rest, self._mass, self._inverse_volume, self._bulk, self._origin, self._flags)
+        elements = (self._corners, self._gradients, self._volumes, self._element_mass, self._across)
+        return *moving, *held, *(array[:n] for array in nodes), *elements, self._surface[:f], self._owner[:f]
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Numbers of nodes and of faces of the surface."""
+        return self._compiled.counts
+
+    @counts.setter
+    def counts(self, counts: tuple[int, int]) -> None:
+        self._compiled.counts = counts
+
+    def _piece_frequency(self, material: Material) -> float:
+        """Return a bound of the highest natural frequency (rad/s) of every piece of the resting body."""
+        mu, lambda_ = material.neo_hookean_lame
+        shear = 0.75 * mu * (1.0 + float(self._branch[:, 0].sum()))
+        sharpness, bulk_rate = self._limits[1:3].tolist()
+        # shear energy G |strain|^2 V, lumped mass rho V / 4
+        return sqrt(8.0 * shear * sharpness / material.density + lambda_ * bulk_rate)
 
     def _highest_frequency(self) -> float:
         """Return the highest natural frequency (rad/s) at rest, with all branches rigid."""
-        size = _PROBE_STRAIN * float(np.ptp(self._rest, axis=0).max())
-        mode = np.random.default_rng(0).standard_normal((len(self._rest), 3))
+        size = _PROBE_STRAIN * float(np.ptp(self.nodes, axis=0).max())
+        mode = np.random.default_rng(0).standard_normal((len(self.mass), 3))
         square = 0.0
         for _ in range(_POWER_ITERATIONS):
             mode *= size / float(np.abs(mode).max())
@@ -190,42 +328,26 @@ class Solid:
             pushed: Vector = -self.force[:, :3].astype(np.float64) * self.inverse_mass[:, None]
             square = float(np.linalg.norm(pushed) / np.linalg.norm(mode))
             mode = pushed
-        self.displacement[:] = 0.0
+        self._displacement[:] = 0.0
         self.strains[:] = 0.0
         return sqrt(square)
 
 
-def _by_place(mesh: TetMesh) -> Indices:
-    """Return the tetrahedra in an order in which neighbours have neighbouring nodes, shape (m, 4)."""
-    return mesh.tetrahedra[np.argsort(mesh.tetrahedra.min(axis=1), kind="stable")]
+def _edges_of(mesh: TetMesh) -> Vector:
+    """Return the edges of all tetrahedra at rest, m, shape (6 m, 3)."""
+    pairs = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+    corners = mesh.nodes[mesh.tetrahedra[:, pairs]]
+    return (corners[:, :, 1] - corners[:, :, 0]).reshape(-1, 3)
 
 
-def _in_blocks(values: NDArray[_Number]) -> NDArray[_Number]:
-    """Return rows of one element each as blocks with the elements in lanes, shape (b, columns, lanes)."""
-    return values.reshape(-1, _LANES, values.shape[1]).transpose(0, 2, 1)
+def _in_whole_blocks(mesh: TetMesh) -> tuple[Indices, Vector]:
+    """Return tetrahedra, shape (m, 4), and their volumes, m^3; whole blocks, the last filled with volume 0.
 
-
-def _by_element(blocks: NDArray[_Number]) -> NDArray[_Number]:
-    """Undo `_in_blocks`."""
-    return blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])
-
-
-def _floats(values: NDArray[np.floating[Any]] | Indices) -> NDArray[np.float32]:
-    """Return an aligned copy in single precision."""
-    found = _memory(4 * values.size).view(np.float32).reshape(values.shape)
-    found[...] = values
-    return found
-
-
-def _integers(values: Indices) -> NDArray[np.int32]:
-    """Return an aligned copy in 32 bits."""
-    found = _memory(4 * values.size).view(np.int32).reshape(values.shape)
-    found[...] = values
-    return found
-
-
-def _memory(size: int) -> NDArray[np.uint8]:
-    """Return `size` bytes that begin at a multiple of `_ALIGNMENT`."""
-    memory = np.zeros(size + _ALIGNMENT, np.uint8)
-    start = -memory.ctypes.data % _ALIGNMENT
-    return memory[start : start + size]
+    Neighbours in order have neighbouring nodes.
+    """
+    tetrahedra = mesh.tetrahedra[np.argsort(mesh.tetrahedra.min(axis=1), kind="stable")]
+    missing = -len(tetrahedra) % _LANES
+    tetrahedra = np.concatenate([tetrahedra, np.repeat(tetrahedra[-1:], missing, axis=0)])
+    volume = volumes(mesh.nodes, tetrahedra)
+    volume[len(volume) - missing :] = 0.0
+    return tetrahedra, volume

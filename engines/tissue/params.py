@@ -73,7 +73,8 @@ class PressedOrgansParams(TissueParams):
     @property
     def _is_compliance_known(self) -> bool:
         return all(
-            len(organ.rest.nodes) <= self.most_corrected_nodes
+            organ.cutting is None  # the spring in series is that of the whole organ
+            and len(organ.rest.nodes) <= self.most_corrected_nodes
             and any(tied.any() for tied in organ.anchored_nodes.values())
             for organ in self.organs.values()
         )
@@ -83,8 +84,8 @@ class PressedOrgansParams(TissueParams):
         for name, probe in self.probes.items():
             if probe.grasp and probe.grasp.width is not None and not self._is_compliance_known:
                 raise ValueError(
-                    f"probe '{name}': grasp.width needs organs that are anchored and have at most"
-                    f" {self.most_corrected_nodes} nodes; leave it out, and a pull is that of the mesh"
+                    f"probe '{name}': grasp.width needs organs that are anchored, are not cut, and have at"
+                    f" most {self.most_corrected_nodes} nodes; leave it out, and a pull is that of the mesh"
                 )
         return self
 

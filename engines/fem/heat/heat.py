@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import ceil
 
 import numpy as np
@@ -86,6 +87,14 @@ class Heat:
     def copy_nodes(self, parents: Indices) -> None:
         """Append nodes as warm as their parents; `rebind` must follow."""
         self.rise = np.concatenate([self.rise, self.rise[parents]])
+
+    def restore(self, parts: Iterator[bytes], elements: tuple[Indices, Vector, Vector]) -> None:
+        """Go back to a saved `state`, in a mesh with these `elements`, the arguments of `rebind`."""
+        self.rise = np.frombuffer(next(parts)).copy()
+        for array in self.state[1:]:
+            array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
+        self._volume = np.ascontiguousarray(elements[2], np.float32)
+        self.rebind(*elements)
 
     @property
     def is_cold(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -85,6 +85,8 @@ class Heating:
         self._edge = max(organ.mean_edge for organ in organs)
         self._elapsed = np.zeros(1)
         """Time since the last step of heat, s."""
+        self._known = {organ.name: len(organ.surface.faces) for organ in organs}
+        """Faces of each organ when its heat was bound to its mesh."""
         self._smoke = np.zeros(len(organs))
         """Smoke of every organ in the last step of heat, g/s."""
 
@@ -100,7 +102,29 @@ class Heating:
         power = self._power(seconds)
         for i, heat in enumerate(self.heats):
             self._smoke[i] = 1e3 / seconds * heat.advance(seconds, power[i] if power else None)
+            if not heat.is_cold:
+                self._burn(self._organs[i], heat)
         return self.outputs
+
+    def follow(self) -> None:
+        """Take over nodes and elements of organs that have been cut."""
+        for organ, heat in zip(self._organs, self.heats, strict=True):
+            if len(organ.surface.faces) != self._known[organ.name]:
+                self._known[organ.name] = len(organ.surface.faces)
+                heat.copy_nodes(organ.solid.origin[len(heat.rise) :].astype(np.int64))
+                heat.rebind(*organ.solid.elements)
+
+    def restore(self, parts: Iterator[bytes]) -> None:
+        """Go back to a saved `state`; the organs have gone back already."""
+        for array in (
+            self._elapsed,
+            self._smoke,
+            *(instrument.numbers for instrument, _ in self._instruments),
+        ):
+            array[...] = np.frombuffer(next(parts), array.dtype)
+        for organ, heat in zip(self._organs, self.heats, strict=True):
+            heat.restore(parts, organ.solid.elements)
+            self._known[organ.name] = len(organ.surface.faces)
 
     @property
     def outputs(self) -> dict[str, Value]:
@@ -122,6 +146,14 @@ class Heating:
             *(instrument.numbers for instrument, _ in self._instruments),
             *(array for heat in self.heats for array in heat.state),
         )
+
+    def _burn(self, organ: Organ, heat: Heat) -> None:
+        """Show burnt tissue, and let vaporised elements go, if the organ may be divided."""
+        vaporised = heat.vaporised()
+        if len(vaporised) and organ.solid.divisible:
+            organ.remove(vaporised)
+            self.follow()
+        organ.colour(heat.kinds)
 
     def _power(self, seconds: float) -> list[NDArray[np.float32]]:
         """Return the mean power (W) in every element of every organ, shapes (m,); empty: none."""

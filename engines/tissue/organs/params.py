@@ -20,6 +20,7 @@ from engines.tissue.meshing.surface import Surface
 from engines.tissue.meshing.tet_mesh import TetMesh
 from engines.tissue.organs.anchors import AnchorParams, Edges
 from engines.tissue.organs.catalogue import SHAPES, block_shape
+from engines.tissue.organs.cutting import CuttingParams
 from engines.tissue.organs.material_file import MaterialFile
 from engines.tissue.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
 from engines.tissue.organs.organ_file import OrganFile
@@ -112,6 +113,9 @@ class OrganParams(BaseModel):
         ),
     )
     friction: float = Field(default=0.3, ge=0, le=2, description="Coulomb coefficient against probes")
+    cutting: CuttingParams | None = Field(
+        default=None, description="lets blades cut the tissue, and pulls tear it; kind fem alone"
+    )
 
     @field_validator("mesh", "material_file")
     @classmethod

@@ -71,6 +71,11 @@ class GraspedOrgan(Body, Protocol):
         ...
 
     @property
+    def origins(self) -> NDArray[np.integer]:
+        """Node of the mesh at the resting place of each node, shape (n,)."""
+        ...
+
+    @property
     def mean_edge(self) -> float:
         """Mean length of an edge of the surface, m."""
         ...
@@ -194,7 +199,7 @@ class Grasp:
         self._widest, self._pull[:], self._lift[:] = float(numbers[0]), numbers[1:4], numbers[4:]
         rest = {organ.name: heights for organ, heights in zip(self._organs, self._rest, strict=True)}
         self._holds = [
-            _Hold(organ, np.array(nodes, np.int64), anchors, rest[organ.name][nodes])
+            _Hold(organ, np.array(nodes, np.int64), anchors, rest[organ.name][organ.origins[nodes]])
             for organ, nodes, anchors in ties
         ]
         self._write_outputs(())
@@ -268,7 +273,7 @@ class Grasp:
                     organ.anchor(node, probe.bodies[sphere])
                     for node, sphere in zip(nodes.tolist(), nearest, strict=True)
                 ]
-                self._holds.append(_Hold(organ, nodes, anchors, rest[nodes]))
+                self._holds.append(_Hold(organ, nodes, anchors, rest[organ.origins[nodes]]))
         if self._holds:
             self._widest = spread
             self._set_held(spheres, held=True)

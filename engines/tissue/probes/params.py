@@ -141,6 +141,14 @@ class ProbeParams(BaseModel):
     energy: EnergyParams | None = Field(
         default=None, description="makes the spheres electrodes that heat tissue; kind fem"
     )
+    blades: tuple[tuple[int, int], ...] = Field(
+        default=(),
+        max_length=8,
+        description=(
+            "sharp edges, each from one of the probe's spheres to another, counted from 0; these spheres pass"
+            " through organs with `cutting`; kind fem alone"
+        ),
+    )
 
     @model_validator(mode="after")
     def _a_radius_for_each(self) -> ProbeParams:
@@ -167,6 +175,14 @@ class ProbeParams(BaseModel):
                 f"{self.spheres or 1} spheres for bipolar energy: one half of them is one jaw, the other half"
                 " the other jaw"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _spheres_at_the_ends_of_blades(self) -> ProbeParams:
+        last = (self.spheres or 1) - 1
+        for blade in self.blades:
+            if not all(0 <= end <= last for end in blade) or blade[0] == blade[1]:
+                raise ValueError(f"blade {list(blade)}: state two different spheres from 0 to {last}")
         return self
 
     @property

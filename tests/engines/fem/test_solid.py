@@ -21,12 +21,11 @@ from tests.engines.bullet.finite_elements import internal_forces
 
 SOFT = Material(10e3, 0.4, 1000.0, 1e-3)
 MESH = block(np.array([0.04, 0.04, 0.02]), 60)
-NOTHING = np.zeros((0, 3), np.int64)
 NO_SPHERES = np.zeros(0), np.zeros(0, np.uint8)
 
 
 def free_solid(mesh=MESH, material=SOFT, branches=()):
-    return Solid(mesh, np.zeros(len(mesh.nodes), bool), NOTHING, material, branches)
+    return Solid(mesh, np.zeros(len(mesh.nodes), bool), material, branches)
 
 
 def forces(solid, seconds=0.0):
@@ -95,7 +94,7 @@ def test_a_column_sags_as_its_modulus_says(poisson_ratio):
     length, material = 0.06, Material(20e3, poisson_ratio, 1000.0, 1e-3)
     mesh = block(np.array([0.012, 0.012, length]), 400)
     anchored = mesh.nodes[:, 2] < -length + 1e-9
-    solid = Solid(mesh, anchored, NOTHING, material, [Branch(1.0, 1e-3)])
+    solid = Solid(mesh, anchored, material, [Branch(1.0, 1e-3)])
     for drag in (40.0, 40.0, 0.0):
         k = solid.sub_steps(0.5)
         solid.advance(0.5, SphereWay(np.zeros((k + 1, 0, 3)), *NO_SPHERES), 0.0, 9.81, drag=drag)
@@ -129,8 +128,7 @@ def sphere_press(solid, centre, radius, depth, friction=0.0, aside=0.0, seconds=
 def slab(nodes=250):
     mesh = block(np.array([0.08, 0.06, 0.02]), nodes)
     anchored = mesh.nodes[:, 2] < -0.02 + 1e-9
-    faces = mesh.triangles[~anchored[mesh.triangles].all(axis=1)]
-    return Solid(mesh, anchored, faces, SOFT, [Branch(1.0, 1e-3)])
+    return Solid(mesh, anchored, SOFT, [Branch(1.0, 1e-3)])
 
 
 def test_no_face_enters_a_sphere_and_it_feels_only_push():
