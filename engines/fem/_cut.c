@@ -23,13 +23,11 @@ static void cross(const double a[3], const double b[3], double out[3])
         out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
+/* Middle of an element of the uncut mesh: moved nodes must not carry it across what has been swept already. */
 static void middle_of(const Body *body, int element, double middle[3])
 {
-    for (int i = 0; i < 3; i++) {
-        middle[i] = 0.0;
-        for (int a = 0; a < 4; a++)
-            middle[i] += 0.25 * (double)body->rest[4 * *corner_of(body, element, a) + i];
-    }
+    for (int i = 0; i < 3; i++)
+        middle[i] = (double)body->middles[3 * element + i];
 }
 
 /* Whether the way from a to b crosses a triangle: Moeller, Trumbore, Fast, minimum storage ray/triangle intersection,

@@ -312,6 +312,7 @@ static int initialise(Solid *self, PyObject *args, PyObject *Py_UNUSED(named))
     NEXT(across, 1);
     NEXT(surface, 1);
     NEXT(owner, 1);
+    NEXT(middles, 0);
     NEXT(limits, 0);
     return 0;
 }

@@ -40,6 +40,7 @@ typedef struct {
     int32_t *across;             /* (4 blocks, 4): the face on the other side, or ~slot of a face of the surface */
     int32_t *surface;            /* (faces, 3): nodes by slot; -1 of a face that has gone */
     int32_t *owner;              /* (faces,): face of an element by slot */
+    const float *middles;        /* (4 blocks, 3): of the elements of the uncut mesh */
     const float *limits;         /* (4,): lambda; largest sharpness, bulk rate and edge (m) of the uncut mesh */
 } Body;
 

@@ -139,6 +139,7 @@ class Solid:
     ) -> None:
         edges = mesh.nodes[tetrahedra[:, 1:]] - mesh.nodes[tetrahedra[:, :1]]
         gradients: Vector = np.asarray(np.linalg.inv(edges), np.float64).transpose(0, 2, 1).reshape(-1, 9)
+        self._middles = aligned_floats(mesh.nodes[tetrahedra].mean(axis=1) - self.middle)
         self._corners = aligned_integers(in_blocks(tetrahedra, _LANES))
         self._gradients = aligned_floats(in_blocks(gradients, _LANES))
         self._volumes = aligned_floats(volume)
@@ -156,7 +157,8 @@ class Solid:
             *(self._mass, self._inverse_mass, self._inverse_volume, self._bulk),
             *(self._holder, self._origin, self._flags),
             *(self._corners, self._gradients, self._volumes, self._element_mass, self._shear),
-            *(self.strains, self._branch, self._across, self._surface, self._owner, self._limits),
+            *(self.strains, self._branch, self._across, self._surface, self._owner),
+            *(self._middles, self._limits),
         )
 
     @property
