@@ -28,7 +28,12 @@ _EXTENSIONS = (
     Extension(
         "engines.fem._solid",
         [f"engines/fem/_{part}.c" for part in ("solid", "elements", "contact", "topology", "cut", "blade")],
-        depends=["engines/fem/_solid.h", "engines/fem/_lanes.h", "engines/fem/_triangle.h"],
+        depends=[
+            "engines/fem/_solid.h",
+            "engines/fem/_lanes.h",
+            "engines/fem/_triangle.h",
+            "engines/fem/_vectors.h",
+        ],
         extra_compile_args=[*_FLAGS, "/O2" if sys.platform == "win32" else "-O3"],
     ),
     Extension(

@@ -7,6 +7,7 @@ toughness times swept area. An edge pushes forward only; backwards it leaves its
 */
 
 #include "_solid.h"
+#include "_vectors.h"
 
 #define ITERATIONS 6
 #define INSIDE -1e-6    /* least shape function of a point in an element */
@@ -21,21 +22,6 @@ typedef struct {
     double share[4], edge[3], forward[3], goal[3], mass, impulse[3];
     double most, borne; /* impulse of slipping, and its part that the mesh bears */
 } Front;
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static int normalise(double v[3])
-{
-    double size = sqrt(dot(v, v));
-    if (size == 0.0)
-        return 0;
-    for (int i = 0; i < 3; i++)
-        v[i] /= size;
-    return 1;
-}
 
 /* Place of a sample at an end of a sub-step. */
 static void sample_at(const Spheres *spheres, const Edges *edges, int edge, double along, int place, double x[3])
@@ -378,9 +364,7 @@ void follow(const Body *body, const Spheres *spheres, const Edges *edges, int su
             for (int i = 0; i < 3; i++)
                 gap[i] += slide * front.edge[i] * (double)seconds; /* along itself an edge slides freely */
             to_rest(body, edges->element[k], gap, advance);
-            double width = front.most / (edges->toughness * (double)seconds);
-            edges->book[0] += slip * width;
-            edges->book[1] += slip * width * edges->toughness;
+            *edges->area += slip * front.most / (edges->toughness * (double)seconds);
             for (int i = 0; i < 3; i++) {
                 edges->front[3 * k + i] += advance[i];
                 if (slip > 0.0)

@@ -1,27 +1,17 @@
 /* Faces open where a blade has swept, and where tissue is stretched too far.
 
 A face opens if the line between the middles of its two elements is crossed, so a cut without holes leaves no bridges.
-Its nodes are moved onto the cut first, as far as no element becomes sharper than the sharpest of the uncut mesh: both
-sides are smooth, and sub-steps as long as before. Mass stays with the elements.
+Its nodes are moved onto the cut first, as far as no element becomes sharper than the body's limit, for which the
+sub-steps are made: both sides are smooth. Mass stays with the elements.
 */
 
 #include "_solid.h"
+#include "_vectors.h"
 
 #define SAME_SIDE 0.35     /* sine of the least angle between faces of different sides of the surface */
 #define LEAST_ALONG 0.5    /* sine of the least angle between cut and surface for a move along the surface */
 #define EDGE_SLACK 1e-9    /* of a triangle's edges, in its own coordinates: neighbours leave no gap */
 #define POWER_ITERATIONS 12
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    for (int i = 0; i < 3; i++)
-        out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
-}
 
 /* Middle of an element of the uncut mesh: moved nodes must not carry it across what has been swept already. */
 static void middle_of(const Body *body, int element, double middle[3])
@@ -48,6 +38,14 @@ static int crosses(const double a[3], const double b[3], const double *triangle)
     return s >= -EDGE_SLACK && t >= -EDGE_SLACK && s + t <= 1.0 + EDGE_SLACK && along >= 0.0 && along < 1.0;
 }
 
+static int has_corner(const Body *body, int element, int32_t node)
+{
+    for (int a = 0; a < 4; a++)
+        if (*corner_of(body, element, a) == node)
+            return 1;
+    return 0;
+}
+
 /* Mean deformation gradient, less the unit matrix, of the elements around a node; return how many there are. */
 static int mean_strain(const Body *body, int32_t node, const int32_t *elements, int count, double mean[9])
 {
@@ -55,10 +53,8 @@ static int mean_strain(const Body *body, int32_t node, const int32_t *elements, 
     int found = 0;
     memset(mean, 0, 9 * sizeof(double));
     for (int k = 0; k < count; k++) {
-        int e = elements[k], around = 0;
-        for (int a = 0; a < 4; a++)
-            around |= *corner_of(body, e, a) == node;
-        if (!around)
+        int e = elements[k];
+        if (!has_corner(body, e, node))
             continue;
         double gradients[9], volume = rest_gradients(body, e, gradients);
         const float *first = body->displacement + 4 * *corner_of(body, e, 0);
@@ -115,10 +111,8 @@ static int sides_at(const Body *body, int32_t node, const int32_t *elements, int
 static int is_fit(Body *body, int32_t node, const int32_t *elements, int count, int write)
 {
     for (int k = 0; k < count; k++) {
-        int e = elements[k], around = 0;
-        for (int a = 0; a < 4; a++)
-            around |= *corner_of(body, e, a) == node;
-        if (!around)
+        int e = elements[k];
+        if (!has_corner(body, e, node))
             continue;
         double gradients[9], volume = rest_gradients(body, e, gradients);
         if (!(volume > 0.0) || !(sharpness_of(gradients) <= (double)body->limits[1]))

@@ -122,10 +122,10 @@ static int run(Body *body, const Spheres *spheres, const Edges *edges, int sub_s
 }
 
 PyDoc_STRVAR(advance_doc, "advance(path, radius, free, force, friction, seconds, sub_steps, gravity, drag, ends, \
-toughness, element, front, ahead, book)\n--\n\n\
+toughness, element, front, ahead, area)\n--\n\n\
 Advance by sub-steps of `seconds` while spheres go along `path`, shape (sub_steps + 1, n, 3), m; add the force on each\n\
 sphere to `force`, shape (sub_steps, n, 3), N. The last arguments are edges of blades: `ends`, shape (e, 2), are\n\
-spheres; `element`, shape (e, samples), `front` and `ahead`, shape (e, samples, 3), and `book` are their state.\n\
+spheres; `element`, shape (e, samples), `front` and `ahead`, shape (e, samples, 3), and `area` are their state.\n\
 Return how many faces have been cut open.");
 
 static PyObject *advance(Solid *self, PyObject *args)
@@ -143,12 +143,15 @@ static PyObject *advance(Solid *self, PyObject *args)
     edges.count = (int)(held[4].len / 8);
     edges.samples = edges.count ? (int)(held[5].len / 4) / edges.count : 0;
     edges.ends = held[4].buf, edges.element = held[5].buf, edges.front = held[6].buf, edges.ahead = held[7].buf;
-    edges.book = held[8].buf;
+    edges.area = held[8].buf;
+    int fits = edges.samples <= MOST_SAMPLES;
     Py_BEGIN_ALLOW_THREADS;
-    opened = run(&self->body, &spheres, &edges, sub_steps, seconds, gravity, drag);
+    opened = !fits ? 0 : run(&self->body, &spheres, &edges, sub_steps, seconds, gravity, drag);
     Py_END_ALLOW_THREADS;
     for (int k = 0; k < 9; k++)
         PyBuffer_Release(held + k);
+    if (!fits)
+        return PyErr_Format(PyExc_ValueError, "at most %d samples along an edge", MOST_SAMPLES);
     return opened < 0 ? PyErr_NoMemory() : PyLong_FromLong(opened);
 }
 
@@ -174,7 +177,7 @@ static PyObject *change(Solid *self, PyObject *numbers, Change apply, int most)
     if (PyObject_GetBuffer(numbers, &given, PyBUF_SIMPLE))
         return NULL;
     const int32_t *number = given.buf;
-    int count = (int)(given.len / 4), valid = self->body.node_room > self->body.nodes;
+    int count = (int)(given.len / 4), valid = self->body.node_room == 16 * self->body.blocks;
     for (int k = 0; k < count; k++)
         valid &= number[k] >= 0 && number[k] < most;
     if (valid)

@@ -63,7 +63,7 @@ typedef struct {
     int32_t *element;    /* (count, samples): where the front of the cut is; -1: nowhere; -2 - e: it has left e */
     double *front;       /* (count, samples, 3): the front of the cut in the resting body */
     double *ahead;       /* (count, samples, 3): direction of its advance, a unit vector */
-    double *book;        /* (2,): swept area, m^2, and work, J */
+    double *area;        /* (1,): swept so far, m^2 */
 } Edges;
 
 static inline int32_t *corner_of(const Body *body, int element, int corner)

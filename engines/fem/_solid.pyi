@@ -22,7 +22,7 @@ class Solid:
         element: NDArray[np.int32],
         front: NDArray[np.float64],
         ahead: NDArray[np.float64],
-        book: NDArray[np.float64],
+        area: NDArray[np.float64],
         /,
     ) -> int: ...
     def forces(self, seconds: float, /) -> None: ...

@@ -33,23 +33,18 @@ class Edges:
         """Front of the cut in the resting body, m, shape (n, samples, 3)."""
         self.ahead: Vector = np.zeros((n, samples, 3))
         """Direction of its advance, shape (n, samples, 3)."""
-        self.book: Vector = np.zeros(2)
-        """Area that has been cut, m^2, and work done on it, J."""
+        self.swept: Vector = np.zeros(1)
+        """Area that has been cut, m^2."""
 
     @property
     def area(self) -> float:
-        """Area that has been cut, m^2."""
-        return float(self.book[0])
-
-    @property
-    def work(self) -> float:
-        """Work of cutting, J."""
-        return float(self.book[1])
+        """Area that has been cut, m^2: times `toughness`, the work of cutting."""
+        return float(self.swept[0])
 
     @property
     def state(self) -> tuple[NDArray[np.generic], ...]:
         """Arrays that change."""
-        return self.element, self.front, self.ahead, self.book
+        return self.element, self.front, self.ahead, self.swept
 
 
 NO_EDGES = Edges((), 0, 1.0)

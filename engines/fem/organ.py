@@ -64,7 +64,9 @@ class Organ:
         """Faces with a free node, shape (f, 3)."""
         self._edges = NO_EDGES
         self._slowest = params.frequencies[1]
-        self._free = np.ones(0, np.uint8)
+        self._presses = self._free = np.ones(0, np.uint8)
+        self.mesh_version = 0
+        """Count of the changes of the mesh."""
         self._reach = float(np.linalg.norm(np.ptp(self.mesh.nodes, axis=0)))
         self.nodes: Vector = self.mesh.nodes
 
@@ -158,6 +160,7 @@ class Organ:
         self.surface.follow(self.solid.faces, self.solid.origin)
         self.nodes = self.solid.nodes
         self.touchable = self._touchable_faces()
+        self.mesh_version += 1
 
     def _touchable_faces(self) -> Indices:
         faces = self.surface.present.astype(np.int64)
@@ -174,14 +177,15 @@ class Organ:
 
     def let_touch(self, body: int, *, on: bool) -> None:
         """Let a sphere press the organ, or pass through."""
-        self._free[body] = on
+        self._free[body] = self._presses[body] if on else 0
 
     def meet(self, spheres: Spheres, blades: Sequence[tuple[int, int]] = ()) -> None:
         """Let these spheres press the organ, and blades between some of them cut it, if it may be cut."""
-        self._free = np.ones(len(spheres.radii), np.uint8)
+        self._presses = np.ones(len(spheres.radii), np.uint8)
         if self._cutting is not None and blades:
-            self._free[np.unique(blades)] = 0
+            self._presses[np.unique(blades)] = 0  # ends of blades pass through
             self._edges = Edges(blades, _SAMPLES, self._cutting.toughness)
+        self._free = self._presses.copy()
         self._way = SphereWay(spheres.path, spheres.radii, self._free, self._edges)
 
     def held_by(self, bodies: Collection[int]) -> list[int]:
@@ -192,11 +196,6 @@ class Organ:
     def digest(self) -> bytes:
         """16 bytes by the displacements."""
         return xxh3_128_digest(self.solid.displacement.tobytes())
-
-    @property
-    def edges(self) -> Edges:
-        """Blades in this organ, and their books."""
-        return self._edges
 
     @property
     def parts(self) -> Iterator[NDArray[np.generic]]:
@@ -224,4 +223,5 @@ class Organ:
                 origins.astype(np.int32),
             )
         )
+        self.nodes = self.solid.nodes
         self.touchable = self._touchable_faces()

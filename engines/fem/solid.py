@@ -261,7 +261,7 @@ class Solid:
             sub_steps,
             gravity,
             drag,
-            *(edges.ends, edges.toughness, edges.element, edges.front, edges.ahead, edges.book),
+            *(edges.ends, edges.toughness, edges.element, edges.front, edges.ahead, edges.swept),
         )
         return forces
 

@@ -32,14 +32,7 @@ class SurfaceState(NamedTuple):
 
 
 class TissueSurface:
-    """Faces of an organ by slot. A face keeps its slot for the session; nodes are appended.
-
-    Examples:
-        surface = TissueSurface(mesh.triangles, len(mesh.nodes))
-        twins = surface.add_nodes(cut_nodes)               # copies of nodes, numbered from the end on
-        surface.replace(slots, faces, kinds)               # faces on one side name the copies
-        surface.append(inner_faces, np.full(len(inner_faces), FaceKind.CUT))
-    """
+    """Faces of an organ by slot. A face keeps its slot for the session; nodes are appended."""
 
     def __init__(self, triangles: Indices, nodes: int) -> None:
         """`triangles`: the surface at rest, shape (f, 3); `nodes`: number of nodes of the mesh."""
@@ -67,35 +60,12 @@ class TissueSurface:
         """The faces with tissue, shape (k, 3)."""
         return self.faces[self.faces[:, 0] != _GONE]
 
-    def add_nodes(self, origins: NDArray[np.integer]) -> NDArray[np.int32]:
-        """Append a copy of each of these nodes; return the numbers of the copies."""
-        first = self.node_count
-        appended = origins >= self._first_nodes
-        roots = origins.astype(np.int32)
-        roots[appended] = self.origins[roots[appended] - self._first_nodes]
-        self.origins = np.concatenate([self.origins, roots])
-        self.version += 1
-        return np.arange(first, self.node_count, dtype=np.int32)
-
     def replace(
         self, slots: NDArray[np.integer], faces: NDArray[np.integer], kinds: NDArray[np.integer]
     ) -> None:
         """Change the faces in these slots, in place. `faces`: shape (k, 3); `kinds`: shape (k,)."""
         self.faces[slots] = faces
         self.kinds[slots] = kinds
-        self.version += 1
-
-    def append(self, faces: NDArray[np.integer], kinds: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Append faces, shape (k, 3), with their kinds, shape (k,); return their slots."""
-        first = len(self.faces)
-        self.faces = np.concatenate([self.faces, faces.astype(np.int32)])
-        self.kinds = np.concatenate([self.kinds, kinds.astype(np.uint8)])
-        self.version += 1
-        return np.arange(first, len(self.faces))
-
-    def remove(self, slots: NDArray[np.integer]) -> None:
-        """Empty these slots: the tissue is gone."""
-        self.faces[slots] = _GONE
         self.version += 1
 
     def follow(self, faces: NDArray[np.int32], origins: NDArray[np.int32]) -> None:

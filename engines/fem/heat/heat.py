@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from engines.fem.heat.tissue import BODY, HeatTissue
 from engines.tissue.meshing.tet_mesh import Indices
+from schemas.soft_surface import FaceKind
 from schemas.vectors import Vector
 
-__all__ = ["CHARRED", "COAGULATED", "HEAT_PERIOD_NS", "Heat"]
+__all__ = ["HEAT_PERIOD_NS", "Heat"]
 
 HEAT_PERIOD_NS = 10_000_000
 """Period of the steps of heat."""
-COAGULATED, CHARRED = 2, 3
-"""Kinds of tissue on a surface."""
 _VAPORISED = 2
 """Stage of an element in `_heat.c`."""
 _FASTEST = 1e3
@@ -157,9 +156,9 @@ class Heat:
 
     @property
     def kinds(self) -> NDArray[np.uint8]:
-        """0, or `COAGULATED` or `CHARRED` for every element, shape (m,)."""
-        found = np.where(self.damage[0] >= 1.0, COAGULATED, 0).astype(np.uint8)
-        found[self.stage > 0] = CHARRED
+        """`FaceKind` of every element: outside, coagulated or charred, shape (m,)."""
+        found = np.where(self.damage[0] >= 1.0, FaceKind.COAGULATED, FaceKind.OUTSIDE).astype(np.uint8)
+        found[self.stage > 0] = FaceKind.CHARRED
         return found
 
     def vaporised(self) -> Indices:

@@ -85,8 +85,8 @@ class Heating:
         self._edge = max(organ.mean_edge for organ in organs)
         self._elapsed = np.zeros(1)
         """Time since the last step of heat, s."""
-        self._known = {organ.name: len(organ.surface.faces) for organ in organs}
-        """Faces of each organ when its heat was bound to its mesh."""
+        self._known = [organ.mesh_version for organ in organs]
+        """Versions of the meshes to which the heats are bound."""
         self._smoke = np.zeros(len(organs))
         """Smoke of every organ in the last step of heat, g/s."""
 
@@ -108,9 +108,9 @@ class Heating:
 
     def follow(self) -> None:
         """Take over nodes and elements of organs that have been cut."""
-        for organ, heat in zip(self._organs, self.heats, strict=True):
-            if len(organ.surface.faces) != self._known[organ.name]:
-                self._known[organ.name] = len(organ.surface.faces)
+        for i, (organ, heat) in enumerate(zip(self._organs, self.heats, strict=True)):
+            if organ.mesh_version != self._known[i]:
+                self._known[i] = organ.mesh_version
                 heat.copy_nodes(organ.solid.origin[len(heat.rise) :].astype(np.int64))
                 heat.rebind(*organ.solid.elements)
 
@@ -124,7 +124,7 @@ class Heating:
             array[...] = np.frombuffer(next(parts), array.dtype)
         for organ, heat in zip(self._organs, self.heats, strict=True):
             heat.restore(parts, organ.solid.elements)
-            self._known[organ.name] = len(organ.surface.faces)
+        self._known = [organ.mesh_version for organ in self._organs]
 
     @property
     def outputs(self) -> dict[str, Value]:

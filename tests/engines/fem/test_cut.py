@@ -144,6 +144,7 @@ def test_a_body_of_single_elements_falls_and_stays_finite():
     loose = mesh.nodes[solid.origin[solid.tetrahedra], 2].min(axis=1) > mesh.nodes[:, 2].min() + 1e-9
     fallen = solid.displacement[solid.tetrahedra[loose], 2]
     assert fallen == pytest.approx(-0.5 * 9.81 * 0.05**2, rel=0.01)
+    assert solid.remove(np.arange(5)) == 5  # though there is no room for another node
 
 
 def test_elements_go_with_their_mass():

@@ -14,6 +14,33 @@ from schemas.vectors import Vector
 _FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
+class EditedSurface(TissueSurface):
+    """A surface that is changed by hand."""
+
+    def add_nodes(self, origins: NDArray[np.integer]) -> NDArray[np.int32]:
+        """Append a copy of each of these nodes; return the numbers of the copies."""
+        first = self.node_count
+        appended = origins >= self._first_nodes
+        roots = origins.astype(np.int32)
+        roots[appended] = self.origins[roots[appended] - self._first_nodes]
+        self.origins = np.concatenate([self.origins, roots])
+        self.version += 1
+        return np.arange(first, self.node_count, dtype=np.int32)
+
+    def append(self, faces: NDArray[np.integer], kinds: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Append faces, shape (k, 3), with their kinds, shape (k,); return their slots."""
+        first = len(self.faces)
+        self.faces = np.concatenate([self.faces, faces.astype(np.int32)])
+        self.kinds = np.concatenate([self.kinds, kinds.astype(np.uint8)])
+        self.version += 1
+        return np.arange(first, len(self.faces))
+
+    def remove(self, slots: NDArray[np.integer]) -> None:
+        """Empty these slots: the tissue is gone."""
+        self.faces[slots] = -1
+        self.version += 1
+
+
 class CutBlock:
     """The block, its surface, and its nodes.
 
@@ -22,7 +49,7 @@ class CutBlock:
 
     def __init__(self, size: Vector, nodes: int) -> None:
         self.mesh: TetMesh = block(size, nodes)
-        self.surface = TissueSurface(self.mesh.triangles, len(self.mesh.nodes))
+        self.surface = EditedSurface(self.mesh.triangles, len(self.mesh.nodes))
         self._sides: NDArray[np.int64] = np.zeros(len(self.mesh.nodes), np.int64)
 
     def cut(self, depth: float, kind: FaceKind = FaceKind.CUT) -> None:

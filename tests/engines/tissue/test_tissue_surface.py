@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engines.tissue.ports import surface_changes
-from engines.tissue.tissue_surface import TissueSurface
 from schemas.codec import decode, encode
 from schemas.ros import Header
 from schemas.soft_surface import FaceKind, SoftSurface
 from schemas.trocar_msgs import SoftBodyState, SurfaceChange
+from tests.engines.tissue.cut_block import EditedSurface
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 NODES = 4
@@ -23,13 +23,13 @@ def first_state() -> SoftBodyState:
     )
 
 
-def drawn(surface: TissueSurface) -> SoftSurface:
+def drawn(surface: EditedSurface) -> SoftSurface:
     """The surface as a viewer has it that receives nothing but the first state and the newest change."""
     message = decode(SurfaceChange, encode(surface.change("liver", 0)))
     return SoftSurface.of_first(first_state()).changed(message)
 
 
-def change_at_random(surface: TissueSurface, data: st.DataObject) -> None:
+def change_at_random(surface: EditedSurface, data: st.DataObject) -> None:
     count = data.draw(st.integers(1, 5))
     node = st.integers(0, surface.node_count - 1)
     faces = np.array(data.draw(st.lists(st.tuples(node, node, node), min_size=count, max_size=count)))
@@ -48,7 +48,7 @@ def change_at_random(surface: TissueSurface, data: st.DataObject) -> None:
 
 @given(st.data())
 def test_the_newest_change_alone_makes_the_surface(data: st.DataObject) -> None:
-    surface = TissueSurface(TETRAHEDRON, NODES)
+    surface = EditedSurface(TETRAHEDRON, NODES)
     for _ in range(data.draw(st.integers(0, 12))):
         change_at_random(surface, data)
         if data.draw(st.booleans()):
@@ -61,7 +61,7 @@ def test_the_newest_change_alone_makes_the_surface(data: st.DataObject) -> None:
 
 
 def test_a_copy_of_a_copy_rests_where_the_first_node_does() -> None:
-    surface = TissueSurface(TETRAHEDRON, NODES)
+    surface = EditedSurface(TETRAHEDRON, NODES)
     assert surface.add_nodes(np.array([2, 0])).tolist() == [4, 5]
     assert surface.add_nodes(np.array([4, 1])).tolist() == [6, 7]
     assert surface.origins.tolist() == [2, 0, 2, 1]
@@ -69,14 +69,14 @@ def test_a_copy_of_a_copy_rests_where_the_first_node_does() -> None:
 
 
 def test_faces_without_tissue_are_not_present() -> None:
-    surface = TissueSurface(TETRAHEDRON, NODES)
+    surface = EditedSurface(TETRAHEDRON, NODES)
     surface.remove(np.array([1]))
     assert surface.present.tolist() == TETRAHEDRON[[0, 2, 3]].tolist()
 
 
 def test_an_unchanged_surface_is_the_same_message() -> None:
     """It is encoded once, however often it goes out."""
-    surface = TissueSurface(TETRAHEDRON, NODES)
+    surface = EditedSurface(TETRAHEDRON, NODES)
     first = surface.change("liver", 0)
     assert surface.change("liver", 16) is first
     assert not first.slots.size
@@ -89,11 +89,11 @@ def test_an_unchanged_surface_is_the_same_message() -> None:
 
 @pytest.mark.parametrize("sent", [False, True])
 def test_a_restored_surface_goes_on_with_the_same_bytes(sent: bool) -> None:
-    def cut(surface: TissueSurface) -> None:
+    def cut(surface: EditedSurface) -> None:
         twins = surface.add_nodes(np.array([1]))
         surface.append(np.array([[0, 1, twins[0]]]), np.array([FaceKind.CUT]))
 
-    surface, other = (TissueSurface(TETRAHEDRON, NODES) for _ in range(2))
+    surface, other = (EditedSurface(TETRAHEDRON, NODES) for _ in range(2))
     cut(surface)
     if sent:
         surface.change("liver", 5)
@@ -105,7 +105,7 @@ def test_a_restored_surface_goes_on_with_the_same_bytes(sent: bool) -> None:
 
 
 def test_a_saved_state_does_not_change_with_the_surface() -> None:
-    surface = TissueSurface(TETRAHEDRON, NODES)
+    surface = EditedSurface(TETRAHEDRON, NODES)
     before = surface.state
     surface.remove(np.array([0]))
     surface.restore(before)
@@ -113,7 +113,7 @@ def test_a_saved_state_does_not_change_with_the_surface() -> None:
 
 
 def test_it_follows_an_engine_that_keeps_faces_by_slot() -> None:
-    surface = TissueSurface(TETRAHEDRON, NODES)
+    surface = EditedSurface(TETRAHEDRON, NODES)
     surface.follow(TETRAHEDRON.astype(np.int32), np.arange(NODES, dtype=np.int32))
     assert surface.version == 0
     faces = np.concatenate([TETRAHEDRON, [[0, 1, 4]]]).astype(np.int32)
@@ -130,7 +130,7 @@ def test_it_follows_an_engine_that_keeps_faces_by_slot() -> None:
 def test_the_ports_name_the_organ() -> None:
     class Liver:
         name = "liver"
-        surface = TissueSurface(TETRAHEDRON, NODES)
+        surface = EditedSurface(TETRAHEDRON, NODES)
 
     (port,) = surface_changes([Liver()], 0)  # pyright: ignore[reportArgumentType]
     assert port == "liver/surface"

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import exp1
 
-from engines.fem.heat.heat import CHARRED, COAGULATED, Heat
+from engines.fem.heat.heat import Heat
 from engines.fem.heat.tissue import BODY, TISSUES
 from engines.tissue.meshing.grid import grid_indices, tetrahedra_of_cells
 from engines.tissue.meshing.tet_mesh import TetMesh, volumes
+from schemas.soft_surface import FaceKind
 
 LIVER = TISSUES["liver"]
 BLOODLESS = replace(LIVER, perfusion=0.0)
@@ -124,10 +125,10 @@ def test_water_boils_off_at_100_degrees_with_its_latent_heat():
     assert smoke == pytest.approx(0.5 * LIVER.density * LIVER.water * volume, rel=0.05)
     assert smoke == pytest.approx(heat.book[2] / 2.257e6, rel=1e-6)
     assert not heat.kinds[heat.damage[0] < 1.0].any()
-    assert (heat.kinds == COAGULATED).all()
+    assert (heat.kinds == FaceKind.COAGULATED).all()
     while not heat.stage.all():
         smoke += heat.advance(0.005 * to_dry, power)
-    assert (heat.kinds == CHARRED).all()
+    assert (heat.kinds == FaceKind.CHARRED).all()
     while len(heat.vaporised()) < len(heat.stage):
         smoke += heat.advance(0.005 * to_dry, power)
     assert smoke == pytest.approx(LIVER.density * volume, rel=1e-3)

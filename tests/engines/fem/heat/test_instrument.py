@@ -7,7 +7,7 @@ import pytest
 
 from engines.bullet.params import BulletParams
 from engines.fem.engine import FemEngine
-from engines.fem.heat.heat import COAGULATED, Heat
+from engines.fem.heat.heat import Heat
 from engines.fem.heat.instrument import EnergyInstrument
 from engines.fem.heat.tissue import TISSUES
 from engines.tissue.meshing.grid import grid_indices, tetrahedra_of_cells
@@ -15,6 +15,7 @@ from engines.tissue.meshing.tet_mesh import volumes
 from engines.tissue.probes.energy import EnergyParams
 from hub.participant import Inputs
 from hub.testing import check_engine
+from schemas.soft_surface import FaceKind
 from tests.engines.fem.rig import MS, FemRig, params
 
 SLAB = {"size": ["20 mm", "10 mm", "5 mm"], "young_modulus": "10 kPa", "nodes": 1400}
@@ -120,7 +121,7 @@ def test_a_moving_hook_leaves_a_coagulated_track():
         assert heat.book[0] == pytest.approx(rig.number("probe/delivered"), rel=1e-6)
         assert abs(heat.imbalance) < 1e-5 * heat.book[0]
         middles = rig.engine._organs[0].mesh.nodes[heat._corners].mean(axis=1)
-        burnt = (heat.kinds >= COAGULATED) & (np.abs(middles[:, 0]) < 4e-3)
+        burnt = (heat.kinds >= FaceKind.COAGULATED) & (np.abs(middles[:, 0]) < 4e-3)
         assert 0.15e-3 < -middles[burnt, 2].min() < 2.7e-3
         assert 0.15e-3 < np.abs(middles[burnt, 1]).max() < 2.7e-3
 
@@ -157,3 +158,17 @@ def test_half_of_the_spheres_is_a_jaw():
 def test_tissue_in_bullet_is_not_heated():
     with pytest.raises(ValueError, match="kind fem only"):
         BulletParams.model_validate({"organs": {"block": SLAB}, "probes": {"probe": cautery()}})
+
+
+def test_vaporised_tissue_goes_and_leaves_charred_walls():
+    with CauteryRig(SLAB | {"cutting": {}}, power="400 W", efficiency=1.0) as rig:
+        solid = rig.engine._organs[0].solid
+        mass = float(solid.mass.sum(dtype=np.float64))
+        rig.watts[:] = 400.0
+        rig.hold(1.0)
+        assert float(solid.mass.sum(dtype=np.float64)) < 0.995 * mass
+        kinds = rig.outputs["block/surface"].kinds
+        assert (kinds == FaceKind.CHARRED).any()
+        assert (kinds == FaceKind.COAGULATED).any()
+        assert not len(rig.heat.vaporised())
+        assert abs(rig.heat.imbalance) < 1e-3 * rig.heat.book[0]
