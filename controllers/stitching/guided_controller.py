@@ -110,7 +110,7 @@ class GuidedStitching(TwoHands):
         return self._outputs
 
     def _hear_person(self, inputs: Inputs) -> Iterator[str]:
-        """Execute the points and words of the person; yield why something cannot be done."""
+        """Execute the points and words of the person; yield what each led to, refusals included."""
         surgeon = self._surgeon
         for source in SOURCES:
             for picked in cast("tuple[PointStamped, ...]", inputs.events(f"{source}pick")):
@@ -118,11 +118,13 @@ class GuidedStitching(TwoHands):
                     surgeon.pick(self._frames.in_world(picked, inputs))
                 except MotionError as error:
                     yield f"refused: {error}"
+                yield from surgeon.statuses()
             for command in cast("tuple[StringMessage, ...]", inputs.events(f"{source}command")):
                 try:
                     surgeon.command(command.data)
                 except MotionError as error:
                     yield f"refused: {error}"
+                yield from surgeon.statuses()
 
     def _command(self) -> None:
         surgeon, moves = self._surgeon, self._surgeon.moves_arms

@@ -131,8 +131,6 @@ class HostRun:
 
     def serve(self) -> None:
         """Configure, report ready, and step as the hub grants, or look on, until interrupted."""
-        if self._observing is not None:
-            lower_priority()  # first: a renderer starts threads while it is configured
         try:
             bonds = self._host.configure(self._directory)
             for thread in self._threads:
@@ -166,8 +164,13 @@ class HostRun:
 
     def _observe(self, observing: Observing, ready: JoinRequest) -> NoReturn:
         """Look until the process is interrupted, and report when the state at time 0 was seen."""
+
+        def began() -> None:
+            lower_priority()  # not before: until here the session waits for this process
+            self._send_to_hub(ready.model_copy(update={"watching": True}))
+
         try:
-            observing.serve(lambda: self._send_to_hub(ready.model_copy(update={"watching": True})))
+            observing.serve(began)
         except ParticipantError as error:
             self._report_failure(error.participant, error.cause)
             raise

@@ -16,17 +16,23 @@ NICE = 10
 """Nice value, at most 19. Where both want a core, Linux gives a tenth of a core to a process with this value
 (weights 110 and 1024 of sched_prio_to_weight, kernel/sched/core.c).
 """
+_THREADS = Path("/proc/self/task")
 _AUTOGROUP = Path("/proc/self/autogroup")
 
 
 def lower_priority() -> None:
-    """Lower the priority of the calling thread, of all threads started later, and of the autogroup.
+    """Lower the priority of all threads of the process, of threads started later, and of the autogroup.
 
     Inherited real-time priority (`chrt trocar run`) is given up. Linux puts each session of processes into an
     autogroup, and each host is a separate session: between autogroups only their own nice values count
     (sched(7)). Does nothing on systems without nice values.
     """
-    if hasattr(os, "nice"):
+    if _THREADS.exists():
+        lower = os.getpriority(os.PRIO_PROCESS, 0) + NICE
+        for thread in _THREADS.iterdir():
+            with suppress(ProcessLookupError):  # the thread has ended since
+                os.setpriority(os.PRIO_PROCESS, int(thread.name), lower)
+    elif hasattr(os, "nice"):
         os.nice(NICE)
     if hasattr(os, "sched_setscheduler") and os.sched_getscheduler(0) in (os.SCHED_FIFO, os.SCHED_RR):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -1,7 +1,8 @@
 """The feed of an output for pages: of a signal some values a second of wall time, of events each message.
 
 A page is no reader of the simulation: nothing waits for a page, a message that cannot be sent is dropped, and
-no value is encoded that a page would not show. While no page looks, an output costs nothing more.
+no value is encoded that a page would not show. While no page looks, an output costs nothing more. Events are
+not repeated, so pictures, which fill a link, have a lower priority and so a queue of their own.
 """
 
 from __future__ import annotations
@@ -43,7 +44,14 @@ class PageFeed:
         self._first: tuple[bytes, bytes] | None = None
         """State at time 0 of a message, which may hold data that later ones lack: the surface of an organ."""
         self._due_ns = self._first_due_ns = 0
-        self._publisher = Publisher(session, key, zenoh.CongestionControl.DROP, self._matched, always=False)
+        self._publisher = Publisher(
+            session,
+            key,
+            zenoh.CongestionControl.DROP,
+            self._matched,
+            always=False,
+            priority=zenoh.Priority.INTERACTIVE_HIGH if codec.is_event else zenoh.Priority.DATA,
+        )
 
     @property
     def needed(self) -> bool:

@@ -12,7 +12,7 @@ __all__ = ["Publisher"]
 
 
 class Publisher:
-    """Publishes under a key, immediately and with the highest priority.
+    """Publishes under a key, immediately.
 
     Args:
         session: The Zenoh session.
@@ -20,6 +20,7 @@ class Publisher:
         congestion: Whether a message that cannot be sent now is dropped or waits.
         changed: Is called whenever `needed` may have changed.
         always: Publish without subscribers too.
+        priority: A link has a queue for each priority, and a full queue drops messages of its own alone.
     """
 
     def __init__(
@@ -30,12 +31,13 @@ class Publisher:
         changed: Callable[[], None],
         *,
         always: bool,
+        priority: zenoh.Priority = zenoh.Priority.REAL_TIME,
     ) -> None:
         self._publisher = session.declare_publisher(
             key,
             encoding=zenoh.Encoding.APPLICATION_CDR,
             congestion_control=congestion,
-            priority=zenoh.Priority.REAL_TIME,
+            priority=priority,
             express=True,
         )
         self.needed = always

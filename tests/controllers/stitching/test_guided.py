@@ -134,6 +134,16 @@ def test_a_stitch_goes_in_any_direction(degrees, way, ends_with):
     assert world.largest < TIP_PERIOD
 
 
+def test_words_about_points_of_one_step_come_in_the_order_of_the_points():
+    world = Guided()
+    point = PointStamped(header=Header(frame_id="phantom"), point=Point(x=0.008, y=0.018, z=0.0))
+    before = len(world.said)
+    world.step(pick=(point, point))
+    picked, refused = world.said[before:]
+    assert picked == "the entry is picked, the exit is next"
+    assert refused.startswith("refused: entry and exit are 0.0 mm apart")
+
+
 def test_a_needle_that_lies_the_wrong_way_up_is_turned_over_by_the_other_hand():
     world = Guided()
     world.needle = world.needle @ np.diag([1.0, -1.0, -1.0, 1.0])
