@@ -6,9 +6,16 @@ from math import isfinite
 
 __all__ = ["label", "readable"]
 
-_SMALLER = {"m": (1e3, "mm"), "m^2": (1e6, "mm²"), "m/s": (1e3, "mm/s"), "N": (1e3, "mN"), "J": (1e3, "mJ")}
+_SMALLER = {
+    "m": (1e3, "mm"),
+    "m^2": (1e6, "mm²"),
+    "m^3": (1e9, "mm³"),
+    "m/s": (1e3, "mm/s"),
+    "N": (1e3, "mN"),
+    "J": (1e3, "mJ"),
+}
 """Factor and name of the unit for values below a limit, by SI unit."""
-_LIMIT = {"m": 1.0, "m^2": 1e-2, "m/s": 1.0, "N": 0.1, "J": 0.1}
+_LIMIT = {"m": 1.0, "m^2": 1e-2, "m^3": 1e-5, "m/s": 1.0, "N": 0.1, "J": 0.1}
 """Smallest values shown in the SI unit itself."""
 
 

@@ -23,7 +23,7 @@ from schemas.message import (
     UInt64,
     UInt64Array,
 )
-from schemas.ros import Header, Vector3
+from schemas.ros import Header, Point, Vector3
 
 __all__ = [
     "AckMessage",
@@ -51,6 +51,7 @@ __all__ = [
     "SoftBodyState",
     "SurfaceChange",
     "TaskEvent",
+    "TissueEvent",
     "TissueGrasp",
 ]
 
@@ -227,6 +228,25 @@ class TissueGrasp(Message):
     """Indices of the nodes held, or held until now."""
     force_n: Float64
     """Pull of the instrument on the tissue just before."""
+
+
+class TissueEvent(Message):
+    """A lasting change of tissue. Changes made one after the other by an instrument are one event."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/TissueEvent"
+    header: Header
+    """Time of the end of the change; frame `world`."""
+    kind: String
+    """`cut` or `torn`, with the area of the opened faces; `burnt` (coagulated, charred or vaporised), with
+    the volume.
+    """
+    instrument: String = ""
+    """Name of the probe; empty: none."""
+    position: Point = Field(default_factory=Point)
+    """Mean place of the change, m."""
+    size: Float64 = 0.0
+    """Amount, in `unit`, of the resting shape."""
+    unit: String = ""
 
 
 class TaskEvent(Message):

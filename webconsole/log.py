@@ -7,8 +7,9 @@ from typing import Any, Literal, NamedTuple
 
 from schemas.codec import decode, message_type
 from schemas.crtk import OperatingState
+from schemas.readable import readable
 from schemas.ros import DiagnosticStatus
-from schemas.trocar_msgs import ScoreCard, TaskEvent, TissueGrasp
+from schemas.trocar_msgs import ScoreCard, TaskEvent, TissueEvent, TissueGrasp
 from webconsole.source import Outlet, Value
 
 __all__ = ["LOGGED", "Entries", "Entry", "card_of"]
@@ -16,7 +17,7 @@ __all__ = ["LOGGED", "Entries", "Entry", "card_of"]
 Level = Literal["info", "warn", "error"]
 
 LOGGED = frozenset(
-    (TaskEvent.ros_type, TissueGrasp.ros_type, DiagnosticStatus.ros_type, OperatingState.ros_type)
+    one.ros_type for one in (TaskEvent, TissueEvent, TissueGrasp, DiagnosticStatus, OperatingState)
 )
 """Types of the logged messages."""
 _LEVELS: tuple[Level, ...] = ("info", "warn", "error", "error")
@@ -62,6 +63,10 @@ def _entries(outlet: Outlet, value: Value) -> Iterator[Entry]:
         about = " ".join(filter(None, (message.object, message.arm, message.place)))
         amount = f", {message.value:.3g} {message.unit}" if message.unit else ""
         yield Entry(at, "info", outlet.participant, f"{message.event}: {about}{amount}")
+    elif isinstance(message, TissueEvent):
+        organ, by = outlet.port.name.partition("/")[0], f" by {message.instrument}" * bool(message.instrument)
+        text = f"{organ} {message.kind}{by}, {readable(message.size, message.unit)}"
+        yield Entry(at, "warn" if message.kind == "torn" else "info", outlet.participant, text)
     elif isinstance(message, TissueGrasp):
         torn = message.event == "torn"
         text = f"{message.body} {message.event}, pull {message.force_n:.2g} N"

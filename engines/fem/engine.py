@@ -14,6 +14,7 @@ from engines.fem.organ import Organ, relaxation
 from engines.fem.params import FemParams
 from engines.fem.probe import Probe
 from engines.fem.spheres import MOST_CONTACTS, Spheres, near_faces
+from engines.fem.tissue_events import event_ports
 from engines.tissue.elasticity.body_yield import BodyYield
 from engines.tissue.ports import node_ports, node_states, surface_changes, surface_ports
 from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
@@ -50,10 +51,11 @@ class FemEngine(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Nodes of every organ, changed surfaces, grasps of probes with fingers, and heat of electrodes."""
+        """Nodes of every organ, changed surfaces and events, grasps of probes with fingers, and heat."""
         grasping = (name for name, probe in self.params.probes.items() if probe.grasp)
         grasps = (port for name in grasping for port in grasp_ports(name))
-        surfaces = surface_ports(self.params) if self.params.changes_surfaces else ()
+        changes = (*surface_ports(self.params), *event_ports(self.params.organs))
+        surfaces = changes if self.params.changes_surfaces else ()
         return *node_ports(self.params), *surfaces, *grasps, *heat_ports(self.params)
 
     @property
@@ -108,6 +110,8 @@ class FemEngine(Stepped):
         if self._heating is not None:
             self._heating.follow()
             outputs.update(self._heating.step(inputs, t, h))
+        if self.params.changes_surfaces:
+            outputs.update({f"{organ.name}/events": organ.events.finish(end) for organ in self._organs})
         return outputs
 
     def _pictured(self, t: int) -> dict[str, Value]:
@@ -178,6 +182,8 @@ class FemEngine(Stepped):
     def _begin(self) -> Outputs:
         """Make the probes of the bonds beside the settled organs; return the outputs at time 0."""
         outputs = self._pictured(0)
+        if self.params.changes_surfaces:
+            outputs |= {f"{organ.name}/events": () for organ in self._organs}
         self._unused = {
             port: value
             for name, probe in self.params.probes.items()
@@ -187,7 +193,8 @@ class FemEngine(Stepped):
         outputs.update(self._unused)
         bonds = [bond for bond in self.bonds if bond.name in self._bonded]
         radii = [self.params.probes[bond.name].radii for bond in bonds]
-        self._spheres = Spheres(np.concatenate([np.zeros(0), *radii]), self._sub_steps)
+        names = [bond.name for bond, own in zip(bonds, radii, strict=True) for _ in own]
+        self._spheres = Spheres(np.concatenate([np.zeros(0), *radii]), self._sub_steps, names)
         series = [relaxation(organ) for organ in self.params.organs.values()]
         first, blades = 0, list[tuple[int, int]]()
         for bond in bonds:

@@ -11,6 +11,7 @@ from xxhash import xxh3_128_digest
 from engines.fem.edges import NO_EDGES, Edges
 from engines.fem.solid import Branch, Solid, SphereWay
 from engines.fem.spheres import Spheres
+from engines.fem.tissue_events import TissueEvents
 from engines.tissue.meshing.tet_mesh import Indices
 from engines.tissue.organs.params import OrganParams
 from engines.tissue.tissue_surface import SurfaceState, TissueSurface
@@ -62,6 +63,7 @@ class Organ:
         """Faces as seen, with the kind of tissue of each."""
         self.touchable = self._touchable_faces()
         """Faces with a free node, shape (f, 3)."""
+        self.events = TissueEvents()
         self._edges = NO_EDGES
         self._slowest = params.frequencies[1]
         self._presses = self._free = np.ones(0, np.uint8)
@@ -100,6 +102,7 @@ class Organ:
         """Advance; return the force on each sphere in each sub-step, N, shape (k, n, 3)."""
         forces = self.solid.advance(seconds, self._way, self.friction, gravity)
         if self.solid.counts[1] != len(self.surface.faces):
+            self._note_opened("cut", np.unique(self._edges.ends))
             self._note_change()
         return forces
 
@@ -107,6 +110,7 @@ class Organ:
         """Open faces that are stretched beyond the limit of the tissue, if there is one."""
         limit = None if self._cutting is None else self._cutting.tear_stretch
         if limit is not None and self.solid.tear(limit):
+            self._note_opened("torn", np.unique(self.solid.holder[self.held]))
             self._note_change()
 
     def remove(self, elements: Indices) -> None:
@@ -155,6 +159,17 @@ class Organ:
             )
             self.remove(elements)
 
+    def _note_opened(self, kind: str, spheres: NDArray[np.int32]) -> None:
+        """Note the newly opened faces as an event of the nearest of these spheres."""
+        opened = self.solid.faces[len(self.surface.faces) :]
+        areas, places = self.solid.areas(opened), self.solid.nodes[opened].mean(axis=1)
+        self.events.add(kind, 0.5 * areas, places, self._spheres.nearest(places, spheres))  # two sides each
+
+    def note_burnt(self, elements: Indices, volumes: Vector, spheres: NDArray[np.int64]) -> None:
+        """Note elements with volumes (m^3, shape (n,)) as burnt by the nearest of these spheres."""
+        places = self.solid.nodes[self.solid.tetrahedra[elements]].mean(axis=1)
+        self.events.add("burnt", volumes, places, self._spheres.nearest(places, spheres))
+
     def _note_change(self) -> None:
         """Bring surface, nodes and touchable faces up to date."""
         self.surface.follow(self.solid.faces, self.solid.origin)
@@ -181,6 +196,7 @@ class Organ:
 
     def meet(self, spheres: Spheres, blades: Sequence[tuple[int, int]] = ()) -> None:
         """Let these spheres press the organ, and blades between some of them cut it, if it may be cut."""
+        self._spheres, self.events = spheres, TissueEvents(spheres.probes)
         self._presses = np.ones(len(spheres.radii), np.uint8)
         if self._cutting is not None and blades:
             self._presses[np.unique(blades)] = 0  # ends of blades pass through
@@ -204,6 +220,7 @@ class Organ:
         yield from self.solid.state
         yield self._free
         yield from self._edges.state
+        yield from self.events.state
         yield from self.surface.state
 
     def restore(self, parts: Iterator[bytes]) -> None:
@@ -212,6 +229,7 @@ class Organ:
         self.solid.counts = nodes, faces
         for array in (*self.solid.state, self._free, *self._edges.state):
             array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
+        self.events.restore(parts)
         version, faces, kinds, origins = (
             np.frombuffer(next(parts), kept.dtype).reshape(-1, *kept.shape[1:]) for kept in self.surface.state
         )

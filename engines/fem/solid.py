@@ -221,6 +221,12 @@ class Solid:
         n = self._compiled.counts[0]
         return self.middle + self._rest[:n, :3].astype(np.float64) + self._displacement[:n, :3]
 
+    def areas(self, faces: NDArray[np.integer]) -> Vector:
+        """Return the resting areas of faces, m^2, shape (f,)."""
+        corners = self._rest[faces, :3].astype(np.float64)
+        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        return 0.5 * np.linalg.norm(np.cross(u, v), axis=1)
+
     @property
     def holder(self) -> NDArray[np.int32]:
         """Number of the sphere that holds a node, or -1, shape (n,)."""

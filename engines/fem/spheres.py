@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from engines.tissue.meshing.tet_mesh import Indices
 from engines.tissue.probes.near_faces import NearFaces
@@ -20,13 +23,22 @@ _PAIRS = 1024
 class Spheres:
     """Arrays that every step writes anew."""
 
-    def __init__(self, radii: Vector, sub_steps: int) -> None:
+    def __init__(self, radii: Vector, sub_steps: int, probes: Sequence[str] = ()) -> None:
         """`radii`: of all spheres, m, shape (n,); `sub_steps`: their number k in a step."""
         self.radii = radii
+        self.probes = probes
+        """Name of the probe of every sphere."""
         self.path: Vector = np.zeros((sub_steps + 1, len(radii), 3))
         """Centres at the ends of the sub-steps, m, in `world`, shape (k + 1, n, 3)."""
         self.forces: Vector = np.zeros((sub_steps, len(radii), 3))
         """Force of the tissue in each sub-step, N, shape (k, n, 3)."""
+
+    def nearest(self, places: Vector, among: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Return the sphere `among` these nearest to each place (m, shape (n, 3)); -1 if there is none."""
+        if not len(among):
+            return np.full(len(places), -1)
+        away = np.linalg.norm(places[:, None] - self.path[-1][among], axis=2)
+        return among[away.argmin(axis=1)].astype(np.int64)
 
 
 def near_faces(

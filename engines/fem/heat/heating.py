@@ -45,6 +45,11 @@ class ElectrodeSpheres(Protocol):
         ...
 
     @property
+    def bodies(self) -> Sequence[int]:
+        """The engine's number of every sphere."""
+        ...
+
+    @property
     def radii(self) -> Vector:
         """m, shape (n,)."""
         ...
@@ -82,6 +87,10 @@ class Heating:
             for probe in probes
             if (energy := params.probes[probe.name].energy)
         ]
+        self._electrodes = np.array(
+            [sphere for _, probe in self._instruments for sphere in probe.bodies], np.int64
+        )
+        """Spheres with power, by the engine's number."""
         self._edge = max(organ.mean_edge for organ in organs)
         self._elapsed = np.zeros(1)
         """Time since the last step of heat, s."""
@@ -101,9 +110,10 @@ class Heating:
         self._elapsed[:] = 0.0
         power = self._power(seconds)
         for i, heat in enumerate(self.heats):
+            burnt = heat.kinds > 0
             self._smoke[i] = 1e3 / seconds * heat.advance(seconds, power[i] if power else None)
             if not heat.is_cold:
-                self._burn(self._organs[i], heat)
+                self._burn(self._organs[i], heat, burnt)
         return self.outputs
 
     def follow(self) -> None:
@@ -147,8 +157,11 @@ class Heating:
             *(array for heat in self.heats for array in heat.state),
         )
 
-    def _burn(self, organ: Organ, heat: Heat) -> None:
+    def _burn(self, organ: Organ, heat: Heat, was_burnt: NDArray[np.bool_]) -> None:
         """Show burnt tissue, and let vaporised elements go, if the organ may be divided."""
+        fresh = np.flatnonzero((heat.kinds > 0) & ~was_burnt)
+        if fresh.size:
+            organ.note_burnt(fresh, organ.solid.elements[2][fresh], self._electrodes)
         vaporised = heat.vaporised()
         if len(vaporised) and organ.solid.divisible:
             organ.remove(vaporised)

@@ -151,12 +151,12 @@ def test_a_sphere_shot_through_ends_with_a_word_or_not_at_all(speed):
 class Jaw:
     """Two fingers of three spheres that point down, apart along x."""
 
-    def __init__(self, **grasp):
-        slab = {"size": ["60 mm", "40 mm", "12 mm"], "young_modulus": "10 kPa", "nodes": 150}
+    def __init__(self, organ=None, **grasp):
+        slab = {"size": ["60 mm", "40 mm", "12 mm"], "young_modulus": "10 kPa", "nodes": 150} | (organ or {})
         probe = {"spheres": 6, "radius": "2 mm", "grasp": grasp}
         self.engine = FemEngine("tissue", params(slab, probe, node_period="1 ms"))
         self.outputs = dict(self.engine.configure(Setup(MS, Path(), {"probe": IMPULSE})))
-        self.t, self.events = 0, []
+        self.t, self.events, self.tissue_events = 0, [], []
 
     def spheres(self, height, opening):
         return np.array(
@@ -173,6 +173,7 @@ class Jaw:
             self.outputs |= self.engine.step(self.t, MS, inputs)
             self.t += MS
             self.events += [event.event for event in self.outputs["probe/events"]]
+            self.tissue_events += self.outputs.get("block/events", ())
         return self
 
     def take(self):

@@ -32,8 +32,14 @@ class CauteryRig(FemRig):
 
     def __init__(self, slab=SLAB, start=ON_SLAB, **energy):
         super().__init__(params(slab, cautery(**energy)), start=start)
-        self.watts = np.zeros(1)
+        self.watts, self.events = np.zeros(1), []
         self.inputs = Inputs({"probe/pose": self.pose, "probe/twist": self.twist, "probe/energy": self.watts})
+
+    def follow(self, motion, seconds):
+        for i in range(round(seconds * 1e9 / self.period)):
+            t = i * self.period * 1e-9
+            super().follow(lambda dt, t=t: motion(t + dt), self.period * 1e-9)
+            self.events += self.outputs["block/events"]
 
     @property
     def heat(self):
@@ -114,7 +120,7 @@ def test_a_moving_hook_leaves_a_coagulated_track():
         rig.watts[:] = 30.0
         rig.move((5e-3, 0.0, ON_SLAB[2]), 2.0)
         rig.watts[:] = 0.0
-        rig.hold(0.05)
+        rig.hold(0.2)
         assert rig.number("probe/delivered") == pytest.approx(30.0, rel=0.02)
         assert rig.number("block/hottest") > 60.0
         heat = rig.heat
@@ -124,6 +130,9 @@ def test_a_moving_hook_leaves_a_coagulated_track():
         burnt = (heat.kinds >= FaceKind.COAGULATED) & (np.abs(middles[:, 0]) < 4e-3)
         assert 0.15e-3 < -middles[burnt, 2].min() < 2.7e-3
         assert 0.15e-3 < np.abs(middles[burnt, 1]).max() < 2.7e-3
+        assert {(one.kind, one.instrument, one.unit) for one in rig.events} == {("burnt", "probe", "m^3")}
+        volume = rig.engine._organs[0].solid.elements[2][heat.kinds > 0].sum()
+        assert sum(one.size for one in rig.events) == pytest.approx(volume, rel=1e-6)
 
 
 def test_a_burn_is_saved_and_restored_to_the_bit():

@@ -1,0 +1,97 @@
+"""Events of an organ: cut, torn and burnt tissue, gathered along the way of an instrument."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hub.participant import event_out
+from schemas.ports import Port
+from schemas.ros import Header, Point, Time
+from schemas.trocar_msgs import TissueEvent
+from schemas.vectors import Vector
+
+__all__ = ["TissueEvents", "event_ports"]
+
+_UNITS = {"cut": "m^2", "torn": "m^2", "burnt": "m^3"}
+"""Unit of the size by kind."""
+_KINDS = tuple(_UNITS)
+_PAUSE_NS = 100_000_000
+"""Time without a change that ends an event."""
+_LONGEST_NS = 500_000_000
+"""Longest time from the first to the last change of an event."""
+_NONE = -1
+"""Time of no change."""
+
+
+def event_ports(organs: Iterable[str]) -> tuple[Port, ...]:
+    """Return the ports of the events of organs."""
+    return tuple(
+        event_out(f"{organ}/events", TissueEvent, "tissue that was cut, torn or burnt", frame="world")
+        for organ in organs
+    )
+
+
+class TissueEvents:
+    """Changes summed by kind and instrument; a sum is an event after a pause, at the latest after 0.5 s."""
+
+    def __init__(self, probes: Sequence[str] = ()) -> None:
+        """`probes`: the probe of every sphere."""
+        self._names = [*dict.fromkeys(probes), ""]
+        self._number = np.array([self._names.index(probe) for probe in (*probes, "")])
+        """Number of the instrument of every sphere; the last is that of none."""
+        rows = len(_KINDS), len(self._names)
+        self._sums: Vector = np.zeros((*rows, 4))
+        """Size, and sum of sizes times places (m), by kind and instrument."""
+        self._times: NDArray[np.int64] = np.full((*rows, 2), _NONE)
+        """First and last change, ns."""
+        self._is_fresh: NDArray[np.bool_] = np.zeros(rows, np.bool_)
+        """Changes of the present step."""
+
+    def add(self, kind: str, sizes: Vector, places: Vector, spheres: NDArray[np.integer]) -> None:
+        """Add changes of the present step.
+
+        sizes: shape (n,). places: m, in `world`, shape (n, 3). spheres: number of the acting sphere, -1 for
+        none, shape (n,).
+        """
+        row, instruments = _KINDS.index(kind), self._number[spheres]
+        np.add.at(self._sums[row], instruments, np.column_stack([sizes, sizes[:, None] * places]))
+        self._is_fresh[row, instruments] = True
+
+    def finish(self, time_ns: int) -> tuple[TissueEvent, ...]:
+        """End the step at `time_ns`; return the events that are over."""
+        first, last = self._times[..., 0], self._times[..., 1]
+        if self._is_fresh.any():
+            first[self._is_fresh & (first == _NONE)] = time_ns
+            last[self._is_fresh] = time_ns
+            self._is_fresh[:] = False
+        over = (first != _NONE) & ((time_ns - last >= _PAUSE_NS) | (time_ns - first >= _LONGEST_NS))
+        if not over.any():
+            return ()
+        events = tuple(self._event(row, instrument) for row, instrument in np.argwhere(over).tolist())
+        self._sums[over], self._times[over] = 0.0, _NONE
+        return events
+
+    def _event(self, row: int, instrument: int) -> TissueEvent:
+        size = float(self._sums[row, instrument, 0])
+        x, y, z = (self._sums[row, instrument, 1:] / size).tolist()
+        return TissueEvent(
+            header=Header(stamp=Time.from_ns(int(self._times[row, instrument, 1])), frame_id="world"),
+            kind=_KINDS[row],
+            instrument=self._names[instrument],
+            position=Point(x=x, y=y, z=z),
+            size=size,
+            unit=_UNITS[_KINDS[row]],
+        )
+
+    @property
+    def state(self) -> tuple[NDArray[np.generic], ...]:
+        """Sums and times between steps, to be written."""
+        return self._sums, self._times
+
+    def restore(self, parts: Iterator[bytes]) -> None:
+        """Go back to a saved `state`."""
+        for array in (self._sums, self._times):
+            array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
