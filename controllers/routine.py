@@ -1,8 +1,8 @@
 """A scripted procedure: CRTK commands to the motion controller, in sequence or at the same time.
 
 The routine is a client like any other: it sends a command, waits until the arm's operating state was busy
-and is not busy any more, and continues. A refused command, with an event on the arm's `error` or `warning`,
-ends the session with the text of that event.
+and is not busy any more, and continues. Speeds and power are set at once. A refused command, with
+an event on the arm's `error` or `warning`, ends the session with the text of that event.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from schemas.crtk import OperatingState, StringStamped
 from schemas.errors import SessionError
 from schemas.message import Message
 from schemas.ports import Port
-from schemas.quantity import Angle, Duration, Length
+from schemas.quantity import Angle, Duration, Length, Power
 from schemas.ros import (
     Float64Message,
     Header,
@@ -120,6 +120,29 @@ class ChangeState(_Command):
         return f"{self.arm}/state_command", StringStamped(string=self.command)
 
 
+class SetSpeed(_Command):
+    """Let the moves of an arm have a share of its largest speeds from now on; done at once."""
+
+    do: Literal["speed"]
+    share: float = Field(gt=0, le=1)
+
+    def message(self) -> tuple[str, Message]:
+        """Return port and message."""
+        return f"{self.arm}/trajectory_j/set_ratio_v", Float64Message(data=self.share)
+
+
+class SetPower(_Command):
+    """Let the generator of an energy instrument give a power from now on, 0 to stop; done at once."""
+
+    do: Literal["energy"]
+    power: Power = Field(ge=0, le=400)
+
+    @property
+    def port(self) -> str:
+        """Output with the power."""
+        return f"{self.arm}/energy"
+
+
 class Wait(Params):
     """Wait."""
 
@@ -138,7 +161,8 @@ class Together(Params):
 
 
 Step = Annotated[
-    MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | Wait | Together, Field(discriminator="do")
+    MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | SetSpeed | SetPower | Wait | Together,
+    Field(discriminator="do"),
 ]
 
 
@@ -182,11 +206,14 @@ class Routine(Controller):
         )
         self._now = RoutineState(arms=len(self._arms))
         self._busy = self._now.busy
-        self.keep(self._now)
+        self._powers = {step.port: np.zeros(1) for step in params.steps if isinstance(step, SetPower)}
+        """Power of every generator, W, by output."""
+        self.keep(self._now, *self._powers.values())
         self._outputs: dict[str, Any] = {
             "step": self._now.part("step"),
             "done": self._now.part("done"),
             **dict.fromkeys(self._commands, ()),
+            **self._powers,
         }
 
     @property
@@ -205,6 +232,7 @@ class Routine(Controller):
         return (
             *(event_in(f"{arm}/{name}", type_) for arm in self._arms for name, type_ in events),
             *(event_out(name, types[name]) for name in self._commands),
+            *(signal_out(name, description="power of the generator", unit="W") for name in self._powers),
             signal_out("step", Float64Message, "number of the present step, from 0"),
             signal_out("done", Float64Message, "1 when all steps are done"),
         )
@@ -234,10 +262,12 @@ class Routine(Controller):
 
     def _begin(self, step: Step, t: int) -> None:
         self._now.begun_ns = t
+        if isinstance(step, SetPower):
+            self._powers[step.port][0] = step.power
         for command in _commands(step):
             port, message = command.message()
             self._outputs[port] += (message,)
-            self._busy[self._arms.index(command.arm)] = 1.0
+            self._busy[self._arms.index(command.arm)] = 0.0 if isinstance(command, SetSpeed) else 1.0
 
     def _receive(self, inputs: Inputs) -> None:
         for i, arm in enumerate(self._arms):
@@ -252,6 +282,8 @@ class Routine(Controller):
                     self._busy[i] = 2.0 if busy else 0.0 if self._busy[i] == 2.0 else 1.0
 
     def _is_over(self, step: Step, t: int) -> bool:
+        if isinstance(step, SetPower):
+            return True
         if isinstance(step, Wait):
             return t - self._now.begun_ns >= step.time
         if t - self._now.begun_ns > self.params.limit:
@@ -263,9 +295,9 @@ class Routine(Controller):
         return not self._busy.any()
 
 
-def _commands(step: Step) -> Iterator[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState]:
+def _commands(step: Step) -> Iterator[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | SetSpeed]:
     """Yield the commands of a step."""
     if isinstance(step, Together):
         yield from step.orders
-    elif not isinstance(step, Wait):
+    elif not isinstance(step, Wait | SetPower):
         yield step

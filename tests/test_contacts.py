@@ -7,6 +7,8 @@ import trocar
 from hub.planning.contacts import missing_contacts
 from hub.planning.scenario_file import installed_scenarios, load
 from robots import rotation
+from robots.dvrk.end_effectors.electrode import Electrode
+from robots.dvrk.instruments import instrument
 from schemas.errors import ScenarioError, SessionError
 
 TOUCHES = """\
@@ -76,12 +78,35 @@ def test_a_scenario_with_its_contacts_made_gets_no_more(write):
             "scene.arms.PSM1.touches=[livre]",
             "PSM1.touches: there is no organ 'livre'.*'liver'",
         ),
-        ("scene.arms.PSM1.instrument=PERMANENT_CAUTERY_HOOK_400183", "has no contact spheres"),
     ],
 )
 def test_a_contact_that_cannot_be_made_is_refused(write, change, problem):
     with pytest.raises(ScenarioError, match=problem):
         load(write(TOUCHES), [change])
+
+
+def test_an_instrument_without_spheres_touches_nothing(write, monkeypatch):
+    monkeypatch.setattr(Electrode, "spheres", lambda self, tip: ())
+    instrument("400184").__dict__.pop("spheres", None)
+    with pytest.raises(ScenarioError, match="has no contact spheres"):
+        load(write(TOUCHES), ["scene.arms.PSM1.instrument=PERMANENT_CAUTERY_SPATULA_400184"])
+    instrument("400184").__dict__.pop("spheres", None)
+
+
+@pytest.mark.parametrize(
+    ("number", "mode", "spheres"),
+    [("400183", "monopolar", 3), ("400179", "monopolar", 6), ("400172", "bipolar", 8)],
+)
+def test_an_energy_instrument_heats_tissue_of_our_own_without_a_word(write, number, mode, spheres):
+    change = [f"scene.arms.PSM1.instrument='{number}'"]
+    fem = load(write(TOUCHES), [*change, "participants.tissue.kind=fem"])
+    (probe,) = fem.params["tissue"].probes.values()
+    assert (probe.energy.mode, probe.spheres) == (mode, spheres)
+    (probe,) = load(write(TOUCHES), change).params["tissue"].probes.values()
+    assert probe.energy is None, "tissue in Bullet knows no heat"
+    cold = [*change, "participants.tissue.kind=fem", "participants.tissue.probes={PSM1: {energy: null}}"]
+    (probe,) = load(write(TOUCHES), cold).params["tissue"].probes.values()
+    assert probe.energy is None
 
 
 def test_an_instrument_that_passes_through_is_named_with_lines_to_add(write):

@@ -63,12 +63,17 @@ class DvrkConsole(Controller):
         self._state.enabled = params.enabled
         for component in self._components.values():
             component.state.selected = not self._rival_components(component)
+        self._powers = {arm: np.zeros(1) for arm in params.energy}
+        """Power of every generator, W."""
         self.keep(
             self._state,
             self._readiness.state,
             *(component.state for component in self._components.values()),
+            *self._powers.values(),
         )
         self._outputs = self._events.outputs
+        for arm, power in self._powers.items():
+            self._outputs[f"{arm}/energy"] = power
         for name, component in self._components.items():
             self._outputs |= {
                 f"teleop/{name}/scale": component.state.part("scale"),
@@ -98,6 +103,9 @@ class DvrkConsole(Controller):
             self._execute_system_commands(inputs)
             self._execute_commands(inputs)
             self._read_pedals(inputs)
+        if not self._state.operator_present:
+            for power in self._powers.values():
+                power[:] = 0.0
         self._lead_camera()
         for component in self._components.values():
             component.step(
@@ -148,8 +156,9 @@ class DvrkConsole(Controller):
 
     def _read_pedals(self, inputs: Inputs) -> None:
         for pedal in PEDALS.events:
-            for joy in inputs.events(f"pedals/{pedal}"):
+            for joy in cast("tuple[Joy, ...]", inputs.events(f"pedals/{pedal}")):
                 self._events.publish(f"footpedals/{pedal}", joy)
+                self._set_powers(pedal, joy)
         for button, pedal in _BUTTONS.items():
             for joy in cast(
                 "tuple[Joy, ...]",
@@ -164,6 +173,13 @@ class DvrkConsole(Controller):
                 if joy.buttons[0] != _TAP:
                     setattr(self._state, button, joy.buttons[0] != 0)
                 self._events.publish(f"console/{button}", joy)
+
+    def _set_powers(self, pedal: str, joy: Joy) -> None:
+        """Let the generators of a pedal give their power while the pedal is held."""
+        held = joy.buttons.size > 0 and joy.buttons[0] == 1
+        for arm, generator in self.params.energy.items():
+            if generator.pedal == pedal:
+                self._powers[arm][0] = generator.power if held else 0.0
 
     def _enable_teleoperation(self, *, enabled: bool) -> None:
         self._state.enabled = enabled

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from hub.participant import Params
 from robots.dvrk.setup_joints import CartArm
+from schemas.quantity import Power
 
-__all__ = ["ComponentName", "DvrkConsoleParams"]
+__all__ = ["ComponentName", "DvrkConsoleParams", "GeneratorParams"]
 
 ComponentName = Annotated[str, Field(pattern=r"^MTM[LR]_PSM[123]$")]
 """A master and its arm: `MTMR_PSM1`."""
+
+
+class GeneratorParams(BaseModel):
+    """The output of an electrosurgical generator for the instrument of an arm."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    pedal: Literal["coag", "bicoag"] = Field(
+        default="coag", description="gives the power while pressed: coag for monopolar, bicoag for bipolar"
+    )
+    power: Power = Field(default=30.0, gt=0, le=400)
 
 
 class DvrkConsoleParams(Params):
@@ -29,6 +41,10 @@ class DvrkConsoleParams(Params):
             "a master and the arm that it leads, such as MTMR_PSM1; of those that share a master or an arm"
             " the first is selected at time 0"
         ),
+    )
+    energy: dict[CartArm, GeneratorParams] = Field(
+        default={},
+        description="generators of arms with energy instruments, led by pedals: outputs `<arm>/energy`, W",
     )
     scale: float = Field(
         default=0.2, gt=0.0, le=1.0, description="metres of the tip per metre of the master at time 0"

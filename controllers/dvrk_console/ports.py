@@ -26,6 +26,7 @@ NO_GRIPPER = -pi
 
 _SYSTEM_COMMANDS = ("power_on", "power_off", "home", "set_volume")
 """A hub has no loudspeaker: the remaining commands of a dVRK's system are sounds."""
+_POWER = "of the generator, while the pedal is pressed and an operator is present"
 _MASTER_COMMANDS = {
     name: (crtk.COMMANDS | crtk.MTM_COMMANDS)[name]
     for name in (
@@ -78,6 +79,7 @@ def console_ports(params: DvrkConsoleParams) -> tuple[Port, ...]:
         *_events_in(commands),
         *(event_in(f"{arm}/operating_state", OperatingState) for arm in params.arms),
         *_events_out(events),
+        *(signal_out(f"{arm}/energy", description=_POWER, unit="W") for arm in params.energy),
         *(event_out(f"{arm}/state_command", StringStamped) for arm in params.arms),
         event_out("teleop/ECM/buttons", BUTTON, "button 0: the camera pedal leads the endoscope"),
         *(port for master in masters for port in _master(master)),

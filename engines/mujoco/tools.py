@@ -22,6 +22,7 @@ def instrument_tool(arm: str, mounted: MountedPsm, base: Vector) -> Tool:
         radii = [sphere.radius for sphere in spheres]
         probe = {"spheres": len(spheres), "radius": radii[0] if len(set(radii)) == 1 else radii}
         probe |= {} if mounted.tool.jaw is None else {"grasp": {}}
+        probe |= {"energy": {"mode": mounted.tool.energy}} if mounted.tool.energy else {}
     return Tool(
         name=arm,
         touches=mounted.touches,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ class Tool:
     bond: str
     """Motion side of the contact; empty for a tool without contact."""
     probe: Mapping[str, Any]
-    """Parameters of a probe for the tool: spheres, radius, grasp."""
+    """Parameters of a probe for the tool: spheres, radius, grasp, energy."""
     tip: str
     """Output with the pose of the tip in the arm's base frame."""
     base: Vector
@@ -68,6 +68,9 @@ class TissueParams(Params):
     The kind has a parameter `probes` by name, each the force side of a bond of the same name. A probe touches
     all bodies of the participant.
     """
+
+    unused_of_tools: ClassVar[frozenset[str]] = frozenset()
+    """Parameters of a tool's probe without meaning in this kind: planning leaves them out."""
 
     @property
     @abstractmethod

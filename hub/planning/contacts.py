@@ -51,7 +51,8 @@ def add_contacts(source: Source, params: Mapping[str, Params]) -> list[str]:
         if not tool.bond:
             raise ScenarioError("this instrument has no contact spheres: it touches nothing", path=path)
         tissue = _tissue_of(tool, params, path)
-        _add_probe(source.tree["participants"][tissue], tool)
+        home = cast("TissueParams", params[tissue])
+        _add_probe(source.tree["participants"][tissue], tool, home.unused_of_tools)
         bonds = cast("list[Any]", source.tree.get("bonds") or [])
         source.tree["bonds"] = bonds
         source.stands_also_at(path, ("bonds", len(bonds)))
@@ -94,9 +95,10 @@ def _tissue_of(tool: Tool, params: Mapping[str, Params], path: tuple[str | int, 
     return found[0]
 
 
-def _add_probe(tissue: dict[str, Any], tool: Tool) -> None:
+def _add_probe(tissue: dict[str, Any], tool: Tool, unused: frozenset[str]) -> None:
     probes = cast("dict[str, Any]", tissue.get("probes") or {})
-    tissue["probes"] = probes | {tool.name: merge_missing(dict(tool.probe), probes.get(tool.name) or {})}
+    own = {key: value for key, value in tool.probe.items() if key not in unused}
+    tissue["probes"] = probes | {tool.name: merge_missing(own, probes.get(tool.name) or {})}
 
 
 def _is_bonded(bonds: Any, robot: str, tool: Tool) -> bool:

@@ -14,7 +14,7 @@ from functools import cache, cached_property
 from importlib.resources import files
 from math import radians
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -56,6 +56,9 @@ Maryland ones, 172).
 
 _OTHER_JAW_LENGTH = _JAW_LENGTHS["049"]
 """Length of jaws without a public model (m): the length of the Cadiere forceps."""
+
+_FOOT = 0.003
+"""Length of the bent end of a cautery hook, m; assumed. A spatula's end is straight."""
 
 _PROBE = "palpation-probe"
 """A steel sphere centred on the tip frame in place of the jaws of a large needle driver 400006."""
@@ -105,6 +108,16 @@ class Instrument:
     def has_snake_wrist(self) -> bool:
         """Whether the instrument is a 5 mm tool, with four bending joints instead of wrist pitch and yaw."""
         return len(self.joints) > 3
+
+    @property
+    def energy(self) -> Literal["monopolar", "bipolar"] | None:
+        """Path of the current of an electrosurgical instrument, by its name.
+
+        From the whole bare tip, or both jaws, to a far plate; or from jaw to jaw.
+        """
+        if "BIPOLAR" in self.name:
+            return "bipolar"
+        return "monopolar" if "MONOPOLAR" in self.name or "CAUTERY" in self.name else None
 
     @property
     def jaw(self) -> Jaw | None:
@@ -184,12 +197,13 @@ def _from_data(name: str, row: dict[str, Any], data: dict[str, Any]) -> Instrume
     number = next(word for word in name.split("_") if word.isdigit() and len(word) == 6)
     coupling = np.array(data["actuator_to_joint"][row["actuator_to_joint"]])
     jaw = Jaw(*_jaw_numbers(number, row, coupling))
+    electrode = Electrode(foot=_FOOT if "HOOK" in name else 0.0)
     return Instrument(
         name,
         number,
         tuple(_tool_joint(*cells) for cells in row["joints"]),
         np.vstack([data["tips"][row["tip"]], [0.0, 0.0, 0.0, 1.0]]),
-        jaw if jaw.effort else Electrode(),
+        jaw if jaw.effort else electrode,
         coupling,
         row["source"],
     )

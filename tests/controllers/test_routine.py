@@ -118,3 +118,17 @@ def test_a_jaw_with_a_roller_is_told_two_angles():
     port, message = step.message()
     assert port == "PSM1/jaw/move_jp"
     assert message.position == pytest.approx(np.radians([-20, 90]))
+
+
+def test_power_lasts_from_its_order_to_the_next_one(tmp_path):
+    watts = [{"do": "energy", "arm": "PSM1", "power": power} for power in ("30 W", 0)]
+    run = Run(tmp_path, [watts[0], {"do": "wait", "time": "3 ms"}, watts[1]])
+    found = []
+    for _ in range(9):
+        run.step()
+        found.append(float(run.outputs["PSM1/energy"][0]))
+    assert found[:5] == [30.0] * 5
+    assert found[-1] == 0.0
+    assert run.outputs["done"][0] == 1.0
+    with pytest.raises(ValidationError, match="400"):
+        RoutineParams.model_validate({"steps": [watts[0] | {"power": "1 kW"}]})

@@ -66,3 +66,31 @@ def test_what_does_not_open_has_no_jaw(name):
 def test_an_unknown_instrument_is_refused_with_what_is_near(word, meant):
     with pytest.raises(MotionError, match=f"no instrument '{word}'. Did you mean '{meant}'"):
         instrument(word)
+
+
+def test_a_hook_touches_from_heel_to_tip_and_a_spatula_along_its_end():
+    hook, spatula = instrument("400183").spheres, instrument("400184").spheres
+    places = np.array([sphere.position for sphere in hook])
+    assert np.ptp(places[:, 2]) == pytest.approx(0.003 - 2 * hook[0].radius)
+    assert np.ptp(places[:, :2], axis=0) == pytest.approx([0, 0], abs=1e-12)
+    along = np.array([sphere.position for sphere in spatula])
+    assert np.ptp(along[:, 2]) == pytest.approx(0.0, abs=1e-12)
+    for spheres in (hook, spatula):
+        ends = [np.linalg.norm(np.array(sphere.position)[:2]) + sphere.radius for sphere in spheres]
+        assert max(ends) == pytest.approx(0.0155)
+
+
+@pytest.mark.parametrize(
+    ("number", "energy"),
+    [
+        ("400183", "monopolar"),
+        ("420184", "monopolar"),
+        ("400179", "monopolar"),
+        ("400172", "bipolar"),
+        ("420205", "bipolar"),
+        ("400178", None),
+        ("400049", None),
+    ],
+)
+def test_energy_instruments_are_known_by_their_names(number, energy):
+    assert instrument(number).energy == energy

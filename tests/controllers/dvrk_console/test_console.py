@@ -270,6 +270,21 @@ def test_what_makes_no_sense_is_refused_in_words(port, message, words):
     assert words in Rig().step({port: message}).said("console/warning")[0]
 
 
+def test_a_pedal_gives_power_while_it_is_held_and_an_operator_is_there():
+    rig = Rig(energy={"PSM1": {"power": "25 W"}, "PSM2": {"pedal": "bicoag"}})
+    watts = lambda: [float(rig.outputs[f"{arm}/energy"][0]) for arm in ("PSM1", "PSM2")]  # noqa: E731
+    assert watts() == [0.0, 0.0]
+    rig.step({"pedals/coag": DOWN})
+    assert watts() == [0.0, 0.0]
+    rig.step({"console/emulate_operator_present": DOWN}).step({"pedals/coag": DOWN})
+    assert watts() == [25.0, 0.0]
+    assert rig.buttons("footpedals/coag") == [[1]]
+    rig.step({"pedals/coag": UP, "pedals/bicoag": DOWN})
+    assert watts() == [0.0, 30.0]
+    rig.step({"console/emulate_operator_present": UP})
+    assert watts() == [0.0, 0.0]
+
+
 def test_a_teleoperation_of_an_arm_that_is_not_there_is_refused():
     with pytest.raises(ValueError, match="'MTMR_PSM1' leads PSM1, which is not among the arms: PSM2"):
         DvrkConsoleParams.model_validate({"arms": ["PSM2"], "teleoperations": ["MTMR_PSM1"]})
