@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -19,6 +19,8 @@ _LONGEST_NS, _HALVES = 1_000_000, 4
 
 class BulletParams(PressedOrgansParams):
     """Tissue in Bullet."""
+
+    unused_of_tools: ClassVar[frozenset[str]] = frozenset({"energy"})
 
     timestep: Duration | None = Field(
         default=None,
@@ -64,6 +66,10 @@ class BulletParams(PressedOrgansParams):
             if probe.blades:
                 raise ValueError(f"probe '{name}': blades cut tissue of kind fem only; leave them out here")
         for name, organ in self.organs.items():
+            if organ.layers:
+                raise ValueError(
+                    f"organ '{name}': only tissue of kind fem has layers; leave `layers` out here"
+                )
             if organ.cutting is not None:
                 raise ValueError(f"organ '{name}': only tissue of kind fem is cut; leave `cutting` out here")
         return self

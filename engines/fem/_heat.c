@@ -24,6 +24,7 @@ typedef struct {
     double perfusion;         /* W/(m^3 K) */
     double latent;            /* heat of all water, J/m^3 */
     double residue;           /* capacity of the dry residue, J/(m^3 K) */
+    double dry_mass;          /* kg/m^3 */
     double body;              /* temperature of the body, degrees C */
     double boiling;           /* rises, K */
     double charring;
@@ -36,11 +37,13 @@ typedef struct {
     double given, perfused, boiled; /* J */
     double vaporised;               /* m^3 */
     double hottest;                 /* K, of nodes and dry elements at the end */
+    double ash;                     /* dry mass of what was vaporised, kg */
 } Book;
 
 typedef struct {
     int nodes, elements;
     const int32_t *corners;   /* (elements, 4) */
+    const uint8_t *kind;      /* (elements,): number of the tissue */
     const float *conductance; /* (elements, 6): between corners 01 02 03 12 13 23, W/K */
     const float *volume;      /* (elements,): 0 of an element that is no more */
     const float *capacity;    /* (nodes,), J/K */
@@ -105,15 +108,16 @@ static float absorb(const Body *body, const Tissue *tissue, int e, float mean, f
     if (mean + now > (float)tissue->vaporising && body->stage[e] != VAPORISED) {
         body->stage[e] = VAPORISED;
         book->vaporised += (double)volume;
+        book->ash += tissue->dry_mass * (double)volume;
     }
     return conductance * now;
 }
 
 /* Set the flow of heat into every node, W. */
-static void set_flows(const Body *body, const Tissue *tissue, float seconds, Book *book)
+static void set_flows(const Body *body, const Tissue *tissues, float seconds, Book *book)
 {
     const double *rise = body->rise;
-    float *flow = body->flow, perfusion = (float)(0.25 * tissue->perfusion);
+    float *flow = body->flow;
     memset(flow, 0, sizeof(float) * (size_t)body->nodes);
     for (int e = 0; e < body->elements; e++) {
         const int32_t *at = body->corners + 4 * (size_t)e;
@@ -123,6 +127,8 @@ static void set_flows(const Body *body, const Tissue *tissue, float seconds, Boo
         if (body->volume[e] == 0.0f || (T[0] == 0.0f && T[1] == 0.0f && T[2] == 0.0f && T[3] == 0.0f &&
                                         body->power[e] == 0.0f && body->excess[e] == 0.0f))
             continue;
+        const Tissue *tissue = tissues + body->kind[e];
+        float perfusion = (float)(0.25 * tissue->perfusion);
         for (int k = 0; k < 6; k++) {
             int a = PAIR[k][0], b = PAIR[k][1];
             float through = conductance[k] * (T[a] - T[b]);
@@ -149,7 +155,7 @@ static void set_flows(const Body *body, const Tissue *tissue, float seconds, Boo
 }
 
 /* Let nodes above boiling give their heat to the water of the elements around, in shares of the volume. */
-static void boil_off(const Body *body, const Tissue *tissue, Book *book)
+static void boil_off(const Body *body, const Tissue *tissues, Book *book)
 {
     float *wet = body->flow, *taken = body->flow + body->nodes;
     memset(wet, 0, sizeof(float) * 2 * (size_t)body->nodes);
@@ -160,6 +166,7 @@ static void boil_off(const Body *body, const Tissue *tissue, Book *book)
     for (int e = 0; e < body->elements; e++) {
         if (body->volume[e] == 0.0f || body->water[e] == 0.0f)
             continue;
+        const Tissue *tissue = tissues + body->kind[e];
         const int32_t *at = body->corners + 4 * (size_t)e;
         float offered[4], sum = 0.0f, full = (float)tissue->latent * body->volume[e];
         for (int a = 0; a < 4; a++) {
@@ -180,10 +187,10 @@ static void boil_off(const Body *body, const Tissue *tissue, Book *book)
             body->rise[i] -= (double)(taken[i] / body->capacity[i]);
 }
 
-static void advance_body(const Body *body, const Tissue *tissue, float seconds, int sub_steps, Book *book)
+static void advance_body(const Body *body, const Tissue *tissues, float seconds, int sub_steps, Book *book)
 {
     for (int s = 0; s < sub_steps; s++) {
-        set_flows(body, tissue, seconds, book);
+        set_flows(body, tissues, seconds, book);
         double hottest = 0.0;
         for (int i = 0; i < body->nodes; i++) {
             if (body->flow[i] == 0.0f)
@@ -192,8 +199,8 @@ static void advance_body(const Body *body, const Tissue *tissue, float seconds, 
             body->rise[i] = fabs(now) > SMALLEST_RISE ? now : 0.0;
             hottest = now > hottest ? now : hottest;
         }
-        if (hottest > tissue->boiling)
-            boil_off(body, tissue, book);
+        if (hottest > tissues->boiling) /* water boils alike in all tissues */
+            boil_off(body, tissues, book);
     }
     book->hottest = 0.0;
     for (int i = 0; i < body->nodes; i++)
@@ -236,33 +243,34 @@ static int hold(Buffers *buffers, PyObject *arrays, int count, int writable)
     return 0;
 }
 
-PyDoc_STRVAR(advance_doc, "advance(arrays, tissue, book, seconds, sub_steps)\n--\n\n\
+PyDoc_STRVAR(advance_doc, "advance(arrays, tissues, book, seconds, sub_steps)\n--\n\n\
 Advance the heat of a body by sub-steps of `seconds`; add to the book. For the arrays see `Body`.");
 
 static PyObject *advance(PyObject *Py_UNUSED(module), PyObject *args)
 {
     PyObject *arrays;
-    Py_buffer tissue, book;
+    Py_buffer tissues, book;
     float seconds;
     int sub_steps;
-    if (!PyArg_ParseTuple(args, "Oy*w*fi", &arrays, &tissue, &book, &seconds, &sub_steps))
+    if (!PyArg_ParseTuple(args, "Oy*w*fi", &arrays, &tissues, &book, &seconds, &sub_steps))
         return NULL;
     Buffers held;
-    int failed = hold(&held, arrays, 11, 5);
-    if (!failed && (tissue.len != sizeof(Tissue) || book.len != sizeof(Book))) {
+    int failed = hold(&held, arrays, 12, 6);
+    if (!failed && (tissues.len % sizeof(Tissue) || book.len != sizeof(Book))) {
         PyErr_SetString(PyExc_ValueError, "constants of tissue, or its book, of another length");
         failed = 1;
     }
     if (!failed) {
         Py_buffer *view = held.view;
-        Body body = {(int)(view[3].len / 4), (int)(view[2].len / 4), view[0].buf, view[1].buf, view[2].buf, view[3].buf,
-                     view[4].buf, view[5].buf, view[6].buf, view[7].buf, view[8].buf, view[9].buf, view[10].buf};
+        Body body = {(int)(view[4].len / 4), (int)(view[3].len / 4), view[0].buf, view[1].buf, view[2].buf, view[3].buf,
+                     view[4].buf, view[5].buf, view[6].buf, view[7].buf, view[8].buf, view[9].buf, view[10].buf,
+                     view[11].buf};
         Py_BEGIN_ALLOW_THREADS;
-        advance_body(&body, tissue.buf, seconds, sub_steps, book.buf);
+        advance_body(&body, tissues.buf, seconds, sub_steps, book.buf);
         Py_END_ALLOW_THREADS;
     }
     release(&held);
-    PyBuffer_Release(&tissue);
+    PyBuffer_Release(&tissues);
     PyBuffer_Release(&book);
     if (failed)
         return NULL;
@@ -270,11 +278,12 @@ static PyObject *advance(PyObject *Py_UNUSED(module), PyObject *args)
 }
 
 /* Set the conductances of the elements and the capacities of the nodes; return the fastest rate of an element, 1/s. */
-static double bind_body(int elements, const int32_t *corners, const float *gradients, const float *volume,
-                        const Tissue *tissue, double most, float *conductance, float *capacity)
+static double bind_body(int elements, const int32_t *corners, const uint8_t *kind, const float *gradients,
+                        const float *volume, const Tissue *tissues, double most, float *conductance, float *capacity)
 {
     double fastest = 0.0;
     for (int e = 0; e < elements; e++) {
+        const Tissue *tissue = tissues + kind[e];
         double g[4][3] = {{0.0, 0.0, 0.0}}, c[6], sum = 0.0, heat = 0.25 * tissue->capacity * (double)volume[e];
         for (int a = 1; a < 4; a++)
             for (int j = 0; j < 3; j++) {
@@ -296,26 +305,26 @@ static double bind_body(int elements, const int32_t *corners, const float *gradi
     return fastest;
 }
 
-PyDoc_STRVAR(bind_doc, "bind(arrays, tissue, most)\n--\n\n\
-Set conductances and capacities from (corners, gradients, volumes, conductances, capacities); return the fastest rate\n\
-at which an element evens out, 1/s. A sliver evens out at the rate `most`, 1/s.");
+PyDoc_STRVAR(bind_doc, "bind(arrays, tissues, most)\n--\n\n\
+Set conductances and capacities from (corners, kinds, gradients, volumes, conductances, capacities); return the\n\
+fastest rate at which an element evens out, 1/s. A sliver evens out at the rate `most`, 1/s.");
 
 static PyObject *bind(PyObject *Py_UNUSED(module), PyObject *args)
 {
     PyObject *arrays, *found = NULL;
-    Py_buffer tissue;
+    Py_buffer tissues;
     double most;
-    if (!PyArg_ParseTuple(args, "Oy*d", &arrays, &tissue, &most))
+    if (!PyArg_ParseTuple(args, "Oy*d", &arrays, &tissues, &most))
         return NULL;
     Buffers held;
-    if (!hold(&held, arrays, 5, 3)) {
+    if (!hold(&held, arrays, 6, 4)) {
         Py_buffer *view = held.view;
-        memset(view[4].buf, 0, (size_t)view[4].len);
-        found = PyFloat_FromDouble(bind_body((int)(view[2].len / 4), view[0].buf, view[1].buf, view[2].buf, tissue.buf,
-                                             most, view[3].buf, view[4].buf));
+        memset(view[5].buf, 0, (size_t)view[5].len);
+        found = PyFloat_FromDouble(bind_body((int)(view[3].len / 4), view[0].buf, view[1].buf, view[2].buf, view[3].buf,
+                                             tissues.buf, most, view[4].buf, view[5].buf));
     }
     release(&held);
-    PyBuffer_Release(&tissue);
+    PyBuffer_Release(&tissues);
     return found;
 }
 

@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 
 def advance(
     arrays: Sequence[NDArray[np.generic]],
-    tissue: NDArray[np.float64],
+    tissues: NDArray[np.float64],
     book: NDArray[np.float64],
     seconds: float,
     sub_steps: int,
     /,
 ) -> None: ...
-def bind(arrays: Sequence[NDArray[np.generic]], tissue: NDArray[np.float64], most: float, /) -> float: ...
+def bind(arrays: Sequence[NDArray[np.generic]], tissues: NDArray[np.float64], most: float, /) -> float: ...
 def spread(arrays: Sequence[NDArray[np.generic]], reach: float, /) -> float: ...

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.fem.heat.heating import Heating, heat_ports
+from engines.fem.layer_outputs import LayerOutputs, layer_ports
 from engines.fem.organ import Organ, relaxation
 from engines.fem.params import FemParams
 from engines.fem.probe import Probe
@@ -47,16 +48,19 @@ class FemEngine(Stepped):
         self._bonded: dict[str, BondPlan] = {}
         self._surfaces: list[Surface] = []
         self._heating: Heating | None = None
+        self._layers: list[LayerOutputs | None] = []
+        """Outputs of each organ with layers."""
         self._warn_of_coupling()
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Nodes of every organ, changed surfaces and events, grasps of probes with fingers, and heat."""
+        """Nodes of every organ, changed surfaces, events, layers, grasps of probes with fingers, and heat."""
         grasping = (name for name, probe in self.params.probes.items() if probe.grasp)
         grasps = (port for name in grasping for port in grasp_ports(name))
         changes = (*surface_ports(self.params), *event_ports(self.params.organs))
         surfaces = changes if self.params.changes_surfaces else ()
-        return *node_ports(self.params), *surfaces, *grasps, *heat_ports(self.params)
+        layers = layer_ports(self.params.organs, self.params.node_period)
+        return *node_ports(self.params), *surfaces, *layers, *grasps, *heat_ports(self.params)
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
@@ -115,9 +119,13 @@ class FemEngine(Stepped):
         return outputs
 
     def _pictured(self, t: int) -> dict[str, Value]:
-        """Return nodes, and changed surfaces, of all organs at `t` ns."""
+        """Return nodes, changed surfaces and layers of all organs at `t` ns."""
         changes = surface_changes(self._organs, t) if self.params.changes_surfaces else {}
-        return node_states(self._organs, t) | changes
+        outputs = node_states(self._organs, t) | changes
+        for i, layers in enumerate(self._layers):
+            if layers is not None:
+                outputs |= layers.outputs(None if self._heating is None else self._heating.heats[i].dead)
+        return outputs
 
     def state_hash(self) -> int:
         """Return 64 bits of the displacements, and of the probes and grasps."""
@@ -176,11 +184,15 @@ class FemEngine(Stepped):
     def close(self) -> None:
         """Forget the organs."""
         self._heating = None
-        for kept in (self._organs, self._probes, self._grasps, self._surfaces):
+        for kept in (self._organs, self._probes, self._grasps, self._surfaces, self._layers):
             kept.clear()
 
     def _begin(self) -> Outputs:
         """Make the probes of the bonds beside the settled organs; return the outputs at time 0."""
+        self._layers = [
+            LayerOutputs(organ, params) if params.layers else None
+            for organ, params in zip(self._organs, self.params.organs.values(), strict=True)
+        ]
         outputs = self._pictured(0)
         if self.params.changes_surfaces:
             outputs |= {f"{organ.name}/events": () for organ in self._organs}

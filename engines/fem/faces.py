@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from engines.fem.arrays import aligned_integers
 from engines.tissue.meshing.tet_mesh import Indices, TetMesh
 
-__all__ = ["Faces"]
+__all__ = ["FACE_CORNERS", "Faces"]
 
-_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+FACE_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corners of the face opposite to each corner, seen from outside against the clock, as in `_topology.c`."""
 
 
@@ -19,7 +19,7 @@ class Faces:
 
     def __init__(self, mesh: TetMesh, tetrahedra: Indices, room: int) -> None:
         """`tetrahedra`: elements in the body's order, shape (m, 4); `room`: their number with fillers."""
-        faces = tetrahedra[:, _CORNERS].reshape(-1, 3)
+        faces = tetrahedra[:, FACE_CORNERS].reshape(-1, 3)
         keys = np.sort(np.concatenate([faces, mesh.triangles]), axis=1)
         _, number = np.unique(keys, axis=0, return_inverse=True)
         inner, outer = number.ravel()[: len(faces)], number.ravel()[len(faces) :]

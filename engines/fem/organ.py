@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from xxhash import xxh3_128_digest
 
 from engines.fem.edges import NO_EDGES, Edges
-from engines.fem.solid import Branch, Solid, SphereWay
+from engines.fem.solid import Branch, Layering, Solid, SphereWay
 from engines.fem.spheres import Spheres
 from engines.fem.tissue_events import TissueEvents
 from engines.tissue.meshing.tet_mesh import Indices
@@ -58,7 +58,12 @@ class Organ:
         branches += relaxation(params)
         self._cutting = params.cutting
         divisible = params.cutting is not None
-        self.solid = Solid(self.mesh, self._anchored, material, branches, divisible=divisible)
+        layering = Layering(params.materials, params.layer_numbers(self.mesh.tetrahedra))
+        self.solid = Solid(
+            self.mesh, self._anchored, material, branches, divisible=divisible, layering=layering
+        )
+        self.layers = params.layer_numbers(self.solid.tetrahedra)
+        """Number of the layer of every element, shape (m,)."""
         self.surface = TissueSurface(self.mesh.triangles, len(self.mesh.nodes))
         """Faces as seen, with the kind of tissue of each."""
         self.touchable = self._touchable_faces()

@@ -17,7 +17,7 @@ from engines.tissue.meshing.tet_mesh import Indices, TetMesh, volumes
 from schemas.errors import ScenarioError
 from schemas.vectors import Vector
 
-__all__ = ["Branch", "Solid", "SphereWay"]
+__all__ = ["Branch", "Layering", "Solid", "SphereWay"]
 
 _LANES = 4
 """Elements of a block, as in `_lanes.h`."""
@@ -62,6 +62,15 @@ class SphereWay:
     """Sharp edges between spheres."""
 
 
+@dataclass(frozen=True)
+class Layering:
+    """Materials of a body."""
+
+    materials: tuple[Material, ...]
+    numbers: NDArray[np.uint8]
+    """Number of the material of every element of the mesh, shape (m,)."""
+
+
 class Solid:
     """Arrays of the body, in single precision and blocks of elements, relative to the middle of the body.
 
@@ -76,8 +85,18 @@ class Solid:
         branches: Sequence[Branch] = (),
         *,
         divisible: bool = False,
+        layering: Layering | None = None,
     ) -> None:
-        """`anchored`: fixed nodes, shape (n,); `divisible`: whether faces may open and elements go."""
+        """Build the body at rest.
+
+        Args:
+            mesh: the body.
+            anchored: fixed nodes, shape (n,).
+            material: of all elements without a `layering`.
+            branches: relaxation.
+            divisible: whether faces may open and elements go.
+            layering: other materials; the largest Lame's lambda is that of all.
+        """
         try:
             from engines.fem._solid import Solid as Compiled
         except ImportError as error:
@@ -88,20 +107,25 @@ class Solid:
         self.middle: Vector = 0.5 * (mesh.nodes.min(axis=0) + mesh.nodes.max(axis=0))
         """Origin of the arrays in `world`, m."""
         self.divisible = divisible
-        tetrahedra, volume = _in_whole_blocks(mesh)
-        self._set_nodes(mesh, anchored, tetrahedra, volume, material)
-        self._set_elements(mesh, tetrahedra, volume, material, branches)
+        tetrahedra, volume, order = _in_whole_blocks(mesh)
+        materials = (material,) if layering is None else layering.materials
+        numbers = np.zeros(len(order), np.uint8) if layering is None else layering.numbers[order]
+        lambda_ = max(one.neo_hookean_lame[1] for one in materials)
+        density = np.array([one.density for one in materials])[numbers]
+        self._set_elements(mesh, tetrahedra, volume, density, branches)
+        self._shear = aligned_floats(np.array([one.neo_hookean_lame[0] for one in materials])[numbers])
+        self._set_nodes(mesh, anchored, tetrahedra, volume, density, lambda_)
         faces = Faces(mesh, tetrahedra[volume > 0.0], len(volume))
         self._across, self._surface, self._owner = faces.across, faces.surface, faces.owner
         longest = float(np.linalg.norm(_edges_of(mesh), axis=1).max())
-        self._limits = aligned_floats(np.array([material.neo_hookean_lame[1], 0.0, 0.0, longest]))
+        self._limits = aligned_floats(np.array([lambda_, 0.0, 0.0, longest]))
         self._compiled = Compiled(self._arrays, len(mesh.nodes), len(mesh.triangles))
         self.longest_step = _STEP_SHARE * 2.0 / self._highest_frequency()
         """Longest sub-step, s."""
         if divisible:
             self._limits[1:3] = self._compiled.measure()
             self._limits[1] *= _SHARPER
-            self.longest_step = min(self.longest_step, _PIECE_SHARE * 2.0 / self._piece_frequency(material))
+            self.longest_step = min(self.longest_step, _PIECE_SHARE * 2.0 / self._piece_frequency(materials))
 
     def _set_nodes(
         self,
@@ -109,11 +133,14 @@ class Solid:
         anchored: NDArray[np.bool_],
         tetrahedra: Indices,
         volume: Vector,
-        material: Material,
+        density: Vector,
+        lambda_: float,
     ) -> None:
         n, room = len(mesh.nodes), tetrahedra.size if self.divisible else len(mesh.nodes)
         around = np.bincount(tetrahedra.ravel(), np.repeat(volume, 4), n)
-        mass = material.density * around / 4.0
+        lightest = density.min()
+        more = np.bincount(tetrahedra.ravel(), np.repeat((density - lightest) * volume, 4), n)
+        mass = (lightest * around + more) / 4.0  # of one material to the bit as without layers
         self._rest, self._displacement, self._velocity, self._force = (
             aligned_floats(np.zeros((room, 4))) for _ in range(4)
         )
@@ -123,7 +150,7 @@ class Solid:
         )
         self._mass[:n], self._inverse_volume[:n] = mass, 1.0 / around
         self._inverse_mass[:n] = np.where(anchored, 0.0, 1.0 / mass)
-        self._bulk[:] = material.neo_hookean_lame[1]
+        self._bulk[:] = lambda_
         self._holder = aligned_integers(np.full(room, -1))
         self._origin = aligned_integers(np.arange(room))
         self._flags = np.zeros(room, np.uint8)
@@ -134,7 +161,7 @@ class Solid:
         mesh: TetMesh,
         tetrahedra: Indices,
         volume: Vector,
-        material: Material,
+        density: Vector,
         branches: Sequence[Branch],
     ) -> None:
         edges = mesh.nodes[tetrahedra[:, 1:]] - mesh.nodes[tetrahedra[:, :1]]
@@ -143,8 +170,7 @@ class Solid:
         self._corners = aligned_integers(in_blocks(tetrahedra, _LANES))
         self._gradients = aligned_floats(in_blocks(gradients, _LANES))
         self._volumes = aligned_floats(volume)
-        self._element_mass = aligned_floats(material.density * volume)
-        self._shear = aligned_floats(np.full(len(volume), material.neo_hookean_lame[0]))
+        self._element_mass = aligned_floats(density * volume)
         self.strains = aligned_floats(np.zeros((len(branches), len(volume) // _LANES, 6, _LANES)))
         """Viscous strains."""
         self._branch = aligned_floats(np.array([[one.share, one.seconds] for one in branches]).reshape(-1, 2))
@@ -209,6 +235,16 @@ class Solid:
             gradients.astype(np.float64),
             self._volumes.astype(np.float64),
         )
+
+    @property
+    def volumes(self) -> NDArray[np.float32]:
+        """Volumes of the elements at rest, m^3, 0 of one that has gone, shape (m,)."""
+        return self._volumes
+
+    @property
+    def across(self) -> NDArray[np.int32]:
+        """The face on the other side of each face of the elements, negative: none, shape (4 m,)."""
+        return self._across.reshape(-1)
 
     @property
     def owners(self) -> NDArray[np.int32]:
@@ -315,13 +351,14 @@ class Solid:
     def counts(self, counts: tuple[int, int]) -> None:
         self._compiled.counts = counts
 
-    def _piece_frequency(self, material: Material) -> float:
+    def _piece_frequency(self, materials: Sequence[Material]) -> float:
         """Return a bound of the highest natural frequency (rad/s) of every piece of the resting body."""
-        mu, lambda_ = material.neo_hookean_lame
+        mu, lambda_ = (max(one.neo_hookean_lame[k] for one in materials) for k in (0, 1))
         shear = 0.75 * mu * (1.0 + float(self._branch[:, 0].sum()))
         sharpness, bulk_rate = self._limits[1:3].tolist()
         # shear energy G |strain|^2 V, lumped mass rho V / 4
-        return sqrt(8.0 * shear * sharpness / material.density + lambda_ * bulk_rate)
+        density = min(one.density for one in materials)
+        return sqrt(8.0 * shear * sharpness / density + lambda_ * bulk_rate)
 
     def _highest_frequency(self) -> float:
         """Return the highest natural frequency (rad/s) at rest, with all branches rigid."""
@@ -348,14 +385,15 @@ def _edges_of(mesh: TetMesh) -> Vector:
     return (corners[:, :, 1] - corners[:, :, 0]).reshape(-1, 3)
 
 
-def _in_whole_blocks(mesh: TetMesh) -> tuple[Indices, Vector]:
-    """Return tetrahedra, shape (m, 4), and their volumes, m^3; whole blocks, the last filled with volume 0.
+def _in_whole_blocks(mesh: TetMesh) -> tuple[Indices, Vector, Indices]:
+    """Return tetrahedra, shape (m, 4), their volumes, m^3, and their numbers in the mesh, shape (m,).
 
-    Neighbours in order have neighbouring nodes.
+    They fill whole blocks, the last with volume 0. Neighbours in order have neighbouring nodes.
     """
-    tetrahedra = mesh.tetrahedra[np.argsort(mesh.tetrahedra.min(axis=1), kind="stable")]
-    missing = -len(tetrahedra) % _LANES
-    tetrahedra = np.concatenate([tetrahedra, np.repeat(tetrahedra[-1:], missing, axis=0)])
+    order = np.argsort(mesh.tetrahedra.min(axis=1), kind="stable")
+    missing = -len(order) % _LANES
+    order = np.concatenate([order, np.repeat(order[-1:], missing)])
+    tetrahedra = mesh.tetrahedra[order]
     volume = volumes(mesh.nodes, tetrahedra)
     volume[len(volume) - missing :] = 0.0
-    return tetrahedra, volume
+    return tetrahedra, volume, order

@@ -74,6 +74,7 @@ class PressedOrgansParams(TissueParams):
     def _is_compliance_known(self) -> bool:
         return all(
             organ.cutting is None  # the spring in series is that of the whole organ
+            and not organ.layers
             and len(organ.rest.nodes) <= self.most_corrected_nodes
             and any(tied.any() for tied in organ.anchored_nodes.values())
             for organ in self.organs.values()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import ceil
 
 import numpy as np
@@ -23,27 +23,39 @@ _FASTEST = 1e3
 """A sliver evens out no faster, 1/s: the step of heat has at most ten sub-steps."""
 _COLD = 1e-2
 """Largest rise of a body that counts as cold, K."""
-_GIVEN, _PERFUSED, _BOILED, _VAPORISED_M3, _HOTTEST, _EJECTED = range(6)
+_GIVEN, _PERFUSED, _BOILED, _VAPORISED_M3, _HOTTEST, _ASH, _EJECTED = range(7)
 """Places in the book."""
 
 
 class Heat:
     """Arrays of a body.
 
-    Elements keep their numbers; a cut adds nodes (`copy_nodes`, then `rebind`), and an element that goes has
-    no volume.
+    Elements keep their numbers; a cut adds nodes, and an element that goes has no volume: `rebind`.
     """
 
     def __init__(
-        self, tissue: HeatTissue, corners: Indices, gradients: Vector, volumes: Vector, nodes: int
+        self,
+        tissues: Sequence[HeatTissue],
+        corners: Indices,
+        gradients: Vector,
+        volumes: Vector,
+        nodes: int,
+        kinds: NDArray[np.uint8] | None = None,
     ) -> None:
-        """Bind a cold body; for the arrays see `rebind`."""
+        """Bind a cold body; for the arrays see `rebind`.
+
+        kinds: number among `tissues` of every element, shape (m,); default: the first.
+        """
         from engines.fem import _heat  # built together with `_solid`, which says so where it is missing
 
         self._compiled = _heat
-        self.tissue = tissue
-        self._constants = tissue.constants
+        self._constants = np.concatenate([tissue.constants for tissue in tissues])
+        self._steam_per_joule = tissues[0].steam_per_joule
         m = len(corners)
+        self._tissue = np.zeros(m, np.uint8) if kinds is None else np.ascontiguousarray(kinds, np.uint8)
+        self._wet_capacity = np.array([tissue.capacity for tissue in tissues])[self._tissue]
+        self._dry_capacity = np.array([tissue.dry_capacity for tissue in tissues])[self._tissue]
+        self._corners = np.ascontiguousarray(corners, np.int32)
         self._volume = np.zeros(m, np.float32)
         self.rise = np.zeros(nodes)
         """Rise of every node above the temperature of the body, K, shape (n,)."""
@@ -55,12 +67,14 @@ class Heat:
         """Damage integrals of colour and of cells, shape (2, m)."""
         self.stage = np.zeros(m, np.uint8)
         """0 tissue, 1 charred, 2 vaporised, shape (m,)."""
-        self.book = np.zeros(6)
-        """Heat given, perfused and boiled (J), volume vaporised (m^3), hottest rise (K), heat gone (J)."""
+        self.book = np.zeros(7)
+        """Heat given, perfused and boiled (J), volume vaporised (m^3), hottest rise (K), dry mass
+        vaporised (kg), heat gone (J).
+        """
         self.rebind(corners, gradients, volumes)
 
     def rebind(self, corners: Indices, gradients: Vector, volumes: Vector) -> None:
-        """Take over a changed mesh.
+        """Take over a changed mesh. A new node is as warm as the node in whose place it stands.
 
         Args:
             corners: nodes of every element, shape (m, 4).
@@ -69,23 +83,31 @@ class Heat:
         """
         gone = (self._volume > 0.0) & (volumes == 0.0)
         if gone.any():
-            kept_heat = self.tissue.capacity * self.rise[self._corners[gone]].mean(axis=1)
-            dry_heat = self._constants[4] * self.excess[gone]
+            kept_heat = self._wet_capacity[gone] * self.rise[self._corners[gone]].mean(axis=1)
+            dry_heat = self._dry_capacity[gone] * self.excess[gone]
             self.book[_EJECTED] += float(((kept_heat + dry_heat) * self._volume[gone]).sum())
+        self._copy_nodes(corners)
         self._corners = np.ascontiguousarray(corners, np.int32)
         self._volume = np.ascontiguousarray(volumes, np.float32)
         self._conductance = np.zeros((len(corners), 6), np.float32)
         self._capacity = np.zeros(len(self.rise), np.float32)
         self._scratch = np.zeros((2, len(self.rise)), np.float32)
-        arrays = self._corners, np.ascontiguousarray(gradients, np.float32), self._volume
+        shape = np.ascontiguousarray(gradients, np.float32), self._volume
         self._rate = self._compiled.bind(
-            (*arrays, self._conductance, self._capacity), self._constants, _FASTEST
+            (self._corners, self._tissue, *shape, self._conductance, self._capacity),
+            self._constants,
+            _FASTEST,
         )
         self._no_power = np.zeros(len(corners), np.float32)
 
-    def copy_nodes(self, parents: Indices) -> None:
-        """Append nodes as warm as their parents; `rebind` must follow."""
-        self.rise = np.concatenate([self.rise, self.rise[parents]])
+    def _copy_nodes(self, corners: Indices) -> None:
+        """Append the nodes with numbers beyond the present ones."""
+        known = len(self.rise)
+        new = corners >= known
+        if new.any():
+            parents = np.zeros(int(corners.max()) + 1 - known, np.int64)
+            parents[corners[new] - known] = self._corners[new]
+            self.rise = np.concatenate([self.rise, self.rise[parents]])
 
     def restore(self, parts: Iterator[bytes], elements: tuple[Indices, Vector, Vector]) -> None:
         """Go back to a saved `state`, in a mesh with these `elements`, the arguments of `rebind`."""
@@ -107,10 +129,11 @@ class Heat:
         """
         if power is None and self.is_cold:
             return 0.0
-        boiled, vaporised = self.book[[_BOILED, _VAPORISED_M3]].tolist()
+        boiled, ash = self.book[[_BOILED, _ASH]].tolist()
         sub_steps = max(1, ceil(seconds * self._rate))
         arrays = (
             self._corners,
+            self._tissue,
             self._conductance,
             self._volume,
             self._capacity,
@@ -125,10 +148,7 @@ class Heat:
         self._compiled.advance(arrays, self._constants, self.book[:_EJECTED], seconds / sub_steps, sub_steps)
         if power is None and self.book[_HOTTEST] < _COLD:
             self._cool_down()
-        return float(
-            self.tissue.steam_per_joule * (self.book[_BOILED] - boiled)
-            + self.tissue.residue * (self.book[_VAPORISED_M3] - vaporised)
-        )
+        return float(self._steam_per_joule * (self.book[_BOILED] - boiled) + self.book[_ASH] - ash)
 
     def spread(self, nodes: Vector, poles: Vector, reach: float) -> tuple[NDArray[np.float32], float]:
         """Return the share of a current's heat in every element, shape (m,), and the sum of the shares.
@@ -161,6 +181,11 @@ class Heat:
         found[self.stage > 0] = FaceKind.CHARRED
         return found
 
+    @property
+    def dead(self) -> NDArray[np.bool_]:
+        """Elements whose cells are dead, shape (m,)."""
+        return self.damage[1] >= 1.0
+
     def vaporised(self) -> Indices:
         """Return the numbers of elements to be removed."""
         return np.flatnonzero((self.stage == _VAPORISED) & (self._volume > 0.0))
@@ -169,7 +194,7 @@ class Heat:
     def stored(self) -> float:
         """Heat above the temperature of the body, without the heat of steam, J."""
         wet = self._capacity.astype(np.float64) @ self.rise
-        return float(wet + self._constants[4] * (self._volume.astype(np.float64) @ self.excess))
+        return float(wet + (self._dry_capacity * self._volume) @ self.excess)
 
     @property
     def imbalance(self) -> float:

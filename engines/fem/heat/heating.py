@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from engines.fem.heat.heat import HEAT_PERIOD_NS, Heat
 from engines.fem.heat.instrument import EnergyInstrument, energy_ports
-from engines.fem.heat.tissue import tissue_of
+from engines.fem.heat.tissue import HeatTissue, tissue_of
 from engines.fem.organ import Organ
+from engines.tissue.organs.params import OrganParams
 from engines.tissue.params import PressedOrgansParams
 from hub.participant import Inputs, Value, signal_out
 from schemas.ports import Port
@@ -34,6 +35,11 @@ def heat_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
         )
     )
     return *(port for name in instruments for port in energy_ports(name)), *organs
+
+
+def _tissues(organ: OrganParams) -> list[HeatTissue]:
+    """Return the tissues of the layers from the top down, then of the organ's own material."""
+    return [tissue_of(name) for name in (*(layer.material for layer in organ.layers), organ.material_name)]
 
 
 class ElectrodeSpheres(Protocol):
@@ -79,7 +85,7 @@ class Heating:
         """Begin with cold organs."""
         self._organs = organs
         self.heats = [
-            Heat(tissue_of(params.organs[organ.name].material_name), *organ.solid.elements, len(organ.nodes))
+            Heat(_tissues(params.organs[organ.name]), *organ.solid.elements, len(organ.nodes), organ.layers)
             for organ in organs
         ]
         self._instruments = [
@@ -121,7 +127,6 @@ class Heating:
         for i, (organ, heat) in enumerate(zip(self._organs, self.heats, strict=True)):
             if organ.mesh_version != self._known[i]:
                 self._known[i] = organ.mesh_version
-                heat.copy_nodes(organ.solid.origin[len(heat.rise) :].astype(np.int64))
                 heat.rebind(*organ.solid.elements)
 
     def restore(self, parts: Iterator[bytes]) -> None:

@@ -66,6 +66,11 @@ class HeatTissue:
         return self.density * (1.0 - self.water)
 
     @property
+    def dry_capacity(self) -> float:
+        """Heat capacity without water, J/(m^3 K)."""
+        return self.residue * _DRY_SPECIFIC_HEAT
+
+    @property
     def steam_per_joule(self) -> float:
         """Mass of water boiled off by heat, kg/J."""
         return 1.0 / _LATENT_HEAT
@@ -79,7 +84,8 @@ class HeatTissue:
                 self.conductivity,
                 1e-6 / 60.0 * self.perfusion * self.density * _BLOOD,
                 self.density * self.water * _LATENT_HEAT,
-                self.residue * _DRY_SPECIFIC_HEAT,
+                self.dry_capacity,
+                self.residue,
                 BODY,
                 BOILING - BODY,
                 CHARRING - BODY,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 
 from engines.tissue.meshing.tet_mesh import Indices, TetMesh
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
 __all__ = ["FEWEST_NODES", "block", "block_cells", "grid_indices", "tetrahedra_of_cells"]
@@ -27,16 +29,34 @@ _MIRRORED_CELL = (_CELL ^ 4)[:, [0, 2, 1, 3]]
 """The same, mirrored in x: neighbouring cells must alternate for their diagonals to meet."""
 
 
-def block(size: Vector, nodes: int) -> TetMesh:
+def block(size: Vector, nodes: int, layers: Sequence[float] = ()) -> TetMesh:
     """Return a box of edge lengths `size` (m), shape (3,), with about `nodes` nodes.
 
     The origin is in the middle of the top face. The cells of a regular grid are cut into five tetrahedra
     each, the fewest possible, mirrored from cell to cell. With an even number of cells along x and y the mesh
-    is symmetric in both, without a preferred diagonal.
+    is symmetric in both, without a preferred diagonal. Layers from the top down, of these thicknesses (m),
+    have whole rows of cells, one at least.
     """
     cells = block_cells(size, nodes)
-    points = (grid_indices(cells[0] + 1, cells[1] + 1, cells[2] + 1) / cells - [0.5, 0.5, 1.0]) * size
+    heights = np.zeros(0)
+    if layers:
+        heights = _row_heights(float(size[2]), cells[2], layers)
+        cells = cells[0], cells[1], len(heights) - 1
+    indices = grid_indices(cells[0] + 1, cells[1] + 1, cells[2] + 1)
+    points = (indices / cells - [0.5, 0.5, 1.0]) * size
+    if layers:
+        points[:, 2] = heights[indices[:, 2]]
     return TetMesh(points, tetrahedra_of_cells(cells))
+
+
+def _row_heights(height: float, rows: int, layers: Sequence[float]) -> Vector:
+    """Return the heights (m, from -height to 0) of about so many rows of cells."""
+    parts = [height - plain_sum(layers), *reversed(layers)]
+    planes = [-height]
+    for part in parts:
+        count = max(1, round(rows * part / height))
+        planes += (planes[-1] + part * np.arange(1, count + 1) / count).tolist()
+    return np.array([*planes[:-1], 0.0])
 
 
 def tetrahedra_of_cells(cells: tuple[int, int, int], *, closed: bool = False) -> Indices:

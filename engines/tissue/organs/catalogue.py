@@ -15,13 +15,13 @@ __all__ = ["SHAPES", "block_shape"]
 SHAPES = {"kidney-with-adrenal": KIDNEY_WITH_ADRENAL, "colon": COLON, "liver-lobe": LIVER_LOBE}
 
 
-def block_shape(size: tuple[float, float, float]) -> Shape:
-    """Return a block of edge lengths `size` (m)."""
+def block_shape(size: tuple[float, float, float], layers: tuple[float, ...] = ()) -> Shape:
+    """Return a block of edge lengths `size` (m), with layers of these thicknesses (m) from the top down."""
     return Shape(
         description=(
             "a block of the given size along the axes of its frame; the origin is in the middle of its top"
         ),
-        mesh=lambda nodes: block(np.array(size), nodes),
+        mesh=lambda nodes: block(np.array(size), nodes, layers),
         surfaces={side: lambda nodes, side=side: on_side(nodes, side, 0.0) for side in SIDES},
         anchors=("bottom",),
         material=None,

@@ -21,6 +21,7 @@ from engines.tissue.meshing.tet_mesh import TetMesh
 from engines.tissue.organs.anchors import AnchorParams, Edges
 from engines.tissue.organs.catalogue import SHAPES, block_shape
 from engines.tissue.organs.cutting import CuttingParams
+from engines.tissue.organs.layers import LayerParams
 from engines.tissue.organs.material_file import MaterialFile
 from engines.tissue.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
 from engines.tissue.organs.organ_file import OrganFile
@@ -30,7 +31,9 @@ from engines.tissue.organs.surface_mesh import mesh_surface
 from robots import rotation
 from robots.dvrk.parameters import UnitQuaternion
 from schemas.files import find_file
+from schemas.plain_sum import plain_sum
 from schemas.quantity import Duration, Length
+from schemas.vectors import Vector
 
 __all__ = ["OrganParams"]
 
@@ -83,6 +86,11 @@ class OrganParams(BaseModel):
         default=None, description=f"with young_modulus; default: {_POISSON_RATIO}"
     )
     density: TissueDensity | None = Field(default=None, description="with young_modulus; default: water")
+    layers: tuple[LayerParams, ...] = Field(
+        default=(),
+        max_length=8,
+        description="of a block, from its top down, kind fem alone; below them is the organ's own material",
+    )
     nodes: int | None = Field(
         default=None,
         ge=FEWEST_NODES,
@@ -133,6 +141,8 @@ class OrganParams(BaseModel):
             raise ValueError(
                 f"the longest edge of a block is {SMALLEST_M:g} to {LARGEST_M:g} m, not {max(self.size):g} m"
             )
+        if self.layers:
+            self._check_layers()
         if self.mesh is None and self.unit is not None:
             raise ValueError("unit is that of a mesh file; elsewhere units stand with the numbers")
         if self.mesh is not None and self.nodes is not None and not _is_surface(self.mesh):
@@ -152,6 +162,15 @@ class OrganParams(BaseModel):
             raise ValueError("an organ has a material, a material_file or a young_modulus, one of them")
         _ = self.elastic, self.local, self.anchored_nodes
         return self
+
+    def _check_layers(self) -> None:
+        names = [layer.name for layer in self.layers]
+        if self.size is None:
+            raise ValueError("layers are those of a block: state its size, or leave them out")
+        if len(set(names)) < len(names):
+            raise ValueError(f"two layers have the same name: {', '.join(names)}")
+        if (thick := plain_sum(layer.thickness for layer in self.layers)) >= self.size[2]:
+            raise ValueError(f"layers of {thick:g} m fill a block of {self.size[2]:g} m: make them thinner")
 
     @cached_property
     def elastic(self) -> Material:
@@ -193,6 +212,20 @@ class OrganParams(BaseModel):
         return replace(self.elastic, young_modulus=own.long_term_young_modulus, damping=self.damping * 1e-9)
 
     @cached_property
+    def materials(self) -> tuple[Material, ...]:
+        """The relaxed materials of the layers from the top down, then the organ's own."""
+        return *(layer.elastic(self.relaxed.damping) for layer in self.layers), self.relaxed
+
+    def layer_numbers(self, tetrahedra: NDArray[np.integer]) -> NDArray[np.uint8]:
+        """Return the number among `materials` of every element, shape (m,).
+
+        tetrahedra: nodes of the elements, shape (m, 4).
+        """
+        depths = -self.local.nodes[tetrahedra, 2].mean(axis=1)
+        ends: Vector = np.cumsum([layer.thickness for layer in self.layers], dtype=np.float64)
+        return np.asarray(np.searchsorted(ends, depths), np.uint8)
+
+    @cached_property
     def series(self) -> tuple[PronyTerm, ...]:
         """Relaxation: as stated, else from the material file, if any."""
         own = self._own_material
@@ -214,7 +247,7 @@ class OrganParams(BaseModel):
     def body(self) -> Shape:
         """The shape. Raises ValueError where the mesh file is unusable."""
         if self.size is not None:
-            return block_shape(self.size)
+            return block_shape(self.size, tuple(layer.thickness for layer in self.layers))
         if self.mesh is not None:
             return _from_file(self.mesh, _UNITS[self.unit or "m"], self.nodes or _NODES)
         return SHAPES[self.shape or ""]
@@ -287,7 +320,9 @@ class OrganParams(BaseModel):
 
         The estimate is for a punch as wide as the sphere, or as a longer median edge of the surface.
         """
-        return self.elastic.contact_stiffness(max(radius, self._median_edge))
+        width = max(radius, self._median_edge)
+        layers = (layer.elastic(self.elastic.damping) for layer in self.layers)
+        return max(material.contact_stiffness(width) for material in (self.elastic, *layers))
 
     @cached_property
     def _median_edge(self) -> float:

@@ -35,7 +35,7 @@ def elements(mesh):
 
 
 def heat_of(mesh, tissue=BLOODLESS):
-    return Heat(tissue, *elements(mesh), len(mesh.nodes))
+    return Heat([tissue], *elements(mesh), len(mesh.nodes))
 
 
 def everywhere(heat, watts):
@@ -95,7 +95,7 @@ def test_damage_at_a_constant_temperature(celsius, seconds, times):
     for _ in range(10):
         heat.advance(seconds / 10.0)
     for damage, (log_factor, temperature), time in zip(
-        heat.damage, LIVER.constants[10:].reshape(2, 2), times, strict=True
+        heat.damage, LIVER.constants[11:].reshape(2, 2), times, strict=True
     ):
         np.testing.assert_allclose(
             damage, seconds * exp(log_factor - temperature / (celsius + 273.15)), rtol=1e-5
@@ -172,7 +172,6 @@ def test_no_heat_crosses_an_opened_face():
     on_cut = np.flatnonzero(np.abs(mesh.nodes[:, 0]) < 1e-9)
     copies = np.arange(len(mesh.nodes))
     copies[on_cut] = len(mesh.nodes) + np.arange(len(on_cut))
-    heat.copy_nodes(on_cut)
     heat.rebind(np.where(left[:, None], corners, copies[corners]), gradients, volume)
     assert heat.stored == pytest.approx(before, rel=1e-6)
     right = np.unique(heat._corners[~left])
@@ -180,6 +179,25 @@ def test_no_heat_crosses_an_opened_face():
     heat.advance(20.0, warm)
     assert float(heat._capacity[right].astype(float) @ heat.rise[right]) == pytest.approx(kept, rel=1e-5)
     assert heat.rise[heat._corners[left]].min() > heat.rise[right].max()
+
+
+def test_a_node_parted_twice_is_as_warm_as_the_node_in_whose_place_it_stands():
+    mesh = grid((3, 1, 1), 1e-3)
+    heat = heat_of(mesh)
+    corners, gradients, volume = elements(mesh)
+    node = int(np.bincount(corners.ravel()).argmax())
+    where = corners == node
+    rows = np.flatnonzero(where.any(axis=1))
+    assert len(rows) > 2
+    for count, kept in ((1, rows[:1]), (2, rows[:2])):
+        parted = where.copy()
+        parted[kept] = False
+        corners = np.where(parted, len(mesh.nodes) - 1 + count, corners)
+        heat.rebind(corners, gradients, volume)
+        assert heat.rise[-1] == (0.0 if count == 1 else 50.0)
+        heat.rise[-1] = 50.0
+    assert heat.rise[node] == 0.0
+    assert len(heat.rise) == len(mesh.nodes) + 2
 
 
 def test_an_element_that_goes_carries_its_heat_away():
@@ -190,7 +208,7 @@ def test_an_element_that_goes_carries_its_heat_away():
     volume[:5] = 0.0
     heat.rebind(corners, gradients, volume)
     heat.advance(0.1)
-    assert heat.book[5] > 0.0
+    assert heat.book[6] > 0.0
     assert abs(heat.imbalance) < 1e-5 * heat.book[0]
 
 

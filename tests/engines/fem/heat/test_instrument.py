@@ -55,7 +55,11 @@ def unit_block():
     gradients = (
         np.linalg.inv(points[corners[:, 1:]] - points[corners[:, :1]]).transpose(0, 2, 1).reshape(-1, 9)
     )
-    return Heat(TISSUES["liver"], corners, gradients, volumes(points, corners), len(points)), points, corners
+    return (
+        Heat([TISSUES["liver"]], corners, gradients, volumes(points, corners), len(points)),
+        points,
+        corners,
+    )
 
 
 def inputs(watts, *, stale=False):
