@@ -27,7 +27,10 @@ _EXTENSIONS = (
     ),
     Extension(
         "engines.fem._solid",
-        [f"engines/fem/_{part}.c" for part in ("solid", "elements", "contact", "topology", "cut", "blade")],
+        [
+            f"engines/fem/_{part}.c"
+            for part in ("solid", "elements", "contact", "rigid", "topology", "cut", "blade")
+        ],
         depends=[
             "engines/fem/_solid.h",
             "engines/fem/_lanes.h",

@@ -14,7 +14,7 @@ docs/decisions/0125-tissue-of-our-own.md.
 typedef struct {
     PyObject_HEAD
     Body body;
-    Py_buffer held[24];
+    Py_buffer held[26];
     int count;
 } Solid;
 
@@ -66,24 +66,27 @@ static void accelerate(const Body *body, float seconds, float gravity, float dra
 /* Memory of a step. */
 typedef struct {
     int *near;         /* faces near the spheres */
+    int32_t *beside;   /* boxes and nodes near them */
     double *begun;     /* fronts at the start, (edges, samples, 3) */
     double *impulses;  /* (edges, samples, 3) */
     double *triangles; /* (2 edges samples, 3, 3) */
 } Scratch;
 
-static int find_scratch(const Spheres *spheres, const Edges *edges, Scratch *scratch)
+static int find_scratch(const Body *body, const Spheres *spheres, const Edges *edges, Scratch *scratch)
 {
     size_t fronts = 3 * (size_t)(edges->count * edges->samples + 1);
     scratch->near = PyMem_RawMalloc(sizeof(int) * (size_t)(spheres->count + 1) * (MOST_NEAR + 1));
+    scratch->beside = PyMem_RawMalloc(sizeof(int32_t) * (2 * (size_t)body->boxes * (size_t)body->nodes + 1));
     scratch->begun = PyMem_RawCalloc(fronts, sizeof(double));
     scratch->impulses = PyMem_RawCalloc(fronts, sizeof(double));
     scratch->triangles = PyMem_RawCalloc(6 * fronts, sizeof(double));
-    return scratch->near && scratch->begun && scratch->impulses && scratch->triangles;
+    return scratch->near && scratch->beside && scratch->begun && scratch->impulses && scratch->triangles;
 }
 
 static void free_scratch(Scratch *scratch)
 {
     PyMem_RawFree(scratch->near);
+    PyMem_RawFree(scratch->beside);
     PyMem_RawFree(scratch->begun);
     PyMem_RawFree(scratch->impulses);
     PyMem_RawFree(scratch->triangles);
@@ -95,12 +98,13 @@ static int run(Body *body, const Spheres *spheres, const Edges *edges, int sub_s
 {
     Scratch scratch;
     int opened = -1;
-    if (find_scratch(spheres, edges, &scratch)) {
+    if (find_scratch(body, spheres, edges, &scratch)) {
         for (int s = 0; s < spheres->count; s++) {
             int *found = scratch.near + s * (MOST_NEAR + 1);
             *found = spheres->free[s] ? find_near(body, spheres, s, sub_steps, found + 1, MOST_NEAR) : 0;
         }
         engage(body, spheres, edges, sub_steps, scratch.begun);
+        int beside = find_beside(body, (double)seconds * sub_steps, scratch.beside);
         for (int k = 0; k < sub_steps; k++) {
             elastic_forces(body, seconds);
             accelerate(body, seconds, gravity, drag);
@@ -111,9 +115,12 @@ static int run(Body *body, const Spheres *spheres, const Edges *edges, int sub_s
                     press(body, spheres, s, k, seconds, found + 1, *found);
             }
             slice(body, spheres, edges, k, seconds, scratch.impulses);
+            rest_on(body, scratch.beside, beside, (double)seconds);
             move(body, seconds);
             follow(body, spheres, edges, k, seconds, scratch.impulses);
         }
+        for (int i = 0; i < 3 * body->boxes; i++)
+            body->support[i] /= sub_steps;
         int swept = sweep(body, spheres, edges, sub_steps, scratch.begun, scratch.triangles);
         opened = swept ? cut_along(body, scratch.triangles, swept) : 0;
     }
@@ -317,6 +324,9 @@ static int initialise(Solid *self, PyObject *args, PyObject *Py_UNUSED(named))
     NEXT(owner, 1);
     NEXT(middles, 0);
     NEXT(limits, 0);
+    NEXT(box, 0);
+    body->boxes = (int)(size / 128);
+    NEXT(support, 1);
     return 0;
 }
 

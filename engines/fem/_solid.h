@@ -42,6 +42,9 @@ typedef struct {
     int32_t *owner;              /* (faces,): face of an element by slot */
     const float *middles;        /* (4 blocks, 3): of the elements of the uncut mesh */
     const float *limits;         /* (4,): lambda; largest sharpness, bulk rate and edge (m) of the uncut mesh */
+    int boxes;                   /* that do not move */
+    const double *box;           /* (boxes, 16): middle, axes row by row, half edges, friction */
+    double *support;             /* (boxes, 3): mean force of the body on each in a step, N */
 } Body;
 
 enum { FIXED = 1, PLACED = 2 }; /* anchored; moved onto a cut */
@@ -79,6 +82,9 @@ static inline int is_gone(const Body *body, int element)
 void elastic_forces(const Body *body, float seconds);
 void press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count);
 int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_steps, int *near, int most);
+
+int find_beside(const Body *body, double seconds, int32_t *beside);
+void rest_on(const Body *body, const int32_t *beside, int count, double seconds);
 
 int open_faces(Body *body, const int32_t *faces, int count);
 int remove_elements(Body *body, const int32_t *elements, int count);

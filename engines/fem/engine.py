@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.fem.boxes import box_rows
 from engines.fem.heat.heating import Heating, heat_ports
 from engines.fem.layer_outputs import LayerOutputs, layer_ports
 from engines.fem.organ import Organ, relaxation
@@ -68,13 +69,11 @@ class FemEngine(Stepped):
         return tuple(self._bond(name) for name in self.params.probes)
 
     def configure(self, setup: Setup) -> Outputs:
-        """Build the organs and let them settle.
-
-        Raises ScenarioError for unfit periods and for rigid parts.
-        """
+        """Build the organs and let them settle. Raises ScenarioError for unfit periods."""
         self._check(setup.period_ns)
+        boxes = box_rows(self.params.rigid.values())
         for name, organ in self.params.organs.items():
-            self._organs.append(Organ(name, organ))
+            self._organs.append(Organ(name, organ, boxes))
         for organ in self._organs:
             organ.settle(self.params.gravity)
         self._sub_steps = max(organ.solid.sub_steps(setup.period_ns * 1e-9) for organ in self._organs)
@@ -273,16 +272,10 @@ class FemEngine(Stepped):
         )
 
     def _check(self, period_ns: int) -> None:
-        where = f"participant '{self.name}'"
         if self.params.node_period % period_ns:
             raise ScenarioError(
-                f"{where}: node_period {self.params.node_period} ns is no multiple of the period"
-                f" {period_ns} ns"
-            )
-        if self.params.rigid:
-            raise ScenarioError(
-                f"{where}: kind fem has no rigid parts yet ({', '.join(self.params.rigid)}); anchor the"
-                " organs to 'world', or take kind bullet"
+                f"participant '{self.name}': node_period {self.params.node_period} ns is no multiple of the"
+                f" period {period_ns} ns"
             )
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 from xxhash import xxh3_128_digest
 
+from engines.fem.boxes import NO_BOXES
 from engines.fem.edges import NO_EDGES, Edges
 from engines.fem.solid import Branch, Layering, Solid, SphereWay
 from engines.fem.spheres import Spheres
 from engines.fem.tissue_events import TissueEvents
+from engines.tissue.material import Material
 from engines.tissue.meshing.tet_mesh import Indices
 from engines.tissue.organs.params import OrganParams
 from engines.tissue.tissue_surface import SurfaceState, TissueSurface
@@ -40,10 +43,16 @@ def relaxation(params: OrganParams) -> list[Branch]:
     return [Branch(term.share / remaining, term.seconds) for term in params.series]
 
 
+def _slowest_on_a_bed(material: Material, extent: float) -> float:
+    """Return the lowest natural frequency (rad/s) of a column as long as the organ, on its end."""
+    return 0.5 * np.pi * sqrt(material.young_modulus / material.density) / extent
+
+
 class Organ:
     """Tissue of one name."""
 
-    def __init__(self, name: str, params: OrganParams) -> None:
+    def __init__(self, name: str, params: OrganParams, boxes: Vector = NO_BOXES) -> None:
+        """`boxes`: fixed rigid parts, rows of `box_rows`."""
         self.name, self.mesh = name, params.rest
         self._anchored: NDArray[np.bool_] = np.zeros(len(self.mesh.nodes), dtype=np.bool_)
         for tied in params.anchored_nodes.values():
@@ -60,7 +69,13 @@ class Organ:
         divisible = params.cutting is not None
         layering = Layering(params.materials, params.layer_numbers(self.mesh.tetrahedra))
         self.solid = Solid(
-            self.mesh, self._anchored, material, branches, divisible=divisible, layering=layering
+            self.mesh,
+            self._anchored,
+            material,
+            branches,
+            divisible=divisible,
+            layering=layering,
+            boxes=boxes,
         )
         self.layers = params.layer_numbers(self.solid.tetrahedra)
         """Number of the layer of every element, shape (m,)."""
@@ -70,11 +85,13 @@ class Organ:
         """Faces with a free node, shape (f, 3)."""
         self.events = TissueEvents()
         self._edges = NO_EDGES
+        self._reach = float(np.linalg.norm(np.ptp(self.mesh.nodes, axis=0)))
         self._slowest = params.frequencies[1]
+        if self._slowest is None and len(boxes):
+            self._slowest = _slowest_on_a_bed(material, self._reach)
         self._presses = self._free = np.ones(0, np.uint8)
         self.mesh_version = 0
         """Count of the changes of the mesh."""
-        self._reach = float(np.linalg.norm(np.ptp(self.mesh.nodes, axis=0)))
         self.nodes: Vector = self.mesh.nodes
 
     @property
@@ -133,9 +150,13 @@ class Organ:
         if not moved < self._reach:
             raise SessionError(
                 f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from"
-                " its place. The likeliest cause is an instrument that went through it; else shorten the"
-                " tissue's timestep"
+                f" its place. {self._likely_cause(moved)}"
             )
+
+    def _likely_cause(self, moved: float) -> str:
+        if np.isfinite(moved) and not self._anchored.any():
+            return "The likeliest cause is that it fell: nothing anchors it, and no rigid part lies under it"
+        return "The likeliest cause is an instrument that went through it; else shorten the tissue's timestep"
 
     def colour(self, kinds: NDArray[np.uint8]) -> None:
         """Show the kind of tissue of burnt elements, shape (m,), on their faces; 0: not burnt."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.fem.arrays import aligned_floats, aligned_integers, in_blocks
+from engines.fem.boxes import NO_BOXES
 from engines.fem.edges import NO_EDGES, Edges
 from engines.fem.faces import Faces
 from engines.tissue.material import Material
@@ -86,6 +87,7 @@ class Solid:
         *,
         divisible: bool = False,
         layering: Layering | None = None,
+        boxes: Vector = NO_BOXES,
     ) -> None:
         """Build the body at rest.
 
@@ -96,6 +98,7 @@ class Solid:
             branches: relaxation.
             divisible: whether faces may open and elements go.
             layering: other materials; the largest Lame's lambda is that of all.
+            boxes: rigid parts, rows of `box_rows`.
         """
         try:
             from engines.fem._solid import Solid as Compiled
@@ -119,6 +122,9 @@ class Solid:
         self._across, self._surface, self._owner = faces.across, faces.surface, faces.owner
         longest = float(np.linalg.norm(_edges_of(mesh), axis=1).max())
         self._limits = aligned_floats(np.array([lambda_, 0.0, 0.0, longest]))
+        self._boxes = boxes - np.pad(self.middle, (0, boxes.shape[1] - 3))
+        self.support: Vector = np.zeros((len(boxes), 3))
+        """Mean force of the body on each box in the last step, N, shape (b, 3)."""
         self._compiled = Compiled(self._arrays, len(mesh.nodes), len(mesh.triangles))
         self.longest_step = _STEP_SHARE * 2.0 / self._highest_frequency()
         """Longest sub-step, s."""
@@ -184,7 +190,7 @@ class Solid:
             *(self._holder, self._origin, self._flags),
             *(self._corners, self._gradients, self._volumes, self._element_mass, self._shear),
             *(self.strains, self._branch, self._across, self._surface, self._owner),
-            *(self._middles, self._limits),
+            *(self._middles, self._limits, self._boxes, self.support),
         )
 
     @property

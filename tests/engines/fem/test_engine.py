@@ -225,10 +225,7 @@ def test_it_keeps_the_contract_of_engines():
     check_engine(lambda: FemEngine("tissue", model), period_ns=4 * MS, inputs=inputs)
 
 
-def test_what_is_not_there_yet_is_said():
-    model = params(rigid={"bed": {"box": ["1 m", "1 m", "1 cm"]}})
-    with pytest.raises(ScenarioError, match="no rigid parts yet"):
-        FemEngine("tissue", model).configure(Setup(MS, Path(), {}))
+def test_an_unfit_node_period_is_refused():
     with pytest.raises(ScenarioError, match="node_period"):
         FemEngine("tissue", params(node_period="1.5 ms")).configure(Setup(MS, Path(), {}))
 
