@@ -29,11 +29,15 @@ _EXTENSIONS = (
         "engines.fem._solid",
         [
             f"engines/fem/_{part}.c"
-            for part in ("solid", "elements", "contact", "rigid", "topology", "cut", "blade")
+            for part in (
+                *("solid", "step", "elements", "contact", "rigid", "topology", "cut", "blade"),
+                *("together", "touch", "pairs"),
+            )
         ],
         depends=[
             "engines/fem/_solid.h",
             "engines/fem/_lanes.h",
+            "engines/fem/_pairs.h",
             "engines/fem/_triangle.h",
             "engines/fem/_vectors.h",
         ],

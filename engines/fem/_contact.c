@@ -69,10 +69,10 @@ static int touch(const Body *body, const int32_t *node, const double *centre, fl
         away[i] = contact->share[0] * x[0][i] + contact->share[1] * x[1][i] + contact->share[2] * x[2][i];
         contact->point[i] = away[i];
     }
-    float distance = sqrtf(dot(away, away));
+    float distance = sqrtf(dotf(away, away));
     if (!(distance < radius + AHEAD) || distance < SAME_POINT)
         return 0;
-    float side = dot(away, normal) > 0.0f ? -1.0f : 1.0f; /* -1: the centre is behind the face */
+    float side = dotf(away, normal) > 0.0f ? -1.0f : 1.0f; /* -1: the centre is behind the face */
     if (side < 0.0f && distance > DEEPEST * radius)
         return 0; /* a face of the far side */
     for (int a = 0; a < 3; a++)
@@ -95,7 +95,7 @@ static int is_known(const Contact *contacts, int count, const Contact *other)
         float apart[3];
         for (int i = 0; i < 3; i++)
             apart[i] = contacts[k].point[i] - other->point[i];
-        if (dot(apart, apart) < SAME_POINT * SAME_POINT)
+        if (dotf(apart, apart) < SAME_POINT * SAME_POINT)
             return 1;
     }
     return 0;
@@ -111,13 +111,13 @@ static void resolve(const Body *body, Contact *contact, const float moving[3], f
         for (int a = 0; a < 3; a++)
             apart[i] += contact->share[a] * body->velocity[4 * node[a] + i];
     }
-    float along = dot(apart, contact->normal);
+    float along = dotf(apart, contact->normal);
     float least = contact->gap > 0.0f ? -contact->gap / seconds : -RECOVERY * contact->gap / seconds;
     float pushed = contact->pushed + (least - along) * contact->mass;
     pushed = pushed > 0.0f ? pushed : 0.0f;
     for (int i = 0; i < 3; i++)
         rub[i] = contact->rubbed[i] - contact->mass * (apart[i] - along * contact->normal[i]);
-    float size = sqrtf(dot(rub, rub)), most = friction * pushed;
+    float size = sqrtf(dotf(rub, rub)), most = friction * pushed;
     float kept = size > most ? most / size : 1.0f;
     for (int i = 0; i < 3; i++) {
         impulse[i] = (pushed - contact->pushed) * contact->normal[i] + kept * rub[i] - contact->rubbed[i];

@@ -1,131 +1,43 @@
 /* Total-Lagrangian explicit dynamics of a soft body (Miller, Joldes, Lance, Wittek, Total Lagrangian explicit dynamics
 finite element algorithm for computing soft tissue deformation, Commun. Numer. Methods Eng. 23, 2007).
 
-Velocities, then displacements advance by each sub-step, with forces of the displacements before. See
-docs/decisions/0125-tissue-of-our-own.md.
+See docs/decisions/0125-tissue-of-our-own.md; `_step.c` advances.
 */
 
 #include "_solid.h"
 
-#define MOST_NEAR 16384 /* faces near one sphere: all of the largest mesh */
-#define MOST_TORN 64      /* faces at a time */
-#define LARGEST_MOVE 0.25f
+#define MOST_TORN 64 /* faces at a time */
 
-typedef struct {
-    PyObject_HEAD
-    Body body;
-    Py_buffer held[26];
-    int count;
-} Solid;
-
-/* Move the nodes that a sphere holds with the sphere; write the force on the sphere. */
-static void carry(const Body *body, const Spheres *spheres, int sub_step, float seconds, float gravity)
+/* Read the arguments of `advance`: a way through a step, whose buffers are held until `release_way`. */
+int read_way(Solid *self, PyObject *args, Way *way, Course *course)
 {
-    const float *mass = body->mass;
-    for (int i = 0; i < body->nodes; i++) {
-        int sphere = body->holder[i];
-        if (sphere < 0)
-            continue;
-        const double *here = spheres->path + 3 * (sub_step * spheres->count + sphere), *next = here + 3 * spheres->count;
-        double *force = spheres->force + 3 * (sub_step * spheres->count + sphere);
-        for (int k = 0; k < 3; k++) {
-            float now = (float)((next[k] - here[k]) / (double)seconds), *v = body->velocity + 4 * i + k;
-            float weight = k == 2 ? gravity * mass[i] : 0.0f;
-            force[k] += (double)(body->force[4 * i + k] - weight - mass[i] * (now - *v) / seconds);
-            *v = now;
-        }
-    }
+    Py_buffer *held = way->held;
+    memset(way, 0, sizeof *way);
+    if (!PyArg_ParseTuple(args, "y*y*y*w*ffiffy*dw*w*w*w*", held, held + 1, held + 2, held + 3, &way->spheres.friction,
+                          &course->seconds, &course->sub_steps, &course->gravity, &way->drag, held + 4,
+                          &way->edges.toughness, held + 5, held + 6, held + 7, held + 8))
+        return -1;
+    Spheres *spheres = &way->spheres;
+    Edges *edges = &way->edges;
+    way->body = &self->body;
+    spheres->count = (int)(held[1].len / (Py_ssize_t)sizeof(double));
+    spheres->path = held[0].buf, spheres->radius = held[1].buf, spheres->free = held[2].buf;
+    spheres->force = held[3].buf;
+    edges->count = (int)(held[4].len / 8);
+    edges->samples = edges->count ? (int)(held[5].len / 4) / edges->count : 0;
+    edges->ends = held[4].buf, edges->element = held[5].buf, edges->front = held[6].buf, edges->ahead = held[7].buf;
+    edges->area = held[8].buf;
+    if (edges->samples <= MOST_SAMPLES)
+        return 0;
+    release_way(way);
+    PyErr_Format(PyExc_ValueError, "at most %d samples along an edge", MOST_SAMPLES);
+    return -1;
 }
 
-/* Move the nodes; of a body that may be cut by no more in a sub-step than a part of the least height of an element. */
-static void move(const Body *body, float seconds)
+void release_way(Way *way)
 {
-    float sharpness = body->limits[1], fastest = sharpness > 0.0f ? LARGEST_MOVE / (sqrtf(sharpness) * seconds) : INFINITY;
-    for (int i = 0; i < body->nodes; i++)
-        for (int k = 0; k < 3; k++) {
-            float *v = body->velocity + 4 * i + k;
-            *v = *v > fastest ? fastest : *v < -fastest ? -fastest : *v;
-            body->displacement[4 * i + k] += seconds * *v;
-        }
-}
-
-static void accelerate(const Body *body, float seconds, float gravity, float drag)
-{
-    float kept = 1.0f - drag * seconds;
-    for (int i = 0; i < body->nodes; i++) {
-        if (body->inverse_mass[i] == 0.0f)
-            continue;
-        float share = seconds * body->inverse_mass[i], *v = body->velocity + 4 * i;
-        const float *f = body->force + 4 * i;
-        v[0] = kept * v[0] + share * f[0];
-        v[1] = kept * v[1] + share * f[1];
-        v[2] = kept * v[2] + share * f[2] - seconds * gravity;
-    }
-}
-
-/* Memory of a step. */
-typedef struct {
-    int *near;         /* faces near the spheres */
-    int32_t *beside;   /* boxes and nodes near them */
-    double *begun;     /* fronts at the start, (edges, samples, 3) */
-    double *impulses;  /* (edges, samples, 3) */
-    double *triangles; /* (2 edges samples, 3, 3) */
-} Scratch;
-
-static int find_scratch(const Body *body, const Spheres *spheres, const Edges *edges, Scratch *scratch)
-{
-    size_t fronts = 3 * (size_t)(edges->count * edges->samples + 1);
-    scratch->near = PyMem_RawMalloc(sizeof(int) * (size_t)(spheres->count + 1) * (MOST_NEAR + 1));
-    scratch->beside = PyMem_RawMalloc(sizeof(int32_t) * (2 * (size_t)body->boxes * (size_t)body->nodes + 1));
-    scratch->begun = PyMem_RawCalloc(fronts, sizeof(double));
-    scratch->impulses = PyMem_RawCalloc(fronts, sizeof(double));
-    scratch->triangles = PyMem_RawCalloc(6 * fronts, sizeof(double));
-    return scratch->near && scratch->beside && scratch->begun && scratch->impulses && scratch->triangles;
-}
-
-static void free_scratch(Scratch *scratch)
-{
-    PyMem_RawFree(scratch->near);
-    PyMem_RawFree(scratch->beside);
-    PyMem_RawFree(scratch->begun);
-    PyMem_RawFree(scratch->impulses);
-    PyMem_RawFree(scratch->triangles);
-}
-
-/* Advance by sub-steps; return how many faces have been cut open, or -1 without memory. */
-static int run(Body *body, const Spheres *spheres, const Edges *edges, int sub_steps, float seconds, float gravity,
-               float drag)
-{
-    Scratch scratch;
-    int opened = -1;
-    if (find_scratch(body, spheres, edges, &scratch)) {
-        for (int s = 0; s < spheres->count; s++) {
-            int *found = scratch.near + s * (MOST_NEAR + 1);
-            *found = spheres->free[s] ? find_near(body, spheres, s, sub_steps, found + 1, MOST_NEAR) : 0;
-        }
-        engage(body, spheres, edges, sub_steps, scratch.begun);
-        int beside = find_beside(body, (double)seconds * sub_steps, scratch.beside);
-        for (int k = 0; k < sub_steps; k++) {
-            elastic_forces(body, seconds);
-            accelerate(body, seconds, gravity, drag);
-            carry(body, spheres, k, seconds, gravity);
-            for (int s = 0; s < spheres->count; s++) {
-                int *found = scratch.near + s * (MOST_NEAR + 1);
-                if (*found)
-                    press(body, spheres, s, k, seconds, found + 1, *found);
-            }
-            slice(body, spheres, edges, k, seconds, scratch.impulses);
-            rest_on(body, scratch.beside, beside, (double)seconds);
-            move(body, seconds);
-            follow(body, spheres, edges, k, seconds, scratch.impulses);
-        }
-        for (int i = 0; i < 3 * body->boxes; i++)
-            body->support[i] /= sub_steps;
-        int swept = sweep(body, spheres, edges, sub_steps, scratch.begun, scratch.triangles);
-        opened = swept ? cut_along(body, scratch.triangles, swept) : 0;
-    }
-    free_scratch(&scratch);
-    return opened;
+    for (int k = 0; k < WAY_BUFFERS; k++)
+        PyBuffer_Release(way->held + k);
 }
 
 PyDoc_STRVAR(advance_doc, "advance(path, radius, free, force, friction, seconds, sub_steps, gravity, drag, ends, \
@@ -137,28 +49,15 @@ Return how many faces have been cut open.");
 
 static PyObject *advance(Solid *self, PyObject *args)
 {
-    Py_buffer held[9];
-    Spheres spheres;
-    Edges edges;
-    float seconds, gravity, drag;
-    int sub_steps, opened;
-    if (!PyArg_ParseTuple(args, "y*y*y*w*ffiffy*dw*w*w*w*", held, held + 1, held + 2, held + 3, &spheres.friction, &seconds,
-                          &sub_steps, &gravity, &drag, held + 4, &edges.toughness, held + 5, held + 6, held + 7, held + 8))
+    Way way;
+    Course course;
+    int opened;
+    if (read_way(self, args, &way, &course))
         return NULL;
-    spheres.count = (int)(held[1].len / (Py_ssize_t)sizeof(double));
-    spheres.path = held[0].buf, spheres.radius = held[1].buf, spheres.free = held[2].buf, spheres.force = held[3].buf;
-    edges.count = (int)(held[4].len / 8);
-    edges.samples = edges.count ? (int)(held[5].len / 4) / edges.count : 0;
-    edges.ends = held[4].buf, edges.element = held[5].buf, edges.front = held[6].buf, edges.ahead = held[7].buf;
-    edges.area = held[8].buf;
-    int fits = edges.samples <= MOST_SAMPLES;
     Py_BEGIN_ALLOW_THREADS;
-    opened = !fits ? 0 : run(&self->body, &spheres, &edges, sub_steps, seconds, gravity, drag);
+    opened = advance_bodies(&way, 1, &course, NULL);
     Py_END_ALLOW_THREADS;
-    for (int k = 0; k < 9; k++)
-        PyBuffer_Release(held + k);
-    if (!fits)
-        return PyErr_Format(PyExc_ValueError, "at most %d samples along an edge", MOST_SAMPLES);
+    release_way(&way);
     return opened < 0 ? PyErr_NoMemory() : PyLong_FromLong(opened);
 }
 
@@ -353,7 +252,7 @@ static PyGetSetDef fields[] = {
     {NULL, NULL, NULL, NULL, NULL},
 };
 
-static PyTypeObject solid_type = {
+PyTypeObject solid_type = {
     PyVarObject_HEAD_INIT(NULL, 0).tp_name = "engines.fem._solid.Solid",
     .tp_doc = PyDoc_STR("A body over the arrays of `engines.fem.solid.Solid`, which checks them."),
     .tp_basicsize = sizeof(Solid),
@@ -375,7 +274,7 @@ static struct PyModuleDef definition = {
 PyMODINIT_FUNC PyInit__solid(void)
 {
     PyObject *module = PyModule_Create(&definition);
-    if (module == NULL || PyModule_AddType(module, &solid_type) < 0)
+    if (module == NULL || PyModule_AddType(module, &solid_type) < 0 || PyModule_AddType(module, &together_type) < 0)
         return NULL;
     return module;
 }

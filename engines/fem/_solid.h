@@ -17,6 +17,7 @@ is at 4 k + l. Face 4 e + k of element e is opposite to its corner k.
 
 typedef struct {
     int nodes, blocks, faces, branches;
+    int changes;                 /* of the mesh since the start */
     int node_room;               /* a body that may be cut has room for a node of its own at every corner */
     int skin;                    /* faces of the uncut mesh */
     float *rest;                 /* (nodes, 4) */
@@ -69,6 +70,45 @@ typedef struct {
     double *area;        /* (1,): swept so far, m^2 */
 } Edges;
 
+#define WAY_BUFFERS 9
+
+/* A body on its way through a step: its instruments, and memory. */
+typedef struct {
+    Body *body;
+    Spheres spheres;
+    Edges edges;
+    float drag;        /* damping over mass, 1/s */
+    int *near;         /* faces near the spheres */
+    int32_t *beside;   /* boxes and nodes near them */
+    int besides;       /* their pairs */
+    double *begun;     /* fronts at the start, (edges, samples, 3) */
+    double *impulses;  /* (edges, samples, 3) */
+    double *triangles; /* (2 edges samples, 3, 3) */
+    Py_buffer held[WAY_BUFFERS];
+} Way;
+
+typedef struct {
+    int sub_steps;
+    float seconds, gravity; /* of a sub-step; along -z */
+} Course;
+
+typedef struct {
+    PyObject_HEAD
+    Body body;
+    Py_buffer held[26];
+    int count;
+} Solid;
+
+typedef struct Touch Touch; /* of bodies among each other */
+
+/* Elements around some nodes: those of nodes[k] are element[start[k]] to element[start[k + 1] - 1], ascending. */
+typedef struct {
+    int count;
+    int32_t *nodes, *start, *element, *place; /* place: number in `nodes` by node, or -1 */
+} Stars;
+
+extern PyTypeObject solid_type, together_type;
+
 static inline int32_t *corner_of(const Body *body, int element, int corner)
 {
     return body->corners + 16 * (element / 4) + 4 * corner + element % 4;
@@ -86,6 +126,20 @@ int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_step
 int find_beside(const Body *body, double seconds, int32_t *beside);
 void rest_on(const Body *body, const int32_t *beside, int count, double seconds);
 
+int advance_bodies(Way *ways, int count, const Course *course, Touch *touch);
+int read_way(Solid *self, PyObject *args, Way *way, Course *course);
+void release_way(Way *way);
+
+Touch *new_touch(int count, Body *const *bodies, const double *middles, const double *frictions, double *forces,
+                 double ahead, double skin);
+void free_touch(Touch *touch);
+void forget_pairs(Touch *touch);
+void begin_touch(Touch *touch);
+int part_bodies(Touch *touch, double seconds, double share);
+
+int find_stars(const Body *body, int32_t *place, Stars *stars);
+void free_stars(Stars *stars);
+int32_t *no_places(const Body *body);
 int open_faces(Body *body, const int32_t *faces, int count);
 int remove_elements(Body *body, const int32_t *elements, int count);
 int measure(const Body *body, float *sharpness, float *bulk_rate);

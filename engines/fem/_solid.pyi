@@ -1,4 +1,5 @@
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,3 +32,17 @@ class Solid:
     def tear(self, stretch: float, /) -> int: ...
     def measure(self) -> tuple[float, float]: ...
     def pieces(self, labels: NDArray[np.int32], /) -> None: ...
+
+class Together:
+    def __init__(
+        self,
+        solids: tuple[Solid, ...],
+        middles: NDArray[np.float64],
+        frictions: NDArray[np.float64],
+        forces: NDArray[np.float64],
+        ahead: float,
+        skin: float,
+        /,
+    ) -> None: ...
+    def advance(self, arguments: tuple[tuple[Any, ...], ...], /) -> int: ...
+    def forget(self) -> None: ...

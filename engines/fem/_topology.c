@@ -8,13 +8,7 @@ group gets a copy of the node. Mass stays with the elements.
 
 static const int FACE[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}; /* outward, by the opposite corner */
 
-/* Elements around some nodes: those of nodes[k] are element[start[k]] to element[start[k + 1] - 1], ascending. */
-typedef struct {
-    int count;
-    int32_t *nodes, *start, *element, *place; /* place: number in `nodes` by node, or -1 */
-} Stars;
-
-static void free_stars(Stars *stars)
+void free_stars(Stars *stars)
 {
     PyMem_RawFree(stars->nodes);
     PyMem_RawFree(stars->start);
@@ -23,7 +17,7 @@ static void free_stars(Stars *stars)
 }
 
 /* Find the elements around all marked nodes (place 0 instead of -1); `place` is given and kept. */
-static int find_stars(const Body *body, int32_t *place, Stars *stars)
+int find_stars(const Body *body, int32_t *place, Stars *stars)
 {
     int elements = 4 * body->blocks, count = 0;
     stars->place = place;
@@ -64,7 +58,7 @@ static int find_stars(const Body *body, int32_t *place, Stars *stars)
     return 0;
 }
 
-static int32_t *no_places(const Body *body)
+int32_t *no_places(const Body *body)
 {
     int32_t *place = PyMem_RawMalloc(sizeof(int32_t) * (size_t)(body->node_room + 1));
     if (place != NULL)
@@ -256,6 +250,7 @@ static int part_nodes(Body *body, int32_t *place)
 {
     int elements = 4 * body->blocks, failed = 0;
     Stars stars = {0};
+    body->changes++;
     int32_t *group = PyMem_RawMalloc(sizeof(int32_t) * (size_t)elements * 2);
     if (group == NULL || find_stars(body, place, &stars))
         failed = 1;

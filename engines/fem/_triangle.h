@@ -1,6 +1,6 @@
 /* The point of a triangle nearest to the origin. */
 
-static inline float dot(const float a[3], const float b[3])
+static inline float dotf(const float a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -12,7 +12,7 @@ static inline void nearest(const float a[3], const float b[3], const float c[3],
     float ab[3], ac[3];
     for (int i = 0; i < 3; i++)
         ab[i] = b[i] - a[i], ac[i] = c[i] - a[i];
-    float d1 = -dot(ab, a), d2 = -dot(ac, a), d3 = -dot(ab, b), d4 = -dot(ac, b), d5 = -dot(ab, c), d6 = -dot(ac, c);
+    float d1 = -dotf(ab, a), d2 = -dotf(ac, a), d3 = -dotf(ab, b), d4 = -dotf(ac, b), d5 = -dotf(ab, c), d6 = -dotf(ac, c);
     float va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
     float along = 0.0f;
     share[0] = share[1] = share[2] = 0.0f;

@@ -17,6 +17,7 @@ from engines.fem.params import FemParams
 from engines.fem.probe import Probe
 from engines.fem.spheres import MOST_CONTACTS, Spheres, near_faces
 from engines.fem.tissue_events import event_ports
+from engines.fem.together import Together
 from engines.tissue.elasticity.body_yield import BodyYield
 from engines.tissue.ports import node_ports, node_states, surface_changes, surface_ports
 from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
@@ -51,6 +52,7 @@ class FemEngine(Stepped):
         self._heating: Heating | None = None
         self._layers: list[LayerOutputs | None] = []
         """Outputs of each organ with layers."""
+        self._together: Together | None = None
         self._warn_of_coupling()
 
     @property
@@ -72,10 +74,10 @@ class FemEngine(Stepped):
         """Build the organs and let them settle. Raises ScenarioError for unfit periods."""
         self._check(setup.period_ns)
         boxes = box_rows(self.params.rigid.values())
+        is_carried = bool(len(boxes)) or (self.params.organ_contact and len(self.params.organs) > 1)
         for name, organ in self.params.organs.items():
-            self._organs.append(Organ(name, organ, boxes))
-        for organ in self._organs:
-            organ.settle(self.params.gravity)
+            self._organs.append(Organ(name, organ, boxes, is_carried=is_carried))
+        self._settle()
         self._sub_steps = max(organ.solid.sub_steps(setup.period_ns * 1e-9) for organ in self._organs)
         if self.params.timestep is not None:
             self._sub_steps = max(self._sub_steps, -(-setup.period_ns // self.params.timestep))
@@ -86,6 +88,15 @@ class FemEngine(Stepped):
         self._bonded = dict(setup.bonds)
         return self._begin()
 
+    def _settle(self) -> None:
+        """Let the organs come to rest, side by side where they touch."""
+        if self.params.organ_contact:
+            self._together = Together(self._organs)
+            self._together.settle(self.params.gravity)
+        else:
+            for organ in self._organs:
+                organ.settle(self.params.gravity)
+
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Press the organs along the predicted motion; return the reactions, and the nodes when due."""
         seconds, end = h * 1e-9, t + h
@@ -93,8 +104,11 @@ class FemEngine(Stepped):
             probe.begin(inputs, seconds)
         forces = self._spheres.forces
         forces[:] = 0.0
-        for organ in self._organs:
-            forces += organ.advance(seconds, self.params.gravity)
+        if self._together is None:
+            for organ in self._organs:
+                forces += organ.advance(seconds, self.params.gravity)
+        else:
+            forces += self._together.advance(seconds, self.params.gravity)
         are_finite = [probe.end() for probe in self._probes]
         due, touch = end % self.params.node_period == 0, end // CONTACT_PERIOD_NS != t // CONTACT_PERIOD_NS
         if due or touch or not all(are_finite):
@@ -157,6 +171,8 @@ class FemEngine(Stepped):
     def _restore_parts(self, parts: Iterator[bytes]) -> None:
         for organ in self._organs:
             organ.restore(parts)
+        if self._together is not None:
+            self._together.forget()
         if self._heating is not None:
             self._heating.restore(parts)
         for probe in self._probes:
@@ -182,7 +198,7 @@ class FemEngine(Stepped):
 
     def close(self) -> None:
         """Forget the organs."""
-        self._heating = None
+        self._heating = self._together = None
         for kept in (self._organs, self._probes, self._grasps, self._surfaces, self._layers):
             kept.clear()
 

@@ -23,7 +23,7 @@ from schemas.errors import SessionError
 from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
-__all__ = ["Organ", "relaxation"]
+__all__ = ["Organ", "relaxation", "still_way"]
 
 _VISCOUS_SHARE = 1.0
 """Shear modulus of the branch for `damping`, over that of the material. The damping of a branch is modulus
@@ -48,11 +48,18 @@ def _slowest_on_a_bed(material: Material, extent: float) -> float:
     return 0.5 * np.pi * sqrt(material.young_modulus / material.density) / extent
 
 
+def still_way(sub_steps: int) -> SphereWay:
+    """Return the way of no spheres."""
+    return SphereWay(np.zeros((sub_steps + 1, 0, 3)), *_NO_SPHERES)
+
+
 class Organ:
     """Tissue of one name."""
 
-    def __init__(self, name: str, params: OrganParams, boxes: Vector = NO_BOXES) -> None:
-        """`boxes`: fixed rigid parts, rows of `box_rows`."""
+    def __init__(
+        self, name: str, params: OrganParams, boxes: Vector = NO_BOXES, *, is_carried: bool = False
+    ) -> None:
+        """`boxes`: fixed rigid parts, rows of `box_rows`; `is_carried`: whether they or organs carry it."""
         self.name, self.mesh = name, params.rest
         self._anchored: NDArray[np.bool_] = np.zeros(len(self.mesh.nodes), dtype=np.bool_)
         for tied in params.anchored_nodes.values():
@@ -87,7 +94,7 @@ class Organ:
         self._edges = NO_EDGES
         self._reach = float(np.linalg.norm(np.ptp(self.mesh.nodes, axis=0)))
         self._slowest = params.frequencies[1]
-        if self._slowest is None and len(boxes):
+        if self._slowest is None and is_carried:
             self._slowest = _slowest_on_a_bed(material, self._reach)
         self._presses = self._free = np.ones(0, np.uint8)
         self.mesh_version = 0
@@ -109,24 +116,42 @@ class Organ:
         """Nodes held by a grasp, shape (n,)."""
         return self.solid.holder >= 0
 
+    @property
+    def settling_s(self) -> float:
+        """Time in which the organ comes to rest, s; 0 for one that nothing carries."""
+        if self._slowest is None:
+            return 0.0
+        return max(_LEAST_SETTLING_S, _SETTLED_PERIODS * 2.0 * np.pi / self._slowest)
+
+    @property
+    def settling_drag(self) -> float:
+        """Damping over mass meanwhile, 1/s."""
+        return 2.0 * (self._slowest or 0.0)
+
     def settle(self, gravity: float) -> None:
         """Let the organ come to rest under its weight (m/s^2, along -z)."""
-        if self._slowest is None:
+        if not self.settling_s:
             return
-        duration = max(_LEAST_SETTLING_S, _SETTLED_PERIODS * 2.0 * np.pi / self._slowest)
-        sub_steps = self.solid.sub_steps(duration)
-        way = SphereWay(np.zeros((sub_steps + 1, 0, 3)), *_NO_SPHERES)
-        self.solid.advance(duration, way, 0.0, gravity, drag=2.0 * self._slowest)
+        way = still_way(self.solid.sub_steps(self.settling_s))
+        self.solid.advance(self.settling_s, way, 0.0, gravity, drag=self.settling_drag)
+        self.stand()
+
+    def stand(self) -> None:
+        """Stop all nodes."""
         self.solid.stand()
         self.sample(0)
 
     def advance(self, seconds: float, gravity: float) -> Vector:
         """Advance; return the force on each sphere in each sub-step, N, shape (k, n, 3)."""
-        forces = self.solid.advance(seconds, self._way, self.friction, gravity)
+        forces = self.solid.advance(seconds, self.way, self.friction, gravity)
+        self.follow_surface()
+        return forces
+
+    def follow_surface(self) -> None:
+        """Note faces that have been cut open."""
         if self.solid.counts[1] != len(self.surface.faces):
             self._note_opened("cut", np.unique(self._edges.ends))
             self._note_change()
-        return forces
 
     def tear(self) -> None:
         """Open faces that are stretched beyond the limit of the tissue, if there is one."""
@@ -228,7 +253,8 @@ class Organ:
             self._presses[np.unique(blades)] = 0  # ends of blades pass through
             self._edges = Edges(blades, _SAMPLES, self._cutting.toughness)
         self._free = self._presses.copy()
-        self._way = SphereWay(spheres.path, spheres.radii, self._free, self._edges)
+        self.way = SphereWay(spheres.path, spheres.radii, self._free, self._edges)
+        """Ways of the spheres in a step."""
 
     def held_by(self, bodies: Collection[int]) -> list[int]:
         """Return the nodes that these spheres hold."""

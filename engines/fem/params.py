@@ -24,6 +24,22 @@ class FemParams(PressedOrgansParams):
         description="longest sub-step; the mesh may need shorter ones, which the engine works out",
     )
 
+    organ_contact: bool = Field(
+        default=True,
+        description=(
+            "whether organs touch one another and themselves, also the sides of a cut; the smaller of their"
+            " frictions counts"
+        ),
+    )
+
+    def has_sub_grid(self, probe: str) -> bool:
+        """Return whether a probe feels the tissue's own force: not where organs may lean on rigid parts.
+
+        The spring in series knows the organ on its anchors alone.
+        """
+        anchors = {part for organ in self.organs.values() for part in organ.anchored_nodes}
+        return self.rigid.keys() <= anchors and super().has_sub_grid(probe)
+
     @property
     def changes_surfaces(self) -> bool:
         """Whether an organ may be divided or burnt."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import ceil, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,10 @@ class SphereWay:
     """0 for a sphere that passes through the body, shape (n,)."""
     edges: Edges = field(default=NO_EDGES)
     """Sharp edges between spheres."""
+
+    def no_forces(self) -> Vector:
+        """Return a force of 0 on each sphere in each sub-step, shape (k, n, 3)."""
+        return np.zeros((len(self.path) - 1, len(self.radii), 3))
 
 
 @dataclass(frozen=True)
@@ -125,11 +130,11 @@ class Solid:
         self._boxes = boxes - np.pad(self.middle, (0, boxes.shape[1] - 3))
         self.support: Vector = np.zeros((len(boxes), 3))
         """Mean force of the body on each box in the last step, N, shape (b, 3)."""
-        self._compiled = Compiled(self._arrays, len(mesh.nodes), len(mesh.triangles))
+        self.compiled = Compiled(self._arrays, len(mesh.nodes), len(mesh.triangles))
         self.longest_step = _STEP_SHARE * 2.0 / self._highest_frequency()
         """Longest sub-step, s."""
         if divisible:
-            self._limits[1:3] = self._compiled.measure()
+            self._limits[1:3] = self.compiled.measure()
             self._limits[1] *= _SHARPER
             self.longest_step = min(self.longest_step, _PIECE_SHARE * 2.0 / self._piece_frequency(materials))
 
@@ -196,37 +201,37 @@ class Solid:
     @property
     def displacement(self) -> NDArray[np.float32]:
         """Displacements and pressures, m and Pa, shape (n, 4)."""
-        return self._displacement[: self._compiled.counts[0]]
+        return self._displacement[: self.compiled.counts[0]]
 
     @property
     def velocity(self) -> NDArray[np.float32]:
         """Velocities, m/s, shape (n, 4)."""
-        return self._velocity[: self._compiled.counts[0]]
+        return self._velocity[: self.compiled.counts[0]]
 
     @property
     def force(self) -> NDArray[np.float32]:
         """Forces of the elements on the nodes, N, shape (n, 4)."""
-        return self._force[: self._compiled.counts[0]]
+        return self._force[: self.compiled.counts[0]]
 
     @property
     def mass(self) -> NDArray[np.float32]:
         """Mass at the nodes, kg, shape (n,)."""
-        return self._mass[: self._compiled.counts[0]]
+        return self._mass[: self.compiled.counts[0]]
 
     @property
     def inverse_mass(self) -> NDArray[np.float32]:
         """1/kg, 0 for fixed and held nodes, shape (n,)."""
-        return self._inverse_mass[: self._compiled.counts[0]]
+        return self._inverse_mass[: self.compiled.counts[0]]
 
     @property
     def origin(self) -> NDArray[np.int32]:
         """Node of the uncut mesh at the place of each node, shape (n,)."""
-        return self._origin[: self._compiled.counts[0]]
+        return self._origin[: self.compiled.counts[0]]
 
     @property
     def faces(self) -> NDArray[np.int32]:
         """Faces of the surface by slot, the uncut mesh's first; -1: has gone, shape (f, 3)."""
-        return self._surface[: self._compiled.counts[1]]
+        return self._surface[: self.compiled.counts[1]]
 
     @property
     def elements(self) -> tuple[Indices, Vector, Vector]:
@@ -255,12 +260,12 @@ class Solid:
     @property
     def owners(self) -> NDArray[np.int32]:
         """Element of each face of the surface by slot, shape (f,)."""
-        return self._owner[: self._compiled.counts[1]] // 4
+        return self._owner[: self.compiled.counts[1]] // 4
 
     @property
     def nodes(self) -> Vector:
         """Present nodes, m, in `world`, shape (n, 3)."""
-        n = self._compiled.counts[0]
+        n = self.compiled.counts[0]
         return self.middle + self._rest[:n, :3].astype(np.float64) + self._displacement[:n, :3]
 
     def areas(self, faces: NDArray[np.integer]) -> Vector:
@@ -272,7 +277,7 @@ class Solid:
     @property
     def holder(self) -> NDArray[np.int32]:
         """Number of the sphere that holds a node, or -1, shape (n,)."""
-        return self._holder[: self._compiled.counts[0]]
+        return self._holder[: self.compiled.counts[0]]
 
     @property
     def tetrahedra(self) -> NDArray[np.int32]:
@@ -283,7 +288,7 @@ class Solid:
     def pieces(self) -> NDArray[np.int32]:
         """Piece of the body by element; -1: an element that has gone, shape (m,)."""
         labels = np.zeros(len(self._volumes), np.int32)
-        self._compiled.pieces(labels)
+        self.compiled.pieces(labels)
         return labels
 
     def sub_steps(self, seconds: float) -> int:
@@ -297,9 +302,16 @@ class Solid:
 
         gravity: along -z, m/s^2. drag: damping over mass, 1/s.
         """
-        sub_steps, spheres, edges = len(way.path) - 1, way.path.shape[1], way.edges
-        forces = np.zeros((sub_steps, spheres, 3))
-        self._compiled.advance(
+        forces = way.no_forces()
+        self.compiled.advance(*self.arguments(seconds, way, forces, friction, gravity, drag))
+        return forces
+
+    def arguments(
+        self, seconds: float, way: SphereWay, forces: Vector, friction: float, gravity: float, drag: float
+    ) -> tuple[Any, ...]:
+        """Return the arguments of `_solid.c` for `advance`, which adds to `forces`, shape (k, n, 3)."""
+        sub_steps, edges = len(way.path) - 1, way.edges
+        return (
             np.ascontiguousarray(way.path - self.middle),
             way.radii,
             way.free,
@@ -311,15 +323,14 @@ class Solid:
             drag,
             *(edges.ends, edges.toughness, edges.element, edges.front, edges.ahead, edges.swept),
         )
-        return forces
 
     def tear(self, stretch: float) -> int:
         """Open faces stretched beyond `stretch`; return how many."""
-        return self._compiled.tear(stretch)
+        return self.compiled.tear(stretch)
 
     def remove(self, elements: Indices) -> int:
         """Let elements go; return how many were there."""
-        return self._compiled.remove(np.ascontiguousarray(elements, np.int32))
+        return self.compiled.remove(np.ascontiguousarray(elements, np.int32))
 
     def hold(self, node: int, sphere: int) -> None:
         """Let a node go with a sphere."""
@@ -339,7 +350,7 @@ class Solid:
     @property
     def state(self) -> tuple[NDArray[np.generic], ...]:
         """Arrays that change, in the order of `restore`: `counts` gives the shapes of a divided body."""
-        n, f = self._compiled.counts
+        n, f = self.compiled.counts
         moving = (self._displacement[:n], self._velocity[:n], self.strains)
         held = (self._holder[:n], self._inverse_mass[:n])
         if not self.divisible:
@@ -351,11 +362,11 @@ class Solid:
     @property
     def counts(self) -> tuple[int, int]:
         """Numbers of nodes and of faces of the surface."""
-        return self._compiled.counts
+        return self.compiled.counts
 
     @counts.setter
     def counts(self, counts: tuple[int, int]) -> None:
-        self._compiled.counts = counts
+        self.compiled.counts = counts
 
     def _piece_frequency(self, materials: Sequence[Material]) -> float:
         """Return a bound of the highest natural frequency (rad/s) of every piece of the resting body."""
@@ -375,7 +386,7 @@ class Solid:
             mode *= size / float(np.abs(mode).max())
             self.displacement[:, :3] = mode
             self.strains[:] = 0.0
-            self._compiled.forces(0.0)
+            self.compiled.forces(0.0)
             pushed: Vector = -self.force[:, :3].astype(np.float64) * self.inverse_mass[:, None]
             square = float(np.linalg.norm(pushed) / np.linalg.norm(mode))
             mode = pushed

@@ -134,7 +134,7 @@ def test_a_body_of_single_elements_falls_and_stays_finite():
     mesh = block(np.array([0.03, 0.02, 0.01]), 120)
     solid = strip(mesh=mesh)
     mass = mass_of(solid)
-    solid._compiled.open(np.arange(4 * len(mesh.tetrahedra), dtype=np.int32))
+    solid.compiled.open(np.arange(4 * len(mesh.tetrahedra), dtype=np.int32))
     assert len(np.unique(solid.pieces)) == len(mesh.tetrahedra) + (solid.pieces == -1).any()
     assert len(solid.origin) == 4 * len(mesh.tetrahedra)
     way = SphereWay(np.zeros((solid.sub_steps(0.05) + 1, 0, 3)), np.zeros(0), np.zeros(0, np.uint8))

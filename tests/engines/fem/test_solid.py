@@ -29,7 +29,7 @@ def free_solid(mesh=MESH, material=SOFT, branches=()):
 
 
 def forces(solid, seconds=0.0):
-    solid._compiled.forces(seconds)
+    solid.compiled.forces(seconds)
     return solid.force[:, :3].astype(float)
 
 
@@ -166,7 +166,7 @@ def test_plain_c_has_the_bits_of_simd(tmp_path, monkeypatch):
     sphere_press(usual, (1e-3, 2e-3, 0.0), 4e-3, 2e-3, friction=0.3, aside=1e-3, seconds=0.05)
     monkeypatch.setitem(sys.modules, "engines.fem._solid", plain_lanes(tmp_path))
     plain = slab(120)
-    assert type(plain._compiled) is not type(usual._compiled)
+    assert type(plain.compiled) is not type(usual.compiled)
     sphere_press(plain, (1e-3, 2e-3, 0.0), 4e-3, 2e-3, friction=0.3, aside=1e-3, seconds=0.05)
     for one, other in zip(usual.state, plain.state, strict=True):
         assert one.tobytes() == other.tobytes()

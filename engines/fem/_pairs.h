@@ -1,0 +1,34 @@
+/* Vertices and faces of bodies that may meet; see _pairs.c. */
+
+typedef struct {
+    int32_t body, node;
+} Vertex;
+
+typedef struct {
+    int32_t body, slot; /* of a face */
+} Pair;
+
+typedef struct {
+    int bodies;
+    Body *const *body;
+    const double *middle; /* (bodies, 3): origins of their frames */
+    double reach, skin;   /* m: distance of the pairs, and the part of it in which they may move */
+    int are_known, vertices, room, pair_room;
+    int *changes;         /* (bodies,): of the meshes when the pairs were found */
+    Vertex *vertex;       /* (room,) */
+    float *before;        /* (room, 3): displacements when the pairs were found */
+    int32_t *start;       /* (room + 1,): first pair by vertex */
+    Pair *pair;
+} Pairs;
+
+/* Place of a node in the frame of all bodies. */
+static inline void place_of(const Pairs *pairs, int body, int32_t node, double x[3])
+{
+    const Body *own = pairs->body[body];
+    for (int i = 0; i < 3; i++)
+        x[i] = pairs->middle[3 * body + i] + (double)own->rest[4 * node + i] + (double)own->displacement[4 * node + i];
+}
+
+int have_moved(const Pairs *pairs);
+int find_pairs(Pairs *pairs);
+void free_pairs(Pairs *pairs);

@@ -1,0 +1,136 @@
+/* A step of bodies: all of their sub-steps side by side, with the instruments in each.
+
+Velocities, then displacements advance by each sub-step, with forces of the displacements before.
+*/
+
+#include "_solid.h"
+
+#define MOST_NEAR 16384 /* faces near one sphere: all of the largest mesh */
+#define LARGEST_MOVE 0.25f
+
+/* Move the nodes that a sphere holds with the sphere; write the force on the sphere. */
+static void carry(const Body *body, const Spheres *spheres, int sub_step, float seconds, float gravity)
+{
+    const float *mass = body->mass;
+    for (int i = 0; i < body->nodes; i++) {
+        int sphere = body->holder[i];
+        if (sphere < 0)
+            continue;
+        const double *here = spheres->path + 3 * (sub_step * spheres->count + sphere), *next = here + 3 * spheres->count;
+        double *force = spheres->force + 3 * (sub_step * spheres->count + sphere);
+        for (int k = 0; k < 3; k++) {
+            float now = (float)((next[k] - here[k]) / (double)seconds), *v = body->velocity + 4 * i + k;
+            float weight = k == 2 ? gravity * mass[i] : 0.0f;
+            force[k] += (double)(body->force[4 * i + k] - weight - mass[i] * (now - *v) / seconds);
+            *v = now;
+        }
+    }
+}
+
+/* Move the nodes; of a body that may be cut by no more in a sub-step than a part of the least height of an element. */
+static void move(const Body *body, float seconds)
+{
+    float sharpness = body->limits[1], fastest = sharpness > 0.0f ? LARGEST_MOVE / (sqrtf(sharpness) * seconds) : INFINITY;
+    for (int i = 0; i < body->nodes; i++)
+        for (int k = 0; k < 3; k++) {
+            float *v = body->velocity + 4 * i + k;
+            *v = *v > fastest ? fastest : *v < -fastest ? -fastest : *v;
+            body->displacement[4 * i + k] += seconds * *v;
+        }
+}
+
+static void accelerate(const Body *body, float seconds, float gravity, float drag)
+{
+    float kept = 1.0f - drag * seconds;
+    for (int i = 0; i < body->nodes; i++) {
+        if (body->inverse_mass[i] == 0.0f)
+            continue;
+        float share = seconds * body->inverse_mass[i], *v = body->velocity + 4 * i;
+        const float *f = body->force + 4 * i;
+        v[0] = kept * v[0] + share * f[0];
+        v[1] = kept * v[1] + share * f[1];
+        v[2] = kept * v[2] + share * f[2] - seconds * gravity;
+    }
+}
+
+static void end_way(Way *way)
+{
+    PyMem_RawFree(way->near);
+    PyMem_RawFree(way->beside);
+    PyMem_RawFree(way->begun);
+    PyMem_RawFree(way->impulses);
+    PyMem_RawFree(way->triangles);
+}
+
+/* Find memory for a step, and the faces and nodes that may be touched in it. */
+static int begin_way(Way *way, int sub_steps, float seconds)
+{
+    const Body *body = way->body;
+    const Spheres *spheres = &way->spheres;
+    size_t fronts = 3 * (size_t)(way->edges.count * way->edges.samples + 1);
+    way->near = PyMem_RawMalloc(sizeof(int) * (size_t)(spheres->count + 1) * (MOST_NEAR + 1));
+    way->beside = PyMem_RawMalloc(sizeof(int32_t) * (2 * (size_t)body->boxes * (size_t)body->nodes + 1));
+    way->begun = PyMem_RawCalloc(fronts, sizeof(double));
+    way->impulses = PyMem_RawCalloc(fronts, sizeof(double));
+    way->triangles = PyMem_RawCalloc(6 * fronts, sizeof(double));
+    if (!way->near || !way->beside || !way->begun || !way->impulses || !way->triangles)
+        return -1;
+    for (int s = 0; s < spheres->count; s++) {
+        int *found = way->near + s * (MOST_NEAR + 1);
+        *found = spheres->free[s] ? find_near(body, spheres, s, sub_steps, found + 1, MOST_NEAR) : 0;
+    }
+    way->besides = find_beside(body, (double)seconds * sub_steps, way->beside);
+    engage(body, spheres, &way->edges, sub_steps, way->begun);
+    return 0;
+}
+
+/* Set the velocities at the end of a sub-step, but for what other bodies and boxes do. */
+static void push(const Way *way, const Course *course, int sub_step)
+{
+    elastic_forces(way->body, course->seconds);
+    accelerate(way->body, course->seconds, course->gravity, way->drag);
+    carry(way->body, &way->spheres, sub_step, course->seconds, course->gravity);
+    for (int s = 0; s < way->spheres.count; s++) {
+        int *found = way->near + s * (MOST_NEAR + 1);
+        if (*found)
+            press(way->body, &way->spheres, s, sub_step, course->seconds, found + 1, *found);
+    }
+    slice(way->body, &way->spheres, &way->edges, sub_step, course->seconds, way->impulses);
+}
+
+/* Cut along what the edges have swept; return how many faces have been opened, or -1 without memory. */
+static int finish_way(Way *way, int sub_steps)
+{
+    Body *body = way->body;
+    for (int i = 0; i < 3 * body->boxes; i++)
+        body->support[i] /= sub_steps;
+    int swept = sweep(body, &way->spheres, &way->edges, sub_steps, way->begun, way->triangles);
+    return swept ? cut_along(body, way->triangles, swept) : 0;
+}
+
+/* Advance bodies, which touch each other with `touch`; return how many faces have been opened, or -1 without memory. */
+int advance_bodies(Way *ways, int count, const Course *course, Touch *touch)
+{
+    int failed = 0, opened = 0;
+    for (int b = 0; b < count; b++)
+        failed |= begin_way(ways + b, course->sub_steps, course->seconds);
+    if (touch)
+        begin_touch(touch);
+    for (int k = 0; k < course->sub_steps && !failed; k++) {
+        for (int b = 0; b < count; b++)
+            push(ways + b, course, k);
+        failed = touch ? part_bodies(touch, (double)course->seconds, 1.0 / course->sub_steps) : 0;
+        for (int b = 0; b < count; b++) {
+            rest_on(ways[b].body, ways[b].beside, ways[b].besides, (double)course->seconds);
+            move(ways[b].body, course->seconds);
+            follow(ways[b].body, &ways[b].spheres, &ways[b].edges, k, course->seconds, ways[b].impulses);
+        }
+    }
+    for (int b = 0; b < count && !failed; b++) {
+        int found = finish_way(ways + b, course->sub_steps);
+        failed = found < 0, opened += found;
+    }
+    for (int b = 0; b < count; b++)
+        end_way(ways + b);
+    return failed ? -1 : opened;
+}

@@ -1,0 +1,69 @@
+"""Organs that touch one another and themselves: they advance side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from engines.fem.organ import Organ, still_way
+from schemas.vectors import Vector
+
+__all__ = ["Together"]
+
+_AHEAD, _SKIN = 0.1, 0.2
+"""Distance of a vertex from a face that it meets, on both sides, and the skin of `_pairs.c`, over the least
+mean edge of the surfaces.
+"""
+
+
+class Together:
+    """Organs in one call of `_together.c` a step."""
+
+    def __init__(self, organs: Sequence[Organ]) -> None:
+        from engines.fem._solid import Together as Compiled
+
+        self._organs = organs
+        self.forces: Vector = np.zeros((len(organs), 3))
+        """Mean force of all contacts on each organ in the last step, N, shape (n, 3)."""
+        edge = min(organ.mean_edge for organ in organs)
+        self._compiled = Compiled(
+            tuple(organ.solid.compiled for organ in organs),
+            np.array([organ.solid.middle for organ in organs]),
+            np.array([organ.friction for organ in organs]),
+            self.forces,
+            _AHEAD * edge,
+            _SKIN * edge,
+        )
+
+    def settle(self, gravity: float) -> None:
+        """Let the organs come to rest under their weight (m/s^2, along -z)."""
+        seconds = max(organ.settling_s for organ in self._organs)
+        if not seconds:
+            return
+        way = still_way(max(organ.solid.sub_steps(seconds) for organ in self._organs))
+        self._compiled.advance(
+            tuple(
+                organ.solid.arguments(seconds, way, way.no_forces(), 0.0, gravity, organ.settling_drag)
+                for organ in self._organs
+            )
+        )
+        for organ in self._organs:
+            organ.stand()
+
+    def advance(self, seconds: float, gravity: float) -> Vector:
+        """Advance; return the force on each sphere in each sub-step, N, shape (k, n, 3)."""
+        forces = [organ.way.no_forces() for organ in self._organs]
+        self._compiled.advance(
+            tuple(
+                organ.solid.arguments(seconds, organ.way, found, organ.friction, gravity, 0.0)
+                for organ, found in zip(self._organs, forces, strict=True)
+            )
+        )
+        for organ in self._organs:
+            organ.follow_surface()
+        return np.add.reduce(forces)
+
+    def forget(self) -> None:
+        """Search pairs anew: the organs have been restored."""
+        self._compiled.forget()
