@@ -149,7 +149,7 @@ class Heating:
             found[f"{organ.name}/hottest"] = np.array([heat.hottest])
             found[f"{organ.name}/smoke"] = np.array([smoke])
         for instrument, _ in self._instruments:
-            found[f"{instrument.name}/delivered"] = instrument.numbers[1:].copy()
+            found[f"{instrument.name}/delivered"] = instrument.numbers[1:2].copy()
         return found
 
     @property

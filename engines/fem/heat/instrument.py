@@ -38,6 +38,9 @@ def energy_ports(probe: str) -> tuple[Port, ...]:
     )
 
 
+_LONGEST_IDLE_S = 1.0
+"""Time of power without contact after which a warning says so: a hook leaves tissue for moments."""
+
 Deposit = list[NDArray[np.float32]]
 """Heat in every element of every body, J; empty: none."""
 
@@ -50,8 +53,10 @@ class EnergyInstrument:
 
     def __init__(self, name: str, params: EnergyParams, radii: Vector) -> None:
         self.name, self.reach = name, _REACH * float(radii.max())
-        self.numbers: Vector = np.zeros(2)
-        """Heat that waits for the next step of heat, and heat given since time 0, J."""
+        self.numbers: Vector = np.zeros(3)
+        """Heat that waits for the next step of heat, and heat given since time 0, J; time with power
+        since the last contact, s.
+        """
         self._params, self._radii = params, radii
 
     def listen(self, inputs: Inputs, seconds: float) -> None:
@@ -60,6 +65,7 @@ class EnergyInstrument:
         power = 0.0 if inputs.stale(port) else inputs.number(port, 0.0)
         if power > 0.0:  # false of NaN
             self.numbers[0] += self._params.efficiency * min(power, self._params.power) * seconds
+            self.numbers[2] += seconds
 
     def poles(self, centres: Vector, touching: NDArray[np.bool_]) -> Vector:
         """Return centre, radius and signed current of every pole, shape (p, 5).
@@ -86,10 +92,12 @@ class EnergyInstrument:
         found = [heat.spread(at, poles, self.reach + edge) for heat, at in zip(heats, nodes, strict=True)]
         total = sum(share for _, share in found)
         if not total:
-            warn_once(
-                f"probe '{self.name}': power without contact heats nothing; a bipolar instrument needs tissue"
-                " at both jaws"
-            )
+            if self.numbers[2] >= _LONGEST_IDLE_S:
+                warn_once(
+                    f"probe '{self.name}': power without contact heats nothing; a bipolar instrument needs"
+                    " tissue at both jaws"
+                )
             return []
         self.numbers[1] += waiting
+        self.numbers[2] = 0.0
         return [np.float32(waiting / total) * shares for shares, _ in found]

@@ -33,6 +33,7 @@ SLOW = {
     "retraction": "4 s",
     "colon-grasp": "4 s",
     "caliper": "3 s",
+    "dissect": "5 s",
 }
 """Simulated time of each demonstration, enough for the work of every instrument to begin."""
 

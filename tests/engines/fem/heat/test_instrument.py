@@ -108,7 +108,7 @@ def test_heat_is_that_of_point_currents_in_an_infinite_body(mode):
 def test_power_without_contact_heats_nothing_and_is_said_once(caplog):
     with CauteryRig(start=(0.0, 0.0, 0.02)) as rig, caplog.at_level(logging.WARNING):
         rig.watts[:] = 30.0
-        rig.hold(0.1)
+        rig.hold(1.2)
         assert rig.number("probe/delivered") == 0.0
         assert rig.heat.is_cold
         assert rig.number("block/hottest") == 37.0
