@@ -30,7 +30,7 @@ _EXTENSIONS = (
         [
             f"engines/fem/_{part}.c"
             for part in (
-                *("solid", "step", "elements", "contact", "rigid", "topology", "cut", "blade"),
+                *("solid", "step", "elements", "contact", "rigid", "topology", "cut", "blade", "ties"),
                 *("together", "touch", "pairs"),
             )
         ],
@@ -50,6 +50,7 @@ _EXTENSIONS = (
         extra_compile_args=_FLAGS,
     ),
     Extension("engines.fem._heat", ["engines/fem/_heat.c"], extra_compile_args=_FLAGS),
+    Extension("engines.fem._film", ["engines/fem/_film.c"], extra_compile_args=_FLAGS),
     Extension("schemas._cdr", ["schemas/_cdr.c"], include_dirs=[np.get_include()], extra_compile_args=_FLAGS),
 )
 

@@ -27,10 +27,13 @@ __all__ = [
     "Force",
     "Length",
     "Mass",
+    "Perfusion",
     "Power",
     "Pressure",
     "Speed",
     "Stiffness",
+    "Toughness",
+    "VolumeFlow",
     "same_unit",
     "to_si",
 ]
@@ -60,6 +63,8 @@ _FACTORS = {
     ("mN", "N"): 1e-3,
     ("kN/m", "N/m"): 1e3,
     ("mm/s", "m/s"): 1e-3,
+    ("ml/s", "m^3/s"): 1e-6,
+    ("ml/min/kg", "m^3/(s kg)"): 1e-6 / 60.0,
 }
 """Factors of the most frequent units, as pint has them: a session with no other unit starts half a second
 sooner.
@@ -156,6 +161,8 @@ Power = Annotated[float, *_quantity_type("W", "30 W")]
 Pressure = Annotated[float, *_quantity_type("Pa", "10 kPa")]
 Density = Annotated[float, *_quantity_type("kg/m^3", "1000 kg/m^3")]
 Toughness = Annotated[float, *_quantity_type("J/m^2", "160 J/m^2")]
+VolumeFlow = Annotated[float, *_quantity_type("m^3/s", "30 ml/s")]
+Perfusion = Annotated[float, *_quantity_type("m^3/(s kg)", "860 ml/min/kg")]
 Force = Annotated[float, *_quantity_type("N", "2 N")]
 Stiffness = Annotated[float, *_quantity_type("N/m", "1000 N/m")]
 Damping = Annotated[float, *_quantity_type("N*s/m", "5 N*s/m")]

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.errors import MessageError
-from schemas.trocar_msgs import SoftBodyState, SurfaceChange
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange, SurfaceFilm
 
-__all__ = ["FaceKind", "SoftSurface"]
+__all__ = ["FILM_STEP_M", "FaceKind", "SoftSurface", "film_steps"]
 
+FILM_STEP_M = 10e-6
+"""Step of the thickness of a film in `SurfaceFilm`, m."""
 _GONE = -1
 
 
@@ -90,6 +92,23 @@ class SoftSurface(NamedTuple):
             raise _misfit(change, f"a face with a node outside 0 to {count - 1}")
         if change.origins.size and change.origins.max() >= nodes:
             raise _misfit(change, f"a copy of node {change.origins.max()}, allowed are 0 to {nodes - 1}")
+
+
+def film_steps(film: SurfaceFilm, nodes: int) -> NDArray[np.uint8]:
+    """Return the thickness of a film at each of `nodes` nodes, in steps of `FILM_STEP_M`, shape (n,).
+
+    Raises MessageError for a film that does not fit.
+    """
+    if film.nodes.size != film.thickness.size or (film.nodes[1:] <= film.nodes[:-1]).any():
+        raise MessageError(
+            f"film on '{film.body:.40}': {film.nodes.size} nodes and {film.thickness.size} thicknesses;"
+            " expected as many, and ascending nodes"
+        )
+    if film.nodes.size and film.nodes[-1] >= nodes:
+        raise MessageError(f"film on '{film.body:.40}': node {film.nodes[-1]}, allowed are 0 to {nodes - 1}")
+    steps = np.zeros(nodes, np.uint8)
+    steps[film.nodes] = film.thickness
+    return steps
 
 
 def _misfit(change: SurfaceChange, problem: str) -> MessageError:

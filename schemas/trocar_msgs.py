@@ -50,6 +50,7 @@ __all__ = [
     "ShownMarkers",
     "SoftBodyState",
     "SurfaceChange",
+    "SurfaceFilm",
     "TaskEvent",
     "TissueEvent",
     "TissueGrasp",
@@ -180,6 +181,20 @@ class SurfaceChange(Message):
     """Node of the first state at the resting place of each appended node."""
 
 
+class SurfaceFilm(Message):
+    """Liquid on the surface of a soft body: every message is complete."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/SurfaceFilm"
+    header: Header
+    body: String
+    liquid: String
+    """`blood` or `bile`."""
+    nodes: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
+    """Wet nodes, ascending."""
+    thickness: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
+    """Thickness of the film at each of these nodes, in steps of 10 um; 255: 2.55 mm or more."""
+
+
 class ShownMarkers(Message):
     """All markers of a scene at an instant, as arrays: a camera draws them without earlier messages.
 
@@ -238,7 +253,9 @@ class TissueEvent(Message):
     """Time of the end of the change; frame `world`."""
     kind: String
     """`cut` or `torn`, with the area of the opened faces; `burnt` (coagulated, charred or vaporised), with
-    the volume.
+    the volume; `bleeding`, with its flow, and `bleeding stopped`, with the volume lost by then, of bile
+    `leaking` and `leaking stopped`; `clipped`, with the width of the clip, and `clip slipped`, with the
+    diameter of the tube.
     """
     instrument: String = ""
     """Name of the probe; empty: none."""

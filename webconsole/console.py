@@ -115,6 +115,13 @@ class Console:
             held = self._made[stage.changes[name]] = value, stage.change(name, first, value)
         return held[1]
 
+    def film(self, stage: Stage, name: str, value: Value) -> Section:
+        """Return the section with the liquid on a surface, made once for all pages."""
+        held = self._made.get(stage.films[name])
+        if held is None or held[0] is not value:
+            held = self._made[stage.films[name]] = value, stage.film(name, value)
+        return held[1]
+
     def poses(self, stage: Stage, participant: str, values: dict[str, Value]) -> Section:
         """Return the section with the poses of a participant's bodies, made once for all pages."""
         (value,) = [*values.values()][-1:]

@@ -17,14 +17,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hub.participant.view import tint_of
 from schemas.errors import MessageError
-from schemas.trocar_msgs import SurfaceChange
+from schemas.trocar_msgs import SurfaceChange, SurfaceFilm
 
 __all__ = [
     "VERSION",
     "Section",
     "SectionKind",
     "change_content",
+    "film_content",
     "frame",
     "node_content",
     "parse_acknowledgement",
@@ -61,6 +63,8 @@ class SectionKind(IntEnum):
     """f32: norm of the force (N) for the hand at a device."""
     CHANGE = 9
     """Difference of a soft surface from its triangles: `change_content`."""
+    FILM = 10
+    """Liquid on a soft surface: `film_content`."""
 
 
 class Section(NamedTuple):
@@ -105,6 +109,17 @@ def change_content(change: SurfaceChange) -> bytes:
     """
     slots, faces = change.slots.astype("<u4"), change.faces.astype("<i4")
     return slots.tobytes() + faces.tobytes() + change.kinds.tobytes()
+
+
+def film_content(film: SurfaceFilm) -> bytes:
+    """Return the content of a film.
+
+    It is deep colour and depths of red, green and blue, f32 (6,), wet nodes, u32 (k,), and the thickness at
+    each, u8 (k,), in steps of 10 um.
+    """
+    tint = tint_of(film.liquid)
+    head = np.array([*tint.deep, *tint.depth_m], "<f4").tobytes()
+    return head + film.nodes.astype("<u4").tobytes() + film.thickness.tobytes()
 
 
 def frame(number: int, time_ns: int, parts: Sequence[Section]) -> bytes:

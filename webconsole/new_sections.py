@@ -95,6 +95,11 @@ class NewSections:
             before, self._sent[outlet] = self._sent.get(outlet), change
             if before is None or before.payload != change.payload:
                 yield self._console.change(stage, name, first, change)
+        if (outlet := stage.films.get(name)) and (film := self._newest(outlet)):
+            before, self._sent[outlet] = self._sent.get(outlet), film
+            section = self._console.film(stage, name, film)
+            if before is None or self._console.film(stage, name, before) != section:
+                yield section
         yield from self._changed_section(stage, name)
 
     def _force_arrows(self, stage: Stage, bond: BondArrows) -> Iterator[Section]:

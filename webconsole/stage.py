@@ -21,15 +21,15 @@ from schemas.errors import TrocarError
 from schemas.message import Message
 from schemas.ros import CompressedImage
 from schemas.scenario import Scenario
-from schemas.soft_surface import SoftSurface
-from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange
+from schemas.soft_surface import SoftSurface, film_steps
+from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange, SurfaceFilm
 from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
 from webconsole.bond_history import BondHistory
 from webconsole.drag import DraggedTip, dragged_tips
 from webconsole.felt import felt_wrenches
 from webconsole.followers import find_followers
-from webconsole.frame import Section, SectionKind, change_content, node_content
+from webconsole.frame import Section, SectionKind, change_content, film_content, node_content
 from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
 from webconsole.source import Outlet, Value
@@ -45,6 +45,8 @@ _FLESH: Rgb = (0.8, 0.38, 0.33)
 """Colour of a surface without a scene."""
 _NOTE = 1000
 """Longest reason in a note, characters: enough for a remedy at the end."""
+_MOST_NODES = 2**20
+"""Nodes of a surface that a page takes."""
 _GRID_M = 2.0**-16
 """Step of rounded vertices, m: 15 um are not seen, and trailing zeros compress."""
 
@@ -74,6 +76,11 @@ class Stage:
             if (change := f"{name.removesuffix('nodes')}surface") in changes
         }
         """Outlet of the changed surface, by the outlet of the nodes."""
+        films = _of_type(outlets, SurfaceFilm)
+        self.films = {
+            name: film for name in self.changes if (film := f"{name.removesuffix('nodes')}film") in films
+        }
+        """Outlet of the liquid on the surface, by the outlet of the nodes."""
         self.markers = _of_type(outlets, ShownMarkers)
         self.pictures = _of_type(outlets, CompressedImage)
         self.numbers = {one.name: VectorCodec(one.port) for one in signals if has_vector(one.port.type)}
@@ -99,6 +106,7 @@ class Stage:
                 *self._codecs,
                 *self.surfaces,
                 *self.changes.values(),
+                *self.films.values(),
                 *self.markers,
                 *of_arrows,
                 *of_hands,
@@ -170,6 +178,12 @@ class Stage:
         change = decode(SurfaceChange, value.payload)
         first.changed(change)
         return Section(SectionKind.CHANGE, [*self.surfaces].index(name), change_content(change))
+
+    def film(self, name: str, value: Value) -> Section:
+        """Return the liquid on a soft surface; raises MessageError if it is not valid."""
+        film = decode(SurfaceFilm, value.payload)
+        film_steps(film, _MOST_NODES)
+        return Section(SectionKind.FILM, [*self.surfaces].index(name), film_content(film))
 
     def is_numeric(self, name: str) -> bool:
         """Return whether an outlet can be plotted."""

@@ -63,6 +63,10 @@ class BulletParams(PressedOrgansParams):
         for name, probe in self.probes.items():
             if probe.energy is not None:
                 raise ValueError(f"probe '{name}': energy heats tissue of kind fem only; leave it out here")
+            if probe.suction is not None:
+                raise ValueError(f"probe '{name}': suction takes blood off kind fem only; leave it out here")
+            if probe.clip is not None:
+                raise ValueError(f"probe '{name}': clips hold tissue of kind fem only; leave it out here")
             if probe.blades:
                 raise ValueError(f"probe '{name}': blades cut tissue of kind fem only; leave them out here")
         for name, organ in self.organs.items():
@@ -70,6 +74,8 @@ class BulletParams(PressedOrgansParams):
                 raise ValueError(
                     f"organ '{name}': only tissue of kind fem has layers; leave `layers` out here"
                 )
+            if organ.lumen is not None:
+                raise ValueError(f"organ '{name}': only kind fem has a lumen; leave `lumen` out here")
             if organ.cutting is not None:
                 raise ValueError(f"organ '{name}': only tissue of kind fem is cut; leave `cutting` out here")
         return self

@@ -223,6 +223,8 @@ static int initialise(Solid *self, PyObject *args, PyObject *Py_UNUSED(named))
     NEXT(owner, 1);
     NEXT(middles, 0);
     NEXT(limits, 0);
+    NEXT(tied, 0);
+    body->ties = (int)(size / 8);
     NEXT(box, 0);
     body->boxes = (int)(size / 128);
     NEXT(support, 1);

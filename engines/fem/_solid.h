@@ -42,6 +42,8 @@ typedef struct {
     int32_t *surface;            /* (faces, 3): nodes by slot; -1 of a face that has gone */
     int32_t *owner;              /* (faces,): face of an element by slot */
     const float *middles;        /* (4 blocks, 3): of the elements of the uncut mesh */
+    int ties;                    /* most pairs of tied nodes */
+    int32_t *tied;               /* (ties, 2): nodes; -1 after the last pair */
     const float *limits;         /* (4,): lambda; largest sharpness, bulk rate and edge (m) of the uncut mesh */
     int boxes;                   /* that do not move */
     const double *box;           /* (boxes, 16): middle, axes row by row, half edges, friction */
@@ -95,7 +97,7 @@ typedef struct {
 typedef struct {
     PyObject_HEAD
     Body body;
-    Py_buffer held[26];
+    Py_buffer held[27];
     int count;
 } Solid;
 
@@ -118,6 +120,8 @@ static inline int is_gone(const Body *body, int element)
 {
     return body->volumes[element] == 0.0f;
 }
+
+void tie(const Body *body);
 
 void elastic_forces(const Body *body, float seconds);
 void press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count);

@@ -122,6 +122,7 @@ int advance_bodies(Way *ways, int count, const Course *course, Touch *touch)
         failed = touch ? part_bodies(touch, (double)course->seconds, 1.0 / course->sub_steps) : 0;
         for (int b = 0; b < count; b++) {
             rest_on(ways[b].body, ways[b].beside, ways[b].besides, (double)course->seconds);
+            tie(ways[b].body);
             move(ways[b].body, course->seconds);
             follow(ways[b].body, &ways[b].spheres, &ways[b].edges, k, course->seconds, ways[b].impulses);
         }

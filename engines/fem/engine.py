@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.fem.blood.blood import Blood, bleeds, blood_ports
 from engines.fem.boxes import box_rows
 from engines.fem.heat.heating import Heating, heat_ports
 from engines.fem.layer_outputs import LayerOutputs, layer_ports
@@ -53,6 +54,7 @@ class FemEngine(Stepped):
         self._layers: list[LayerOutputs | None] = []
         """Outputs of each organ with layers."""
         self._together: Together | None = None
+        self._blood: Blood | None = None
         self._warn_of_coupling()
 
     @property
@@ -63,7 +65,8 @@ class FemEngine(Stepped):
         changes = (*surface_ports(self.params), *event_ports(self.params.organs))
         surfaces = changes if self.params.changes_surfaces else ()
         layers = layer_ports(self.params.organs, self.params.node_period)
-        return *node_ports(self.params), *surfaces, *layers, *grasps, *heat_ports(self.params)
+        heat, blood = heat_ports(self.params), blood_ports(self.params)
+        return *node_ports(self.params), *surfaces, *layers, *grasps, *heat, *blood
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
@@ -127,6 +130,9 @@ class FemEngine(Stepped):
         if self._heating is not None:
             self._heating.follow()
             outputs.update(self._heating.step(inputs, t, h))
+        if self._blood is not None:
+            outputs.update(self._blood.step(inputs, end, h, looked=touch))
+            outputs.update(self._blood.pictures(end) if due else {})
         if self.params.changes_surfaces:
             outputs.update({f"{organ.name}/events": organ.events.finish(end) for organ in self._organs})
         return outputs
@@ -146,7 +152,7 @@ class FemEngine(Stepped):
             *(probe.digest for probe in self._probes),
             *(grasp.numbers for grasp, _ in self._grasps),
             *(organ.digest for organ in self._organs),
-            *(array.tobytes() for array in self._heat_state),
+            *(array.tobytes() for array in (*self._heat_state, *self._blood_state)),
         )
 
     def save(self) -> bytes:
@@ -175,6 +181,8 @@ class FemEngine(Stepped):
             self._together.forget()
         if self._heating is not None:
             self._heating.restore(parts)
+        if self._blood is not None:
+            self._blood.restore(parts)
         for probe in self._probes:
             probe.numbers = np.frombuffer(next(parts))
         for grasp, probe in self._grasps:
@@ -189,6 +197,7 @@ class FemEngine(Stepped):
             yield from organ.parts
         if self._heating is not None:
             yield from self._heating.state
+        yield from self._blood_state
         yield from (probe.numbers for probe in self._probes)
         yield from (grasp.numbers for grasp, _ in self._grasps)
 
@@ -196,9 +205,13 @@ class FemEngine(Stepped):
     def _heat_state(self) -> tuple[NDArray[Any], ...]:
         return () if self._heating is None else self._heating.state
 
+    @property
+    def _blood_state(self) -> tuple[NDArray[Any], ...]:
+        return () if self._blood is None else self._blood.state
+
     def close(self) -> None:
         """Forget the organs."""
-        self._heating = self._together = None
+        self._heating = self._together = self._blood = None
         for kept in (self._organs, self._probes, self._grasps, self._surfaces, self._layers):
             kept.clear()
 
@@ -240,6 +253,9 @@ class FemEngine(Stepped):
         if any(self.params.probes[bond.name].energy for bond in bonds):
             self._heating = Heating(self.params, self._organs, self._probes)
             outputs.update(self._heating.outputs)
+        if any(map(bleeds, self.params.organs.values())):
+            self._blood = Blood(self.params, self._organs, self._probes)
+            outputs.update(self._blood.outputs | self._blood.pictures(0))
         return outputs
 
     def _look(self) -> None:

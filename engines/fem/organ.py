@@ -83,6 +83,7 @@ class Organ:
             divisible=divisible,
             layering=layering,
             boxes=boxes,
+            most_ties=0 if params.lumen is None else params.inner_rings.size,
         )
         self.layers = params.layer_numbers(self.solid.tetrahedra)
         """Number of the layer of every element, shape (m,)."""

@@ -42,6 +42,6 @@ class FemParams(PressedOrgansParams):
 
     @property
     def changes_surfaces(self) -> bool:
-        """Whether an organ may be divided or burnt."""
-        divided = any(organ.cutting for organ in self.organs.values())
+        """Whether an organ may be divided, burnt or clipped."""
+        divided = any(organ.cutting or organ.lumen for organ in self.organs.values())
         return divided or any(probe.energy for probe in self.probes.values())

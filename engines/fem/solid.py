@@ -93,6 +93,7 @@ class Solid:
         divisible: bool = False,
         layering: Layering | None = None,
         boxes: Vector = NO_BOXES,
+        most_ties: int = 0,
     ) -> None:
         """Build the body at rest.
 
@@ -104,6 +105,7 @@ class Solid:
             divisible: whether faces may open and elements go.
             layering: other materials; the largest Lame's lambda is that of all.
             boxes: rigid parts, rows of `box_rows`.
+            most_ties: room for pairs of nodes that are tied to each other.
         """
         try:
             from engines.fem._solid import Solid as Compiled
@@ -130,6 +132,7 @@ class Solid:
         self._boxes = boxes - np.pad(self.middle, (0, boxes.shape[1] - 3))
         self.support: Vector = np.zeros((len(boxes), 3))
         """Mean force of the body on each box in the last step, N, shape (b, 3)."""
+        self._ties = aligned_integers(np.full((most_ties, 2), -1))
         self.compiled = Compiled(self._arrays, len(mesh.nodes), len(mesh.triangles))
         self.longest_step = _STEP_SHARE * 2.0 / self._highest_frequency()
         """Longest sub-step, s."""
@@ -195,7 +198,7 @@ class Solid:
             *(self._holder, self._origin, self._flags),
             *(self._corners, self._gradients, self._volumes, self._element_mass, self._shear),
             *(self.strains, self._branch, self._across, self._surface, self._owner),
-            *(self._middles, self._limits, self._boxes, self.support),
+            *(self._middles, self._limits, self._ties, self._boxes, self.support),
         )
 
     @property
@@ -343,6 +346,12 @@ class Solid:
         free = (self._flags[nodes] & _FIXED == 0) & (self._mass[nodes] > 0.0)
         self._inverse_mass[nodes[free]] = 1.0 / self._mass[nodes[free]]
 
+    def tie(self, pairs: NDArray[np.int32]) -> None:
+        """Let pairs of nodes, shape (p, 2), come together and stay together, as far as there is room."""
+        first = int((self._ties[:, 0] >= 0).sum())
+        room = self._ties[first : first + len(pairs)]
+        room[:] = pairs[: len(room)]
+
     def stand(self) -> None:
         """Stop all nodes; viscous strains stay."""
         self._velocity[:] = 0.0
@@ -352,7 +361,7 @@ class Solid:
         """Arrays that change, in the order of `restore`: `counts` gives the shapes of a divided body."""
         n, f = self.compiled.counts
         moving = (self._displacement[:n], self._velocity[:n], self.strains)
-        held = (self._holder[:n], self._inverse_mass[:n])
+        held = (self._holder[:n], self._inverse_mass[:n], *((self._ties,) if len(self._ties) else ()))
         if not self.divisible:
             return *moving, *held
         nodes = (self._rest, self._mass, self._inverse_volume, self._bulk, self._origin, self._flags)

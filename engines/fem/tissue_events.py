@@ -28,10 +28,8 @@ _NONE = -1
 
 def event_ports(organs: Iterable[str]) -> tuple[Port, ...]:
     """Return the ports of the events of organs."""
-    return tuple(
-        event_out(f"{organ}/events", TissueEvent, "tissue that was cut, torn or burnt", frame="world")
-        for organ in organs
-    )
+    happened = "tissue that was cut, torn or burnt, that bleeds or is clipped"
+    return tuple(event_out(f"{organ}/events", TissueEvent, happened, frame="world") for organ in organs)
 
 
 class TissueEvents:
@@ -49,6 +47,8 @@ class TissueEvents:
         """First and last change, ns."""
         self._is_fresh: NDArray[np.bool_] = np.zeros(rows, np.bool_)
         """Changes of the present step."""
+        self._said: list[tuple[str, str, Vector, float, str]] = []
+        """Kind, instrument, place, size and unit of the single events of the present step."""
 
     def add(self, kind: str, sizes: Vector, places: Vector, spheres: NDArray[np.integer]) -> None:
         """Add changes of the present step.
@@ -60,6 +60,10 @@ class TissueEvents:
         np.add.at(self._sums[row], instruments, np.column_stack([sizes, sizes[:, None] * places]))
         self._is_fresh[row, instruments] = True
 
+    def say(self, kind: str, instrument: str, place: Vector, size: float, unit: str) -> None:
+        """Add a single event of the present step. `place`: m, in `world`, shape (3,)."""
+        self._said.append((kind, instrument, place, size, unit))
+
     def finish(self, time_ns: int) -> tuple[TissueEvent, ...]:
         """End the step at `time_ns`; return the events that are over."""
         first, last = self._times[..., 0], self._times[..., 1]
@@ -68,23 +72,18 @@ class TissueEvents:
             last[self._is_fresh] = time_ns
             self._is_fresh[:] = False
         over = (first != _NONE) & ((time_ns - last >= _PAUSE_NS) | (time_ns - first >= _LONGEST_NS))
-        if not over.any():
+        if not over.any() and not self._said:
             return ()
-        events = tuple(self._event(row, instrument) for row, instrument in np.argwhere(over).tolist())
+        gathered = tuple(self._event(row, instrument) for row, instrument in np.argwhere(over).tolist())
+        single = tuple(_event(time_ns, *said) for said in self._said)
         self._sums[over], self._times[over] = 0.0, _NONE
-        return events
+        self._said.clear()
+        return gathered + single
 
     def _event(self, row: int, instrument: int) -> TissueEvent:
-        size = float(self._sums[row, instrument, 0])
-        x, y, z = (self._sums[row, instrument, 1:] / size).tolist()
-        return TissueEvent(
-            header=Header(stamp=Time.from_ns(int(self._times[row, instrument, 1])), frame_id="world"),
-            kind=_KINDS[row],
-            instrument=self._names[instrument],
-            position=Point(x=x, y=y, z=z),
-            size=size,
-            unit=_UNITS[_KINDS[row]],
-        )
+        size, time_ns = float(self._sums[row, instrument, 0]), int(self._times[row, instrument, 1])
+        place, kind = self._sums[row, instrument, 1:] / size, _KINDS[row]
+        return _event(time_ns, kind, self._names[instrument], place, size, _UNITS[kind])
 
     @property
     def state(self) -> tuple[NDArray[np.generic], ...]:
@@ -95,3 +94,15 @@ class TissueEvents:
         """Go back to a saved `state`."""
         for array in (self._sums, self._times):
             array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
+
+
+def _event(time_ns: int, kind: str, instrument: str, place: Vector, size: float, unit: str) -> TissueEvent:
+    x, y, z = place.tolist()
+    return TissueEvent(
+        header=Header(stamp=Time.from_ns(time_ns), frame_id="world"),
+        kind=kind,
+        instrument=instrument,
+        position=Point(x=x, y=y, z=z),
+        size=size,
+        unit=unit,
+    )

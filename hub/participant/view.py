@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from schemas.soft_surface import FaceKind
 from schemas.vectors import Vector
 
-__all__ = ["TISSUE_COLOURS", "Camera", "Frame", "Part", "Rgb", "Scene"]
+__all__ = ["TISSUE_COLOURS", "Camera", "Frame", "Part", "Rgb", "Scene", "Tint", "tint_of", "wet_colours"]
 
 Rgb = tuple[float, float, float]
 """Red, green and blue, each from 0 to 1."""
@@ -26,6 +26,34 @@ TISSUE_COLOURS: Mapping[FaceKind, Rgb] = {
     FaceKind.CHARRED: (0.11, 0.07, 0.05),
 }
 """Colours of changed tissue, by eye: raw and wet in a cut, pale where coagulated, black where charred."""
+
+
+class Tint(NamedTuple):
+    """Colour of a liquid by its thickness."""
+
+    deep: Rgb
+    """Colour of a deep pool."""
+    depth_m: Rgb
+    """Thickness that lets a share 1/e of the light of red, green and blue through, m."""
+
+
+_TINTS: Mapping[str, Tint] = {
+    "blood": Tint((0.30, 0.008, 0.015), (450e-6, 60e-6, 50e-6)),
+    "bile": Tint((0.33, 0.30, 0.03), (2e-3, 1.5e-3, 0.2e-3)),
+}
+"""Tints by eye: thin blood is bright red, as it lets red light through, thick blood is dark."""
+
+
+def tint_of(liquid: str) -> Tint:
+    """Return the tint of a liquid; of an unknown one that of blood."""
+    return _TINTS.get(liquid, _TINTS["blood"])
+
+
+def wet_colours(colour: Rgb, thickness_m: Vector, liquid: str) -> Vector:
+    """Return the colours, shape (n, 3), of a surface of `colour` under films, shape (n,), of a liquid."""
+    tint = tint_of(liquid)
+    through: Vector = np.exp(-thickness_m[:, None] / np.array(tint.depth_m))
+    return through * np.array(colour) + (1.0 - through) * np.array(tint.deep)
 
 
 class Part(NamedTuple):

@@ -7,8 +7,8 @@ import pytest
 
 from schemas.errors import MessageError
 from schemas.ros import Header
-from schemas.soft_surface import FaceKind, SoftSurface
-from schemas.trocar_msgs import SoftBodyState, SurfaceChange
+from schemas.soft_surface import FaceKind, SoftSurface, film_steps
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange, SurfaceFilm
 
 FIRST = SoftBodyState(
     header=Header(),
@@ -73,3 +73,26 @@ def test_a_strangers_change_is_refused(fields: dict[str, Any], problem: str) -> 
 def test_a_strangers_first_state_is_refused(fields: dict[str, Any], problem: str) -> None:
     with pytest.raises(MessageError, match=problem):
         SoftSurface.of_first(SoftBodyState.model_validate(FIRST.model_dump() | fields))
+
+
+def film(**fields: Any) -> SurfaceFilm:
+    return SurfaceFilm(header=Header(), body="liver", liquid="blood", **fields)
+
+
+def test_a_film_is_as_thick_as_its_message_says() -> None:
+    assert film_steps(film(nodes=[1, 3], thickness=[7, 255]), 5).tolist() == [0, 7, 0, 255, 0]
+    assert film_steps(film(), 2).tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("fields", "problem"),
+    [
+        ({"nodes": [1, 3], "thickness": [7]}, "expected as many"),
+        ({"nodes": [3, 1], "thickness": [7, 7]}, "ascending"),
+        ({"nodes": [1, 1], "thickness": [7, 7]}, "ascending"),
+        ({"nodes": [5], "thickness": [7]}, "allowed are 0 to 4"),
+    ],
+)
+def test_a_film_that_does_not_fit_is_refused(fields: dict[str, Any], problem: str) -> None:
+    with pytest.raises(MessageError, match=problem):
+        film_steps(film(**fields), 5)

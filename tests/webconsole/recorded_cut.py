@@ -12,7 +12,7 @@ from schemas.codec import encode
 from schemas.keys import Keys, topic
 from schemas.ros import Header, Time
 from schemas.soft_surface import FaceKind
-from schemas.trocar_msgs import SoftBodyState, SurfaceChange
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange, SurfaceFilm
 from schemas.vectors import VectorCodec
 from tests.engines.tissue.cut_block import CutBlock
 
@@ -28,6 +28,18 @@ def nodes_at(block: CutBlock, step: int) -> SoftBodyState:
         body="block",
         nodes_m=block.part(gap).astype(np.float32).ravel(),
         triangles=triangles.astype(np.uint32).ravel(),
+    )
+
+
+def film_at(block: CutBlock, step: int) -> SurfaceFilm:
+    """Return blood on all nodes of the cut block, none before."""
+    nodes = np.arange(len(block.part(0.0)) if step >= CUT_AT else 0)
+    return SurfaceFilm(
+        header=Header(stamp=Time.from_ns(step * STEP_NS), frame_id="world"),
+        body="block",
+        liquid="blood",
+        nodes=nodes.astype(np.uint32),
+        thickness=np.full(len(nodes), 60, np.uint8),
     )
 
 
@@ -49,6 +61,7 @@ def write_cut(directory: Path) -> CutBlock:
                 ("robot.qpos", qpos.port.type),
                 ("tissue.block/nodes", SoftBodyState.ros_type),
                 ("tissue.block/surface", SurfaceChange.ros_type),
+                ("tissue.block/film", SurfaceFilm.ros_type),
             )
         }
         for step in range(STEPS):
@@ -59,4 +72,5 @@ def write_cut(directory: Path) -> CutBlock:
             recorder.write(channels["robot.qpos"], at, qpos.encode(np.zeros(qpos.size), at))
             recorder.write(channels["tissue.block/nodes"], at, encode(nodes_at(block, step)))
             recorder.write(channels["tissue.block/surface"], at, encode(block.surface.change("block", at)))
+            recorder.write(channels["tissue.block/film"], at, encode(film_at(block, step)))
     return block

@@ -12,10 +12,10 @@ from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.scenario import Scenario
 from schemas.soft_surface import FaceKind, SoftSurface
-from schemas.trocar_msgs import SoftBodyState, SurfaceChange
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange, SurfaceFilm
 from tests.engines.tissue.cut_block import CutBlock
 from tests.webconsole.conftest import served
-from tests.webconsole.recorded_cut import STEP_NS, nodes_at, write_cut
+from tests.webconsole.recorded_cut import STEP_NS, film_at, nodes_at, write_cut
 from tests.webconsole.test_browser import Person
 from webconsole.commands import Show
 from webconsole.console import Console
@@ -32,6 +32,7 @@ SCENARIO = Scenario.model_validate(
 OUTLETS = (
     Outlet("tissue", signal_out("block/nodes", SoftBodyState)),
     Outlet("tissue", signal_out("block/surface", SurfaceChange)),
+    Outlet("tissue", signal_out("block/film", SurfaceFilm)),
 )
 GROUPS = """
 trocar.scene.surfaces[0].mesh.geometry.groups.map(({ count, materialIndex }) => [materialIndex, count / 3])
@@ -73,6 +74,35 @@ def test_a_page_gets_the_change_once_and_again_after_a_seek(cut_recording):
         assert not sections.problems
 
 
+def test_a_page_gets_the_blood_when_it_changes(cut_recording):
+    directory, block = cut_recording
+    with stage_of(directory) as (sections, stage):
+        show = Show(do="show", pictures=False, numbers=[])
+        assert stage.films == {"tissue.block/nodes": "tissue.block/film"}
+
+        def films(step):
+            made = sections.make(stage, show, step * STEP_NS)
+            return [one.content for one in made if one.kind == SectionKind.FILM]
+
+        (dry,) = films(0)
+        assert len(dry) == 24
+        assert films(1) == []
+        (wet,) = films(20)
+        assert len(wet) == 24 + 5 * len(block.part(0.0))
+        assert films(21) == []
+        assert films(0) == [dry]
+        assert not sections.problems
+
+
+def test_a_strangers_film_is_a_problem_of_its_surface_alone():
+    stage = Stage(SCENARIO, OUTLETS, lambda _: Params())
+    film = film_at(CutBlock(np.array([0.08, 0.06, 0.02]), 60), 20)
+    assert stage.film("tissue.block/nodes", Value(0, encode(film))).content
+    damaged = film.model_copy(update={"nodes": film.nodes[::-1].copy()})
+    with pytest.raises(MessageError, match="ascending"):
+        stage.film("tissue.block/nodes", Value(0, encode(damaged)))
+
+
 def test_a_strangers_change_is_a_problem_of_its_surface_alone():
     stage = Stage(SCENARIO, OUTLETS, lambda _: Params())
     block = CutBlock(np.array([0.08, 0.06, 0.02]), 60)
@@ -104,9 +134,13 @@ def test_the_browser_draws_the_cut_and_the_whole_block_before(browser, cut_recor
         instant = person.page.get_by_role("slider", name="Instant of the recording")
         instant.fill("0.4")
         person.sees(cut)
+        colours = "trocar.scene.surfaces[0].mesh.geometry.attributes.color.array"
+        assert person.page.evaluate(f"{colours}.every((part) => part >= 0 && part < 10)")
+        assert person.page.evaluate(f"{colours}[1] < 0.3")  # blood lets no green through
         positions = "trocar.scene.surfaces[0].mesh.geometry.attributes.position.array"
         assert person.page.evaluate(f"{positions}.every(Number.isFinite)")
         instant.fill("0")
         person.sees(whole)
+        person.sees(f"{colours}.every((part) => Math.abs(part - 1) < 1e-3)")
         instant.fill("0.4")
         person.sees(cut)

@@ -144,6 +144,7 @@ class MjsTendon(MjsElement):
 
 class MjsMaterial(MjsElement):
     rgba: _Array
+    textures: list[str]
 
 class MjsMesh(MjsElement):
     file: str
@@ -322,9 +323,12 @@ class MjModel:
     flex_elemdataadr: NDArray[np.int32]
     flex_edgenum: NDArray[np.int32]
     flex_elemnum: NDArray[np.int32]
+    flex_elemtexcoord: NDArray[np.int32]
     flex_group: NDArray[np.int32]
     flex_matid: NDArray[np.int32]
     flex_shellnum: NDArray[np.int32]
+    flex_texcoord: NDArray[np.float32]
+    flex_texcoordadr: NDArray[np.int32]
     flex_vertadr: NDArray[np.int32]
     flex_vertnum: NDArray[np.int32]
     def actuator(self, name: str) -> _Element: ...
@@ -403,7 +407,11 @@ class mjtConstraint(IntEnum):
     mjCNSTR_EQUALITY = ...
 
 class mjtTexture(IntEnum):
+    mjTEXTURE_2D = ...
     mjTEXTURE_SKYBOX = ...
+
+class mjtTextureRole(IntEnum):
+    mjTEXROLE_RGB = ...
 
 class mjtBuiltin(IntEnum):
     mjBUILTIN_GRADIENT = ...

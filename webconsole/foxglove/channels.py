@@ -20,10 +20,11 @@ from foxglove.messages import (
 )
 from numpy.typing import NDArray
 
-from hub.participant.view import TISSUE_COLOURS, Scene
+from hub.participant.view import TISSUE_COLOURS, Scene, wet_colours
 from schemas.codec import decode, ros2msg_definition
-from schemas.soft_surface import FaceKind, SoftSurface
-from schemas.trocar_msgs import SoftBodyState, SurfaceChange
+from schemas.soft_surface import FILM_STEP_M, FaceKind, SoftSurface, film_steps
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange, SurfaceFilm
+from schemas.vectors import Vector
 from webconsole.source import Outlet, Source, Value
 from webconsole.stage import Stage
 
@@ -134,9 +135,10 @@ class _Surface(Channel):
     def __init__(self, stage: Stage, name: str, source: Source, context: foxglove.Context) -> None:
         topic = f"/{name.replace('.', '/')}/surface"
         change = stage.changes.get(name)
-        outlets = (name,) if change is None else (name, change)
+        film = stage.films.get(name)
+        outlets = tuple(one for one in (name, change, film) if one is not None)
         super().__init__(topic, outlets, SceneUpdate.get_schema(), "protobuf", context)
-        self._name, self._change, self._source = name, change, source
+        self._name, self._change, self._film, self._source = name, change, film, source
         self._colours = {FaceKind.OUTSIDE: stage.surfaces[name], **TISSUE_COLOURS}
 
     def _messages(self, values: dict[str, Value]) -> Iterator[bytes]:
@@ -150,8 +152,18 @@ class _Surface(Channel):
         surface = SoftSurface.of_first(start)
         if change := values.get(self._change or ""):
             surface = surface.changed(decode(SurfaceChange, change.payload))
+        film = decode(SurfaceFilm, wet.payload) if (wet := values.get(self._film or "")) else None
+        steps = None if film is None or not film.nodes.size else film_steps(film, len(nodes))
+        liquid = "" if film is None else film.liquid
         shapes = [
-            _triangles(nodes, faces, (*colour, 1.0))
+            _triangles(
+                nodes,
+                faces,
+                (*colour, 1.0),
+                None
+                if steps is None
+                else wet_colours(colour, FILM_STEP_M * steps.astype(np.float64), liquid),
+            )
             for kind, colour in self._colours.items()
             if len(faces := surface.of_kind(kind))
         ]
@@ -196,10 +208,14 @@ def _triangles(
     vertices: NDArray[np.float32],
     faces: NDArray[np.uint32] | NDArray[np.int32],
     colour: tuple[float, float, float, float],
+    colours: Vector | None = None,
 ) -> TriangleListPrimitive:
+    """Return triangles of one colour, or with `colours` of the vertices, shape (n, 3)."""
     red, green, blue, opacity = colour
+    of_vertices = () if colours is None else colours.tolist()
     return TriangleListPrimitive(
         points=[Point3(x=x, y=y, z=z) for x, y, z in vertices.tolist()],
         indices=faces.ravel().tolist(),
         color=Color(r=red, g=green, b=blue, a=opacity),
+        colors=[Color(r=r, g=g, b=b, a=1.0) for r, g, b in of_vertices],
     )

@@ -4,7 +4,7 @@
 import * as THREE from "./vendor/three.module.js"
 import { compared, pageOf, pathTo, shown } from "./address.js"
 import { Contents } from "./contents.js"
-import { CHANGE, changeOf, Link, nodesOf, NODES, POSES, SURFACE } from "./link.js"
+import { CHANGE, changeOf, FILM, filmOf, Link, nodesOf, NODES, POSES, SURFACE } from "./link.js"
 import { short } from "./plots.js"
 import { make } from "./started.js"
 
@@ -79,6 +79,7 @@ export class Comparison {
       if (kind === POSES) this.ghost.poses(index, buffer, at, size)
       else if (kind === SURFACE) this.ghost.surface(index, new Uint32Array(buffer, at, size / 4))
       else if (kind === CHANGE) this.ghost.change(index, changeOf(buffer, at, size))
+      else if (kind === FILM) this.ghost.film(index, filmOf(buffer, at, size))
       else if (kind === NODES && size) this.ghost.nodes(index, nodesOf(buffer, at, size))
     }
     this.link.acknowledge(number)

@@ -30,7 +30,7 @@ export class Contents {
     const size = new DataView(buffer).getUint32(0, true)
     const scenes = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)))
     for (const scene of scenes) this.add(scene, buffer, 4 + size)
-    this.surfaces = surfaces.map(({ colours }) => ({ colours, mesh: null, triangles: null, changed: null, stale: false }))
+    this.surfaces = surfaces.map(({ colours }) => ({ colours, mesh: null, triangles: null, changed: null, film: null, stale: false }))
     return scenes
   }
 
@@ -69,7 +69,15 @@ export class Contents {
 
   surface(index, triangles) {
     const surface = this.surfaces[index]
-    if (surface) Object.assign(surface, { triangles, changed: null, stale: true })
+    if (surface) Object.assign(surface, { triangles, changed: null, film: null, stale: true })
+  }
+
+  // `film`: liquid on the surface; link.js, `filmOf`.
+  film(index, film) {
+    const surface = this.surfaces[index]
+    if (!surface || (!surface.film && !film.nodes.length)) return
+    surface.film = film
+    if (surface.mesh && !surface.stale) wet(surface)
   }
 
   // `changed`: slots, faces and kinds that differ from the triangles; link.js, `changeOf`.
@@ -111,13 +119,46 @@ export class Contents {
     if (surface.mesh) {
       surface.mesh.geometry.dispose()
       surface.mesh.geometry = made
+      if (surface.film) wet(surface)
       return
     }
     const materials = surface.colours.map((colour, kind) => this.material([...colour, 1], THREE.DoubleSide, kind === WET))
     surface.mesh = new THREE.Mesh(made, materials)
     surface.mesh.frustumCulled = false
     this.own(surface.mesh)
+    if (surface.film) wet(surface)
   }
+}
+
+// Give each vertex the colour of its tissue under the liquid there, over the colour of the tissue.
+function wet({ mesh, film, origin, count }) {
+  const { geometry, material } = mesh
+  if (!geometry.attributes.color) geometry.setAttribute("color", attribute(3 * origin.length))
+  for (const each of material) if (!each.vertexColors) Object.assign(each, { vertexColors: true, needsUpdate: true })
+  const steps = new Uint8Array(count), colours = geometry.attributes.color.array, index = geometry.index.array
+  film.nodes.forEach((node, i) => { if (node < count) steps[node] = film.thickness[i] })
+  const tables = material.map(({ color }) => wetColours(color, film.tint))
+  for (const { start, count: corners, materialIndex } of geometry.groups)
+    for (let corner = start; corner < start + corners; corner++) {
+      const vertex = index[corner], from = 3 * steps[origin[vertex]]
+      for (let c = 0; c < 3; c++) colours[3 * vertex + c] = tables[materialIndex][from + c]
+    }
+  geometry.attributes.color.needsUpdate = true
+}
+
+// The colour of tissue under films of 0 to 255 steps of 10 um, over its own; hub/participant/view.py, `wet_colours`.
+function wetColours(own, tint) {
+  const table = new Float32Array(3 * 256), dry = own.clone().convertLinearToSRGB(), mixed = new THREE.Color()
+  for (let step = 0; step < 256; step++) {
+    const parts = [dry.r, dry.g, dry.b].map((part, c) => {
+      const through = Math.exp(-1e-5 * step / tint[3 + c])
+      return through * part + (1 - through) * tint[c]
+    })
+    mixed.setRGB(...parts, THREE.SRGBColorSpace)
+    const over = [mixed.r / own.r, mixed.g / own.g, mixed.b / own.b]
+    over.forEach((part, c) => { table[3 * step + c] = Number.isFinite(part) ? part : 1 })
+  }
+  return table
 }
 
 // The faces of a surface without those that are gone, by kind.

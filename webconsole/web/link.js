@@ -5,7 +5,7 @@ import { pathTo } from "./address.js"
 
 const MAGIC = 0x46435254 // "TRCF", little-endian
 const HEAD = 24
-export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7, FELT = 8, CHANGE = 9
+export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7, FELT = 8, CHANGE = 9, FILM = 10
 
 export function parseFrame(buffer) {
   const view = new DataView(buffer)
@@ -36,6 +36,13 @@ export function changeOf(buffer, at, size) {
   const count = size / 17
   return { slots: new Uint32Array(buffer, at, count), faces: new Int32Array(buffer, at + 4 * count, 3 * count),
     kinds: new Uint8Array(buffer, at + 16 * count, count) }
+}
+
+// Liquid on a surface: deep colour and depths (f32, 3 each), wet nodes (u32), thickness at each (u8, 10 um).
+export function filmOf(buffer, at, size) {
+  const count = (size - 24) / 5
+  return { tint: new Float32Array(buffer, at, 6), nodes: new Uint32Array(buffer, at + 24, count),
+    thickness: new Uint8Array(buffer, at + 24 + 4 * count, count) }
 }
 
 const OTHER_SOURCE = 4001, NOT_SHOWN = 4002

@@ -1,6 +1,6 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
-import { ARROWS, CHANGE, changeOf, FELT, Link, nodesOf, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { ARROWS, CHANGE, changeOf, FELT, FILM, filmOf, Link, nodesOf, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
 import { compared, pathTo, shown } from "./address.js"
 import { Alerts } from "./alerts.js"
 import { Capture } from "./capture.js"
@@ -206,6 +206,7 @@ function apply(frame) {
     else if (kind === POSES) scene.poses(index, frame.buffer, at, size)
     else if (kind === SURFACE) scene.surface(index, new Uint32Array(frame.buffer, at, size / 4))
     else if (kind === CHANGE) scene.change(index, changeOf(frame.buffer, at, size))
+    else if (kind === FILM) scene.film(index, filmOf(frame.buffer, at, size))
     else if (kind === NODES) size && scene.nodes(index, nodesOf(frame.buffer, at, size))
   }
 }

@@ -140,6 +140,7 @@ export class Scene {
   poses(index, buffer, at, size) { this.contents.poses(index, buffer, at, size) }
   surface(index, triangles) { this.contents.surface(index, triangles) }
   change(index, changed) { this.contents.change(index, changed) }
+  film(index, film) { this.contents.film(index, film) }
 
   nodes(index, positions) {
     // the work is where the organ is, unless somebody looks elsewhere

@@ -61,6 +61,11 @@ class HeatTissue:
         return self.density * self.specific_heat
 
     @property
+    def blood_flow(self) -> float:
+        """Perfusion, m^3/(s kg)."""
+        return 1e-6 / 60.0 * self.perfusion
+
+    @property
     def residue(self) -> float:
         """Mass without water, kg/m^3."""
         return self.density * (1.0 - self.water)
@@ -82,7 +87,7 @@ class HeatTissue:
             [
                 self.capacity,
                 self.conductivity,
-                1e-6 / 60.0 * self.perfusion * self.density * _BLOOD,
+                self.blood_flow * self.density * _BLOOD,
                 self.density * self.water * _LATENT_HEAT,
                 self.dry_capacity,
                 self.residue,

@@ -27,7 +27,7 @@ from schemas.errors import MessageError, MissingExtraError, StateError
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import CameraInfo, CompressedImage, Header, Image, Time
-from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange
+from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange, SurfaceFilm
 
 if TYPE_CHECKING:
     from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
@@ -75,12 +75,14 @@ class Endoscope(Stepped):
         shown = "all markers to draw, as a participant of kind `markers` publishes them"
         qpos = signal_in("qpos", description=positions, size=self._positions.size)
         changed = "difference of the surface from that of the first message; may be left unconnected"
+        wet = "liquid on the surface; may be left unconnected"
         bodies = (
             port
             for organ in self._bodies
             for port in (
                 signal_in(f"{organ}/nodes", SoftBodyState, nodes, frame="world"),
                 signal_in(f"{organ}/surface", SurfaceChange, changed, frame="world", start=()),
+                signal_in(f"{organ}/film", SurfaceFilm, wet, frame="world", start=()),
             )
         )
         markers = signal_in("markers", ShownMarkers, shown, frame="world")
@@ -93,6 +95,7 @@ class Endoscope(Stepped):
         """
         for organ, body in self._bodies.items():
             body.may_change = f"{organ}/surface" in setup.connected
+            body.may_be_wet = body.may_change and f"{organ}/film" in setup.connected
         if not self._pictures:
             return {}
         for package in ("mujoco", "PIL"):
@@ -130,7 +133,8 @@ class Endoscope(Stepped):
         self._positions[:] = inputs["qpos"]
         for organ, body in self._bodies.items():
             change = inputs.message(f"{organ}/surface") if body.may_change else None
-            body.accept(inputs.message(f"{organ}/nodes"), change)
+            film = inputs.message(f"{organ}/film") if body.may_be_wet else None
+            body.accept(inputs.message(f"{organ}/nodes"), change, film)
         if self.params.markers:
             self._shown = cast("ShownMarkers | None", inputs.message("markers"))
         if not self._gl:

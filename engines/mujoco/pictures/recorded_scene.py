@@ -24,7 +24,7 @@ from schemas.codec import decode
 from schemas.errors import MessageError, RecordingError, ScenarioError, TrocarError
 from schemas.message import Message
 from schemas.scenario import ParticipantSpec
-from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange
+from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange, SurfaceFilm
 from schemas.vectors import Vector, VectorCodec
 
 __all__ = ["Camera", "RecordedScene"]
@@ -184,6 +184,11 @@ class RecordedScene:
             for name in bodies
             if (topic := self._change_topic(self._nodes[name])) is not None
         }
+        films = {
+            name: _Newest(self._recording, topic)
+            for name in bodies
+            if (topic := self._film_topic(self._nodes[name])) is not None
+        }
         markers = [_Newest(self._recording, topic) for topic in self._markers]
         scene = EndoscopeScene(params, gl.name, bodies)
         try:
@@ -191,9 +196,11 @@ class RecordedScene:
                 for name, newest in nodes.items():
                     if (message := newest.at(time_ns)) is not None:
                         change = changes[name].at(time_ns) if name in changes else None
+                        film = films[name].at(time_ns) if name in films else None
                         bodies[name].accept(
                             self._decoded(SoftBodyState, message),
                             None if change is None else self._decoded(SurfaceChange, change),
+                            None if film is None else self._decoded(SurfaceFilm, film),
                         )
                 yield scene.draw(
                     self._positions(positions.at(time_ns), time_ns), self._shown(markers, time_ns)
@@ -226,14 +233,26 @@ class RecordedScene:
         for name, topic in self._nodes.items():
             first = next(self._recording.messages(topic), None)
             if first is not None and first.time_ns <= time_ns:
-                bodies[name] = SoftBody(topic, may_change=self._change_topic(topic) is not None)
-                bodies[name].accept(self._decoded(SoftBodyState, first))
+                may_change, wet = self._change_topic(topic) is not None, self._film_topic(topic)
+                bodies[name] = SoftBody(
+                    topic, may_change=may_change, may_be_wet=may_change and wet is not None
+                )
+                film = None if wet is None else next(self._recording.messages(wet), None)
+                bodies[name].accept(
+                    self._decoded(SoftBodyState, first),
+                    film=None if film is None else self._decoded(SurfaceFilm, film),
+                )
         return bodies
 
     def _change_topic(self, nodes: str) -> str | None:
         """Return the topic with the changes of the surface of a soft body; None without."""
         topic = f"{nodes.removesuffix('nodes')}surface"
         return topic if self._recording.topics.get(topic) == SurfaceChange.ros_type else None
+
+    def _film_topic(self, nodes: str) -> str | None:
+        """Return the topic with the liquid on a soft body; None without."""
+        topic = f"{nodes.removesuffix('nodes')}film"
+        return topic if self._recording.topics.get(topic) == SurfaceFilm.ros_type else None
 
     def _decoded(self, model: type[M], message: BagMessage) -> M:
         try:

@@ -69,6 +69,13 @@ class SkinMesh:
             points = division.refine(points)
         return points
 
+    def spread(self, values: Vector) -> Vector:
+        """Return values at the vertices, shape (v,), for values at the nodes, shape (n,)."""
+        found = values[self._node]
+        for division in self._divisions:
+            found = division.spread(found)
+        return found
+
 
 class _Division:
     """Every triangle becomes four."""
@@ -89,6 +96,11 @@ class _Division:
         ab, bc, ca = (count + edge_of.reshape(-1, 3)).T
         self.faces: Indices = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, ab, bc, ca], axis=1).reshape(-1, 3)
         """Shape (4 f, 3): the old vertices, then one for each edge."""
+
+    def spread(self, values: Vector) -> Vector:
+        """Return `values`, shape (v,), and after them those in the middles of the edges."""
+        start, end = self._ends
+        return np.concatenate([values, 0.5 * (values[start] + values[end])])
 
     def refine(self, points: Vector) -> Vector:
         """Return `points`, shape (v, 3), m, and after them the middles of the curved edges."""

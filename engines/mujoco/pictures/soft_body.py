@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from schemas.codec import decode, encode
 from schemas.errors import MessageError, SessionError, StateError
 from schemas.message import Message
-from schemas.soft_surface import SoftSurface
-from schemas.trocar_msgs import SoftBodyState, SurfaceChange
+from schemas.soft_surface import SoftSurface, film_steps
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange, SurfaceFilm
 
 __all__ = ["SoftBody"]
 
@@ -19,18 +19,27 @@ _SHAPE = struct.Struct("<qq")
 """Number of nodes at rest and of triangles."""
 _CHANGED = struct.Struct("<qq")
 """Negative length of the message of a changed surface, and number of nodes."""
+_WET = struct.Struct("<qq")
+"""Least number, and length of the message of a film."""
+_LEAST = -(2**63)
 
 
 class SoftBody:
-    """A soft body as the messages on two ports describe it.
+    """A soft body as the messages on its ports describe it.
 
     The surface and the shape at rest come with the first message, the nodes with the newest; later changes of
-    the surface have a port of their own.
+    the surface, and liquid on the surface, have ports of their own.
     """
 
-    def __init__(self, port: str, *, may_change: bool = False) -> None:
-        """`port`: name of the port of the nodes; `may_change`: changes of the surface may come."""
-        self._port, self.may_change = port, may_change
+    def __init__(self, port: str, *, may_change: bool = False, may_be_wet: bool = False) -> None:
+        """Name the port of the nodes, and say what may come.
+
+        Args:
+            port: name of the port of the nodes.
+            may_change: changes of the surface may come.
+            may_be_wet: liquid on a changed surface may come.
+        """
+        self._port, self.may_change, self.may_be_wet = port, may_change, may_be_wet
         self.rest: NDArray[np.float32] = np.zeros((0, 3), np.float32)
         """Nodes of the first message, shape (n, 3), m, frame `world`."""
         self.nodes = self.rest
@@ -39,6 +48,20 @@ class SoftBody:
         """Surface of the first message: node indices, shape (f, 3), counter-clockwise from outside."""
         self._first = self._surface = SoftSurface.of_triangles(self.triangles, 0)
         self._change: SurfaceChange | None = None
+        self._film: SurfaceFilm | None = None
+
+    @property
+    def film(self) -> NDArray[np.uint8]:
+        """Thickness of the liquid at each of `nodes`, in steps of `FILM_STEP_M`, shape (m,)."""
+        known = len(self.nodes)
+        if self._film is None:
+            return np.zeros(known, np.uint8)
+        return film_steps(self._film, max(known, int(self._film.nodes.max(initial=0)) + 1))[:known]
+
+    @property
+    def liquid(self) -> str:
+        """Name of the liquid on the surface."""
+        return "blood" if self._film is None else self._film.liquid
 
     @property
     def version(self) -> int:
@@ -50,8 +73,10 @@ class SoftBody:
         """The surface as changed last."""
         return self._surface
 
-    def accept(self, message: Message | None, change: Message | None = None) -> None:
-        """Take the newest nodes, and the newest change of the surface.
+    def accept(
+        self, message: Message | None, change: Message | None = None, film: Message | None = None
+    ) -> None:
+        """Take the newest nodes, change of the surface, and liquid.
 
         Raises SessionError if the surface is unknown, or a message does not fit it.
         """
@@ -73,6 +98,8 @@ class SoftBody:
             )
         # nodes appended for a change of which nothing is known here are not drawn
         self.nodes = nodes[:known]
+        if isinstance(film, SurfaceFilm):
+            self._wet(film, len(nodes))
 
     def _begin(self, nodes: NDArray[np.float32], first: SoftBodyState) -> None:
         if not first.triangles.size:
@@ -95,14 +122,25 @@ class SoftBody:
             raise SessionError(f"input '{self._port}': {error}") from error
         self._change = change if change.version else None
 
+    def _wet(self, film: SurfaceFilm, nodes: int) -> None:
+        try:
+            film_steps(film, nodes)
+        except MessageError as error:
+            raise SessionError(f"input '{self._port}': {error}") from error
+        self._film = film
+
     def save(self) -> bytes:
         """Return all soft bodies known from the messages."""
-        changed = b""
+        wet = changed = b""
+        if self._film is not None:
+            message = encode(self._film)
+            wet = _WET.pack(_LEAST, len(message)) + message
         if self._change is not None:
             message = encode(self._change)
             changed = _CHANGED.pack(-len(message), len(self.nodes)) + message
         return (
-            changed
+            wet
+            + changed
             + _SHAPE.pack(len(self.rest), len(self.triangles))
             + self.rest.tobytes()
             + self.nodes.tobytes()
@@ -123,11 +161,17 @@ class SoftBody:
             ) from error
 
     def _restore(self, state: bytes) -> bytes:
-        length, count = _CHANGED.unpack_from(state)
-        change, at = None, 0
+        change, film, at = None, None, 0
+        mark, length = _WET.unpack_from(state)
+        if mark == _LEAST:
+            at = _WET.size + length
+            film = decode(SurfaceFilm, state[_WET.size : at])
+            film_steps(film, int(film.nodes.max(initial=0)) + 1)
+        length, count = _CHANGED.unpack_from(state, at)
         if length < 0:
-            at = _CHANGED.size - length
-            change = decode(SurfaceChange, state[_CHANGED.size : at])
+            begin = at + _CHANGED.size
+            at = begin - length
+            change = decode(SurfaceChange, state[begin:at])
         known, triangles = _SHAPE.unpack_from(state, at)
         count = known if change is None else count
         rest = np.frombuffer(state, np.float32, 3 * known, at + _SHAPE.size).reshape(known, 3)
@@ -141,4 +185,5 @@ class SoftBody:
             raise MessageError(f"{count} nodes for a surface of {len(surface.origins)}")
         self.rest, self.nodes, self.triangles = rest, nodes, faces
         self._first, self._surface, self._change = first, surface, change
+        self._film = film
         return state[at + faces.nbytes :]

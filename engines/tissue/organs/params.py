@@ -19,15 +19,18 @@ from engines.tissue.meshing.mesh_check import LARGEST_M, MOST_NODES, SMALLEST_M,
 from engines.tissue.meshing.surface import Surface
 from engines.tissue.meshing.tet_mesh import TetMesh
 from engines.tissue.organs.anchors import AnchorParams, Edges
+from engines.tissue.organs.bleeding import BleedingParams
 from engines.tissue.organs.catalogue import SHAPES, block_shape
 from engines.tissue.organs.cutting import CuttingParams
 from engines.tissue.organs.layers import LayerParams
+from engines.tissue.organs.lumen import LumenParams
 from engines.tissue.organs.material_file import MaterialFile
 from engines.tissue.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
 from engines.tissue.organs.organ_file import OrganFile
 from engines.tissue.organs.prony import PronySeries, PronyTerm
 from engines.tissue.organs.shape import Shape
 from engines.tissue.organs.surface_mesh import mesh_surface
+from engines.tissue.organs.tube import TubeParams, tube_shape
 from robots import rotation
 from robots.dvrk.parameters import UnitQuaternion
 from schemas.files import find_file
@@ -65,6 +68,7 @@ class OrganParams(BaseModel):
             " closed surface (.stl, .obj, .ply, .glb, .gltf); a relative path starts at the scenario"
         ),
     )
+    tube: TubeParams | None = Field(default=None, description="instead: a duct or a vessel")
     unit: Literal["m", "mm"] | None = Field(
         default=None, description="of the file of tetrahedra or of a surface; default: m"
     )
@@ -125,6 +129,13 @@ class OrganParams(BaseModel):
         default=None, description="lets blades cut the tissue, and pulls tear it; kind fem alone"
     )
 
+    lumen: LumenParams | None = Field(
+        default=None, description="liquid under pressure in a tube, which an opening lets out; kind fem alone"
+    )
+    bleeding: BleedingParams | None = Field(
+        default=None, description="lets opened tissue bleed; with `cutting`, kind fem alone"
+    )
+
     @field_validator("mesh", "material_file")
     @classmethod
     def _from_scenario(cls, path: Path | None, info: ValidationInfo) -> Path | None:
@@ -132,11 +143,13 @@ class OrganParams(BaseModel):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Self:
-        if sum(part is not None for part in (self.size, self.shape, self.mesh)) != 1:
+        if sum(part is not None for part in (self.size, self.shape, self.mesh, self.tube)) != 1:
             raise ValueError(
-                f"an organ has a size (a block), a shape ({', '.join(SHAPES)}) or a mesh (a file), one of"
-                " them"
+                f"an organ has a size (a block), a shape ({', '.join(SHAPES)}), a mesh (a file) or a tube,"
+                " one of them"
             )
+        if self.lumen is not None and self.tube is None:
+            raise ValueError("a lumen is that of a tube: state `tube`, or leave it out")
         if self.size is not None and not SMALLEST_M <= max(self.size) <= LARGEST_M:
             raise ValueError(
                 f"the longest edge of a block is {SMALLEST_M:g} to {LARGEST_M:g} m, not {max(self.size):g} m"
@@ -156,6 +169,8 @@ class OrganParams(BaseModel):
                 "anchors are missing: state what holds the organ, for instance [{surface: bottom}], or [] if"
                 " it lies freely on rigid parts"
             )
+        if self.bleeding is not None and self.cutting is None:
+            raise ValueError("tissue bleeds where it is opened: bleeding goes with `cutting`")
         if self.young_modulus is None and (self.poisson_ratio is not None or self.density is not None):
             raise ValueError("poisson_ratio and density go with young_modulus; a material has its own")
         if sum(part is not None for part in (self.material, self.material_file, self.young_modulus)) > 1:
@@ -248,9 +263,16 @@ class OrganParams(BaseModel):
         """The shape. Raises ValueError where the mesh file is unusable."""
         if self.size is not None:
             return block_shape(self.size, tuple(layer.thickness for layer in self.layers))
+        if self.tube is not None:
+            return tube_shape(self.tube)
         if self.mesh is not None:
             return _from_file(self.mesh, _UNITS[self.unit or "m"], self.nodes or _NODES)
         return SHAPES[self.shape or ""]
+
+    @property
+    def inner_rings(self) -> NDArray[np.int64]:
+        """Nodes of the inner wall of a tube, ring by ring from its left end, shape (r, a); else none."""
+        return np.zeros((0, 0), np.int64) if self.tube is None else self.tube.rings(self.nodes or _NODES)
 
     @cached_property
     def local(self) -> TetMesh:

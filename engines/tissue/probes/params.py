@@ -9,7 +9,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from engines.tissue.probes.clip import ClipParams
 from engines.tissue.probes.energy import EnergyParams
+from engines.tissue.probes.suction import SuctionParams
 from schemas.quantity import Damping, Force, Length, Mass, Stiffness
 from schemas.vectors import Vector
 
@@ -141,6 +143,12 @@ class ProbeParams(BaseModel):
     energy: EnergyParams | None = Field(
         default=None, description="makes the spheres electrodes that heat tissue; kind fem"
     )
+    suction: SuctionParams | None = Field(
+        default=None, description="lets the spheres take up blood, by the command `<probe>/suction`; kind fem"
+    )
+    clip: ClipParams | None = Field(
+        default=None, description="lets two jaws put clips on a tube, by the event `<probe>/clip`; kind fem"
+    )
     blades: tuple[tuple[int, int], ...] = Field(
         default=(),
         max_length=8,
@@ -174,6 +182,15 @@ class ProbeParams(BaseModel):
             raise ValueError(
                 f"{self.spheres or 1} spheres for bipolar energy: one half of them is one jaw, the other half"
                 " the other jaw"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _two_jaws(self) -> ProbeParams:
+        if self.clip is not None and (self.spheres or 1) % 2:
+            raise ValueError(
+                f"{self.spheres or 1} spheres for a clip: one half of them is one jaw, the other half the"
+                " other jaw"
             )
         return self
 

@@ -20,7 +20,7 @@ from hub.testing import check_engine
 from schemas.errors import SessionError
 from schemas.ros import Header
 from schemas.soft_surface import FaceKind
-from schemas.trocar_msgs import SoftBodyState, SurfaceChange
+from schemas.trocar_msgs import SoftBodyState, SurfaceChange, SurfaceFilm
 from schemas.vectors import Vector
 from tests.engines.mujoco.pictures.test_endoscope import PERIOD_NS, pixels
 from tests.engines.tissue.cut_block import CutBlock
@@ -65,17 +65,28 @@ def configure(endoscope: Endoscope, *connected: str) -> None:
     endoscope.configure(Setup(PERIOD_NS, Path.cwd(), connected=frozenset(connected)))
 
 
-def step(endoscope: Endoscope, nodes: SoftBodyState, change: SurfaceChange | None) -> dict[str, Any]:
+def step(
+    endoscope: Endoscope,
+    nodes: SoftBodyState,
+    change: SurfaceChange | None,
+    film: SurfaceFilm | None = None,
+) -> dict[str, Any]:
     inputs: dict[str, Any] = {
         "qpos": build(endoscope.params).qpos0.copy(),
         "liver/nodes": nodes,
         "liver/surface": change,
+        "liver/film": film,
     }
     return dict(endoscope.step(0, PERIOD_NS, Inputs(inputs)))
 
 
-def shoot(endoscope: Endoscope, nodes: SoftBodyState, change: SurfaceChange | None) -> NDArray[np.int64]:
-    return pixels(step(endoscope, nodes, change)["left/image_raw"][0]).astype(np.int64)
+def shoot(
+    endoscope: Endoscope,
+    nodes: SoftBodyState,
+    change: SurfaceChange | None,
+    film: SurfaceFilm | None = None,
+) -> NDArray[np.int64]:
+    return pixels(step(endoscope, nodes, change, film)["left/image_raw"][0]).astype(np.int64)
 
 
 def is_red(picture: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -196,3 +207,56 @@ def test_a_larger_scene_keeps_the_room_for_new_faces(gl: str, cut_block: CutBloc
         room = renderer._scene.flexfacenum.copy()
         assert room[0] >= 24_000
         assert np.array_equal(renderer._new_scene(1000).flexfacenum, room)
+
+
+def film_of(steps: NDArray[np.integer[Any]]) -> SurfaceFilm:
+    nodes = np.flatnonzero(steps)
+    return SurfaceFilm(
+        header=Header(),
+        body="liver",
+        liquid="blood",
+        nodes=nodes.astype(np.uint32),
+        thickness=steps[nodes].astype(np.uint8),
+    )
+
+
+def test_thin_blood_is_red_thick_blood_is_dark_and_dry_tissue_is_as_before(
+    gl: str, cut_block: CutBlock
+) -> None:
+    first = nodes_of(cut_block.mesh.nodes, cut_block.mesh.triangles)
+    x = cut_block.mesh.nodes[:, 0]
+    with make() as wet, make() as dry:
+        configure(wet, "liver/surface", "liver/film")
+        configure(dry, "liver/surface")
+        cut_block.cut(0.012)
+        change = cut_block.surface.change("liver", 0)
+        parted = nodes_of(cut_block.part(0.001))
+        nothing = film_of(np.zeros(len(x), np.int64))
+        step(wet, first, None, nothing)
+        step(dry, first, None)
+        without = shoot(dry, parted, change)
+        assert np.abs(shoot(wet, parted, change, nothing) - without).max() <= 3
+        steps = np.where(x < -0.01, 12, np.where(x > 0.01, 200, 0))
+        picture = shoot(wet, parted, change, film_of(steps))
+    height, width = picture.shape[:2]
+    thin, thick = picture[height // 2, width // 5], picture[height // 2, 4 * width // 5]
+    green = without[height // 2, width // 5]
+    assert thin[1] < 0.5 * green[1]  # the tissue is green
+    assert thick.sum() < thin.sum()
+    assert thick[0] > 2 * thick[1]
+    assert np.abs(picture[height // 2, 2 * width // 5] - without[height // 2, 2 * width // 5]).max() <= 8
+
+
+def test_a_wet_body_is_saved_and_restored(gl: str, cut_block: CutBlock) -> None:
+    cut_block.cut(0.012)
+    first = nodes_of(cut_block.mesh.nodes, cut_block.mesh.triangles)
+    parted, change = nodes_of(cut_block.part(0.001)), cut_block.surface.change("liver", 0)
+    steps = np.arange(len(cut_block.part(0.0))) % 256
+    body, other = (SoftBody("liver/nodes", may_change=True, may_be_wet=True) for _ in range(2))
+    body.accept(first)
+    body.accept(parted, change, film_of(steps))
+    assert other.restore(body.save() + b"rest") == b"rest"
+    assert np.array_equal(other.film, steps)
+    assert other.save() == body.save()
+    with pytest.raises(SessionError, match="allowed are"):
+        body.accept(parted, change, film_of(np.ones(5000, np.int64)))

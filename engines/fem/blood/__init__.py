@@ -1,0 +1,1 @@
+"""Blood out of opened tissue, on its surface."""

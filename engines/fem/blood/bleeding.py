@@ -1,0 +1,192 @@
+"""Blood of an organ: out of its opened faces, over its surface, and off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.fem.blood.film import BILE, BLOOD, QUANTUM, Film
+from engines.fem.blood.lumen import Lumen
+from engines.fem.heat.tissue import tissue_of
+from engines.fem.organ import Organ
+from engines.tissue.organs.params import OrganParams
+from schemas.ros import Header, Time
+from schemas.soft_surface import FILM_STEP_M, FaceKind
+from schemas.trocar_msgs import SurfaceFilm
+from schemas.vectors import Vector
+
+__all__ = ["Bleeding"]
+
+_EMITTED, _DRIPPED, _SUCKED = range(3)
+_ML = 1e6 * QUANTUM
+_CLOSED = _UNKNOWN = -1
+
+
+class Bleeding:
+    """Faces that bleed, and the film on all faces.
+
+    A face of the inside of a cut bleeds as long as its piece of the organ is tied to an anchor, and its
+    tissue is not coagulated. An organ without anchors is supplied everywhere.
+    """
+
+    def __init__(self, organ: Organ, params: OrganParams, gravity: float) -> None:
+        """Begin with an uncut, dry organ."""
+        self.organ = organ
+        self._flows = _tissue_flows(params)
+        self._clotting = None if params.bleeding is None else params.bleeding.clotting
+        liquid = BILE if params.lumen is not None and params.lumen.liquid == "bile" else BLOOD
+        self.film = Film(liquid, len(organ.nodes), gravity)
+        self.lumen = None if params.lumen is None else Lumen(params.lumen, liquid, organ, params.inner_rings)
+        self.diameter = 0.0 if params.tube is None else params.tube.diameter
+        """Outer diameter of a tube at rest, m."""
+        self._opened: NDArray[np.int64] = np.full(len(organ.surface.faces), _CLOSED)
+        """Time at which each face began to bleed, ns, or -1, shape (f,)."""
+        self._book: NDArray[np.int64] = np.zeros(3, np.int64)
+        """Blood emitted, dripped off and sucked up, in parts of `QUANTUM`."""
+        self._rate: Vector = np.zeros(1)
+        """Flow out of all faces, m^3/s."""
+        self._source: Vector = np.zeros(3)
+        """Mean place of the faces that bleed or bled last, m."""
+        self._known = _UNKNOWN
+        """Version of the mesh to which all this belongs."""
+        self._velocity: Vector = np.zeros(len(self._opened))
+        """Flow out of each face if it is open, m/s, shape (f,)."""
+
+    @property
+    def rate(self) -> float:
+        """Flow out of the organ, ml/s."""
+        return 1e6 * float(self._rate[0])
+
+    @property
+    def volumes(self) -> Vector:
+        """Blood lost in all; of it on the surface, dripped off, sucked up; ml, (4,)."""
+        emitted, dripped, sucked = self._book.tolist()
+        return _ML * np.array([emitted, self.on_surface, dripped, sucked], np.float64)
+
+    @property
+    def on_surface(self) -> int:
+        """Blood on the surface, in parts of `QUANTUM`."""
+        return int(self.film.amounts.sum())
+
+    @property
+    def imbalance(self) -> int:
+        """Blood emitted, less the blood that is somewhere, in parts of `QUANTUM`: always 0."""
+        return int(self._book[_EMITTED] - self._book[_DRIPPED] - self._book[_SUCKED]) - self.on_surface
+
+    def step(self, t: int, seconds: float) -> None:
+        """Bleed and run for `seconds` until `t` ns."""
+        self._follow()
+        faces, nodes = self.organ.surface.faces, self.organ.nodes
+        bleeds = self.organ.surface.kinds == FaceKind.CUT
+        if not bleeds.any() and not self._book[_EMITTED]:
+            return
+        self._opened[bleeds & (self._opened == _CLOSED)] = t
+        velocity = np.where(bleeds, self._velocity, 0.0)
+        if self._clotting is not None:
+            velocity *= np.maximum(0.0, 1.0 - (t - self._opened) / self._clotting)
+        if self.lumen is not None:
+            velocity += self.lumen.velocity(nodes)
+        rates, emitted = self.film.emit(faces, nodes, velocity, seconds)
+        self._book[_EMITTED] += emitted
+        self._note(rates)
+        self._book[_DRIPPED] += self.film.run(faces, nodes, seconds)
+
+    def _note(self, rates: Vector) -> None:
+        """Take the flow out of each face (m^3/s, shape (f,)); say whether it begins or stops."""
+        before, self._rate[0] = float(self._rate[0]), rates.sum()
+        rate, say = float(self._rate[0]), self.organ.events.say
+        flowing = "bleeding" if self.film.liquid is BLOOD else "leaking"
+        if rate > 0.0:
+            slots = np.flatnonzero(rates)
+            places = self.organ.nodes[self.organ.surface.faces[slots]].mean(axis=1)
+            self._source[:] = (rates[slots, None] * places).sum(axis=0) / rate
+        if rate > 0.0 and before == 0.0:
+            say(flowing, "", self._source.copy(), self.rate, "ml/s")
+        elif rate == 0.0 and before > 0.0:
+            say(f"{flowing} stopped", "", self._source.copy(), float(self.volumes[0]), "ml")
+
+    def suck(self, centres: Vector, reach: Vector, most: int) -> int:
+        """Take up to `most` within `reach` (m, (n,)) of `centres` (m, shape (n, 3)); return how much."""
+        wet = np.flatnonzero(self.film.amounts)
+        apart = self.organ.nodes[wet, None] - centres
+        near = wet[(np.linalg.norm(apart, axis=2) < reach).any(axis=1)]
+        taken = self.film.take(near, most)
+        self._book[_SUCKED] += taken
+        return taken
+
+    def clip(self, ring: int, closing: Vector, width: float) -> None:
+        """Shut a tube with a lumen at a ring of nodes and beside it over a width (m), along `closing`."""
+        if self.lumen is not None:
+            self.organ.solid.tie(self.lumen.shut_rings(ring, closing, width))
+
+    def picture(self, t: int) -> SurfaceFilm:
+        """Return the message of the film at `t` ns."""
+        wet: NDArray[np.uint8] = np.zeros(0, np.uint8)
+        if self._book[_EMITTED]:
+            self._follow()
+            wet = self.film.thickness(self.organ.surface.faces, self.organ.nodes, FILM_STEP_M)
+        nodes = np.flatnonzero(wet)
+        return SurfaceFilm(
+            header=Header(stamp=Time.from_ns(t), frame_id="world"),
+            body=self.organ.name,
+            liquid=self.film.liquid.name,
+            nodes=nodes.astype(np.uint32),
+            thickness=wet[nodes],
+        )
+
+    @property
+    def state(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that the next step depends on."""
+        shut = () if self.lumen is None else (self.lumen.shut,)
+        return self.film.amounts, self._opened, self._book, self._rate, self._source, *shut
+
+    def restore(self, parts: Iterator[bytes]) -> None:
+        """Go back to a saved `state`; the organ has gone back already."""
+        amounts, opened, book, rate, source, *shut = (
+            np.frombuffer(next(parts), array.dtype) for array in self.state
+        )
+        if self.lumen is not None:
+            self.lumen.shut[:] = shut[0]
+        self.film.amounts, self._opened = amounts.copy(), opened.copy()
+        self._book[:], self._rate[:], self._source[:] = book, rate, source
+        self._known = _UNKNOWN
+
+    def _follow(self) -> None:
+        """Take over nodes and faces of an organ that has been cut; liquid without a face drips off."""
+        if self.organ.mesh_version == self._known:
+            return
+        added = len(self.organ.surface.faces) - len(self._opened)
+        self._opened = np.concatenate([self._opened, np.full(added, _CLOSED)])
+        self.film.append(len(self.organ.nodes))
+        self._take_mesh()
+        bare = np.ones(len(self.film.amounts), np.bool_)
+        bare[self.organ.surface.present] = False
+        self._book[_DRIPPED] += self.film.take(np.flatnonzero(bare), self.on_surface)
+
+    def _take_mesh(self) -> None:
+        """Find the flow out of each face, and the openings of a lumen."""
+        self._known = self.organ.mesh_version
+        solid, anchored = self.organ.solid, self.organ.anchored
+        self._velocity = self._flows[self.organ.layers[solid.owners]]
+        if anchored.any():
+            pieces = solid.pieces
+            tied = np.unique(pieces[anchored[solid.tetrahedra].any(axis=1)])
+            self._velocity[~np.isin(pieces[solid.owners], tied[tied >= 0])] = 0.0
+        if self.lumen is not None:
+            self.lumen.find_openings()
+
+
+def _tissue_flows(params: OrganParams) -> Vector:
+    """Return the flow out of an opened face of each layer, m/s, shape (layers + 1,)."""
+    names = (*(layer.material for layer in params.layers), params.material_name)
+    given = params.bleeding
+    if given is None:
+        return np.zeros(len(names))
+    perfusions = [
+        tissue_of(name).blood_flow if given.perfusion is None else given.perfusion for name in names
+    ]
+    densities = [material.density for material in params.materials]
+    return given.depth * np.array(perfusions) * np.array(densities)

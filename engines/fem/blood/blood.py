@@ -1,0 +1,132 @@
+"""The blood of all organs, and the instruments that take it up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.fem.blood.bleeding import Bleeding
+from engines.fem.blood.clip import ClipApplier, clip_ports
+from engines.fem.blood.suction import Suction, suction_ports
+from engines.fem.organ import Organ
+from engines.fem.probe import Probe
+from engines.tissue.organs.params import OrganParams
+from engines.tissue.params import PressedOrgansParams
+from hub.participant import Inputs, Value, signal_out
+from schemas.ports import Port
+from schemas.trocar_msgs import SurfaceFilm
+
+__all__ = ["Blood", "bleeds", "blood_ports"]
+
+
+def blood_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
+    """Return the ports of organs that bleed and of instruments with suction; none without such an organ."""
+    organs = [name for name, organ in params.organs.items() if bleeds(organ)]
+    if not organs:
+        return ()
+    suctions = [name for name, probe in params.probes.items() if probe.suction]
+    clips = [name for name, probe in params.probes.items() if probe.clip]
+    film = "thickness of the liquid on the surface"
+    return (
+        *(
+            signal_out(f"{organ}/bleeding", description="flow of blood, or of bile", unit="ml/s")
+            for organ in organs
+        ),
+        *(
+            signal_out(
+                f"{organ}/blood",
+                description="lost in all; of it on the surface, dripped off, sucked up",
+                size=4,
+                unit="ml",
+            )
+            for organ in organs
+        ),
+        *(
+            signal_out(f"{organ}/film", SurfaceFilm, film, frame="world", period_ns=params.node_period)
+            for organ in organs
+        ),
+        *(port for name in suctions for port in suction_ports(name)),
+        *(port for name in clips for port in clip_ports(name)),
+    )
+
+
+def bleeds(organ: OrganParams) -> bool:
+    """Return whether liquid may come out of an organ."""
+    return organ.bleeding is not None or organ.lumen is not None
+
+
+class Blood:
+    """A step of blood whenever the nodes have been read, every 8 ms."""
+
+    def __init__(
+        self,
+        params: PressedOrgansParams,
+        organs: Sequence[Organ],
+        probes: Sequence[Probe],
+    ) -> None:
+        """Begin with dry organs."""
+        self.bleedings = [
+            Bleeding(organ, params.organs[organ.name], params.gravity)
+            for organ in organs
+            if bleeds(params.organs[organ.name])
+        ]
+        self._suctions = [
+            Suction(suction, probe)
+            for probe in probes
+            if (suction := params.probes[probe.name].suction) is not None
+        ]
+        self._appliers = [
+            ClipApplier(clip, probe)
+            for probe in probes
+            if (clip := params.probes[probe.name].clip) is not None
+        ]
+        self._elapsed = np.zeros(1)
+        """Time since the last step of blood, s."""
+
+    def step(self, inputs: Inputs, t: int, h: int, *, looked: bool) -> dict[str, Value]:
+        """Go on by `h` ns to `t`, where the nodes have been read if `looked`; return the outputs."""
+        self._elapsed += h * 1e-9
+        for applier in self._appliers:
+            applier.step(inputs, self.bleedings)
+        if looked:
+            seconds = float(self._elapsed[0])
+            self._elapsed[:] = 0.0
+            for bleeding in self.bleedings:
+                bleeding.step(t, seconds)
+            for suction in self._suctions:
+                suction.step(inputs, self.bleedings, seconds)
+        return self.outputs
+
+    def pictures(self, t: int) -> dict[str, Value]:
+        """Return the films at `t` ns."""
+        return {f"{one.organ.name}/film": one.picture(t) for one in self.bleedings}
+
+    def restore(self, parts: Iterator[bytes]) -> None:
+        """Go back to a saved `state`; the organs have gone back already."""
+        for array in (self._elapsed, *(suction.taken for suction in self._suctions)):
+            array[...] = np.frombuffer(next(parts), array.dtype)
+        for bleeding in self.bleedings:
+            bleeding.restore(parts)
+
+    @property
+    def outputs(self) -> dict[str, Value]:
+        """Flows and volumes."""
+        found: dict[str, Value] = {}
+        for bleeding in self.bleedings:
+            found[f"{bleeding.organ.name}/bleeding"] = np.array([bleeding.rate])
+            found[f"{bleeding.organ.name}/blood"] = bleeding.volumes
+        for suction in self._suctions:
+            found.update(suction.outputs)
+        return found
+
+    @property
+    def state(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that the next step depends on."""
+        return (
+            self._elapsed,
+            *(suction.taken for suction in self._suctions),
+            *(array for bleeding in self.bleedings for array in bleeding.state),
+        )

@@ -1,0 +1,80 @@
+"""A clip applier: two jaws that leave a clip on the tube between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi
+
+import numpy as np
+
+from engines.fem.blood.bleeding import Bleeding
+from engines.fem.probe import Probe
+from engines.tissue.probes.clip import ClipParams
+from engines.tissue.warn_once import warn_once
+from hub.participant import Inputs, event_in
+from schemas.ports import Port
+from schemas.ros import EmptyMessage
+from schemas.vectors import Vector
+
+__all__ = ["ClipApplier", "clip_ports"]
+
+CLIPPED, SLIPPED = "clipped", "clip slipped"
+
+
+def clip_ports(probe: str) -> tuple[Port, ...]:
+    """Return the ports of a clip applier."""
+    return (event_in(f"{probe}/clip", EmptyMessage, "closes a clip on what is between the jaws"),)
+
+
+class ClipApplier:
+    """The first half of a probe's spheres as one jaw, the second half as the other."""
+
+    def __init__(self, params: ClipParams, probe: Probe) -> None:
+        self._params, self._probe = params, probe
+
+    def step(self, inputs: Inputs, bleedings: Sequence[Bleeding]) -> None:
+        """Close a clip if there is a command."""
+        if inputs.events(f"{self._probe.name}/clip"):
+            self._close(bleedings)
+
+    def _close(self, bleedings: Sequence[Bleeding]) -> None:
+        jaws = self._probe.positions.reshape(2, -1, 3).mean(axis=1)
+        middle = jaws.mean(axis=0)
+        tubes = [(one, *one.lumen.nearest(middle)) for one in bleedings if one.lumen is not None]
+        if not tubes:
+            return self._warn("there is no tube to be clipped")
+        bleeding, ring, offset = min(tubes, key=lambda tube: float(np.linalg.norm(tube[2])))
+        problem = self._misfit(bleeding, jaws, offset)
+        if problem:
+            bleeding.organ.events.say(SLIPPED, self._probe.name, middle, bleeding.diameter, "m")
+            return self._warn(problem)
+        bleeding.clip(ring, jaws[1] - jaws[0], self._params.width)
+        bleeding.organ.events.say(CLIPPED, self._probe.name, middle, self._params.width, "m")
+        return None
+
+    def _misfit(self, bleeding: Bleeding, jaws: Vector, offset: Vector) -> str:
+        """Return why a clip does not hold; empty: it holds. `offset`: from its middle to the tube, m."""
+        diameter, (least, most) = bleeding.diameter, self._params.diameters
+        spread = float(np.linalg.norm(jaws[1] - jaws[0]))
+        name = bleeding.organ.name
+        if float(np.linalg.norm(offset)) > 0.5 * (diameter + spread):
+            return f"organ '{name}' is not between the jaws"
+        if diameter < least:
+            return (
+                f"organ '{name}' of {1e3 * diameter:.3g} mm is too little for a clip of"
+                f" {1e3 * least:.3g} mm or more"
+            )
+        flat = 0.5 * pi * diameter
+        closing = (jaws[1] - jaws[0]) / max(spread, 1e-9)
+        aside = offset - float((offset * closing).sum()) * closing
+        if diameter > most or flat > self._params.length:
+            return (
+                f"organ '{name}' of {1e3 * diameter:.3g} mm, flat {1e3 * flat:.3g} mm, is too much for a clip"
+                f" of {1e3 * self._params.length:.3g} mm for {1e3 * most:.3g} mm at most"
+            )
+        if float(np.linalg.norm(aside)) + 0.5 * flat > 0.5 * self._params.length + 0.5 * diameter:
+            return f"organ '{name}' is not wholly between the jaws"
+        return ""
+
+    def _warn(self, problem: str) -> None:
+        warn_once(f"probe '{self._probe.name}': a clip slipped: {problem}")
