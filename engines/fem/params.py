@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from engines.tissue.elasticity.body_yield import MOST_NODES
 from engines.tissue.params import PressedOrgansParams
@@ -31,6 +31,18 @@ class FemParams(PressedOrgansParams):
             " frictions counts"
         ),
     )
+
+    @model_validator(mode="after")
+    def _something_to_suck_or_clip(self) -> Self:
+        organs = self.organs.values()
+        for name, probe in self.probes.items():
+            if probe.suction and not any(organ.bleeding or organ.lumen for organ in organs):
+                raise ValueError(
+                    f"probe '{name}': suction finds no blood: no organ has `bleeding` or `lumen`"
+                )
+            if probe.clip and not any(organ.lumen for organ in organs):
+                raise ValueError(f"probe '{name}': a clip shuts a tube: no organ has a `lumen`")
+        return self
 
     def has_sub_grid(self, probe: str) -> bool:
         """Return whether a probe feels the tissue's own force: not where organs may lean on rigid parts.

@@ -36,6 +36,7 @@ class Bleeding:
         """Begin with an uncut, dry organ."""
         self.organ = organ
         self._flows = _tissue_flows(params)
+        """Flow out of an opened face of each layer, m/s."""
         self._clotting = None if params.bleeding is None else params.bleeding.clotting
         liquid = BILE if params.lumen is not None and params.lumen.liquid == "bile" else BLOOD
         self.film = Film(liquid, len(organ.nodes), gravity)
@@ -50,6 +51,7 @@ class Bleeding:
         """Flow out of all faces, m^3/s."""
         self._source: Vector = np.zeros(3)
         """Mean place of the faces that bleed or bled last, m."""
+        self._dry = self._picture(0, np.zeros(0, np.uint8))
         self._known = _UNKNOWN
         """Version of the mesh to which all this belongs."""
         self._velocity: Vector = np.zeros(len(self._opened))
@@ -123,11 +125,13 @@ class Bleeding:
             self.organ.solid.tie(self.lumen.shut_rings(ring, closing, width))
 
     def picture(self, t: int) -> SurfaceFilm:
-        """Return the message of the film at `t` ns."""
-        wet: NDArray[np.uint8] = np.zeros(0, np.uint8)
-        if self._book[_EMITTED]:
-            self._follow()
-            wet = self.film.thickness(self.organ.surface.faces, self.organ.nodes, FILM_STEP_M)
+        """Return the message of the film at `t` ns; the same object as long as nothing has bled."""
+        if not self._book[_EMITTED]:
+            return self._dry
+        self._follow()
+        return self._picture(t, self.film.thickness(self.organ.surface.faces, self.organ.nodes, FILM_STEP_M))
+
+    def _picture(self, t: int, wet: NDArray[np.uint8]) -> SurfaceFilm:
         nodes = np.flatnonzero(wet)
         return SurfaceFilm(
             header=Header(stamp=Time.from_ns(t), frame_id="world"),

@@ -85,6 +85,8 @@ class Blood:
         ]
         self._elapsed = np.zeros(1)
         """Time since the last step of blood, s."""
+        self.outputs = self._read()
+        """Flows and volumes at the last step of blood."""
 
     def step(self, inputs: Inputs, t: int, h: int, *, looked: bool) -> dict[str, Value]:
         """Go on by `h` ns to `t`, where the nodes have been read if `looked`; return the outputs."""
@@ -98,6 +100,7 @@ class Blood:
                 bleeding.step(t, seconds)
             for suction in self._suctions:
                 suction.step(inputs, self.bleedings, seconds)
+            self.outputs = self._read()
         return self.outputs
 
     def pictures(self, t: int) -> dict[str, Value]:
@@ -110,10 +113,9 @@ class Blood:
             array[...] = np.frombuffer(next(parts), array.dtype)
         for bleeding in self.bleedings:
             bleeding.restore(parts)
+        self.outputs = self._read()
 
-    @property
-    def outputs(self) -> dict[str, Value]:
-        """Flows and volumes."""
+    def _read(self) -> dict[str, Value]:
         found: dict[str, Value] = {}
         for bleeding in self.bleedings:
             found[f"{bleeding.organ.name}/bleeding"] = np.array([bleeding.rate])
