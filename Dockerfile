@@ -6,7 +6,7 @@ FROM debian:bookworm-slim
 
 RUN apt-get update \
     && apt-get install --yes --no-install-recommends \
-        ca-certificates chromium g++ gcc git libc6-dev libosmesa6 make python3 python3-dev python3-pip python3-venv \
+        ca-certificates chromium g++ gcc git libc6-dev libosmesa6 libvulkan1 make mesa-vulkan-drivers python3 python3-dev python3-pip python3-venv \
     && rm -rf /var/lib/apt/lists/*
 
 # Tests that start processes need a user; the browser refuses to run as root.

@@ -89,8 +89,13 @@ class SceneParams(Params):
             " the jaw's command is not above 0"
         ),
     )
-    looks: bool = Field(
-        default=True, description="give the robot its meshes; without, it has collision shapes only"
+    looks: bool | Literal["plain", "endoscope"] = Field(
+        default=True,
+        description=(
+            "give the robot its meshes (true or plain); without, it has collision shapes only. endoscope: as"
+            " true, and cameras draw with light, textures and surroundings as an endoscope sees them, where"
+            " Filament runs (`trocar doctor`)"
+        ),
     )
 
     def base_pose(self, arm: CartArm) -> Vector:

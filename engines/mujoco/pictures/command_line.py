@@ -43,6 +43,10 @@ Robot = Annotated[
     str | None,
     typer.Option(metavar="NAME", help="Whose scene, where several participants are of kind mujoco."),
 ]
+LooksName = Annotated[
+    Literal["plain", "endoscope"],
+    typer.Option(help="endoscope: light, textures and surroundings as an endoscope sees them, by Filament."),
+]
 Trusted = Annotated[bool, typer.Option("--trust", help="Read files other than those it was recorded with.")]
 
 
@@ -61,6 +65,7 @@ def render(
     width: Pixels = 800,
     height: Pixels = 600,
     robot: Robot = None,
+    looks: LooksName = "plain",
     trust: Trusted = False,
 ) -> None:
     """Draw the scene of a recording at one moment, with its soft bodies and markers."""
@@ -69,7 +74,7 @@ def render(
     output = output or default_output(recording, ".png")
     if output.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"'{output}' is not a picture: .png or .jpg", param_hint="--output")
-    scene = _open_scene("render", recording, robot, trust=trust)
+    scene = _open_scene("render", recording, robot, looks, trust=trust)
     from PIL import Image
 
     picture = scene.picture(
@@ -110,6 +115,7 @@ def film(
     width: Pixels = 800,
     height: Pixels = 600,
     robot: Robot = None,
+    looks: LooksName = "plain",
     trust: Trusted = False,
 ) -> None:
     """Write a film of a recording, with title and time."""
@@ -120,7 +126,7 @@ def film(
         raise typer.BadParameter(f"'{output}' is not a film: .mp4", param_hint="--output")
     if width % 2 or height % 2:
         raise typer.BadParameter("a film has an even width and height", param_hint="--width, --height")
-    scene = _open_scene("film", recording, robot, trust=trust, encoder=True)
+    scene = _open_scene("film", recording, robot, looks, trust=trust, encoder=True)
     from engines.mujoco.pictures.film import Caption, write_film
     from hub.recording.recording import Recording
 
@@ -144,7 +150,13 @@ def film(
 
 
 def _open_scene(
-    command: str, recording: Path, robot: str | None, *, trust: bool, encoder: bool = False
+    command: str,
+    recording: Path,
+    robot: str | None,
+    looks: Literal["plain", "endoscope"],
+    *,
+    trust: bool,
+    encoder: bool = False,
 ) -> RecordedScene:
     """Return the scene of a recording. Raises MissingExtraError if a package for the command is missing."""
     needed = {"mujoco": "mujoco", "PIL": "pillow"} | ({"av": "av"} if encoder else {})
@@ -154,7 +166,7 @@ def _open_scene(
     from engines.mujoco.pictures.recorded_scene import RecordedScene
     from hub.recording.recording import Recording
 
-    return RecordedScene(Recording(recording), robot, trust=trust)
+    return RecordedScene(Recording(recording), robot, looks=looks, trust=trust)
 
 
 def _parse_point(text: str | None, option: str) -> tuple[float, float, float] | None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from engines.mujoco.markers.store import shown_markers
 from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures.drawing import Drawing, find_drawing
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.ports import position_count
@@ -61,7 +62,7 @@ class Endoscope(Stepped):
             for kind, model in kinds.items()
         )
         self._scene: EndoscopeScene | None = None
-        self._gl = ""
+        self._drawing = Drawing("", "")
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -91,7 +92,8 @@ class Endoscope(Stepped):
     def configure(self, setup: Setup) -> Outputs:
         """Build the scene, unless soft bodies are missing from it.
 
-        Without OpenGL it logs one warning and publishes no pictures.
+        Without OpenGL it logs one warning and publishes no pictures; without Filament it logs one and draws
+        plain looks.
         """
         for organ, body in self._bodies.items():
             body.may_change = f"{organ}/surface" in setup.connected
@@ -106,23 +108,17 @@ class Endoscope(Stepped):
                     "pillow" if package == "PIL" else package,
                 )
         opengl.import_mujoco()
-        found = opengl.find()
-        self._gl = found.name
-        if found.name and not self._bodies:
+        self._drawing = find_drawing(self.params.looks)
+        if self._drawing.shortcoming:
+            _log.warning("participant '%s' %s", self.name, self._drawing.shortcoming)
+        if self._drawing.engine and not self._bodies:
             self._build_scene()
-        elif not found.name:
-            _log.warning(
-                "participant '%s' publishes no pictures: no OpenGL works here (%s). To fix it: %s",
-                self.name,
-                found.detail,
-                opengl.REMEDY,
-            )
         return self._outputs({})
 
     def _build_scene(self) -> EndoscopeScene:
         from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 
-        self._scene = EndoscopeScene(self.params, self._gl, self._bodies)
+        self._scene = EndoscopeScene(self.params, self._drawing.engine, self._bodies)
         return self._scene
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
@@ -137,7 +133,7 @@ class Endoscope(Stepped):
             body.accept(inputs.message(f"{organ}/nodes"), change, film)
         if self.params.markers:
             self._shown = cast("ShownMarkers | None", inputs.message("markers"))
-        if not self._gl:
+        if not self._drawing.engine:
             return self._outputs({})
         scene = self._scene or self._build_scene()
         header = Header(stamp=Time.from_ns(t), frame_id=self._frame)

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import SceneParams
+from engines.mujoco.pictures.sensor_params import SensorParams
 from engines.mujoco.pictures.skin_params import SkinParams
 from hub.participant import Params
 from robots.dvrk import endoscope
@@ -82,7 +83,15 @@ class EndoscopeParams(SceneParams):
         default=95, ge=1, le=95, description="of a JPEG; above 95 files grow but pictures do not improve"
     )
     shadows: bool = Field(
-        default=False, description="draw shadows and reflections: several times slower without a GPU"
+        default=False,
+        description="draw shadows and reflections of plain looks: several times slower without a GPU",
+    )
+    place: Literal["abdomen", "dry-lab", "none"] | None = Field(
+        default=None,
+        description=(
+            "surroundings with endoscope looks; default: a dry lab for a scene with table, fixtures or"
+            " objects, an abdomen for one with soft bodies alone"
+        ),
     )
 
     @property
@@ -95,6 +104,18 @@ class EndoscopeParams(SceneParams):
         """What is drawn of other engines, by name: `skins`, and the thread of a needle."""
         threads = (thing.thread for thing in self.objects.values() if isinstance(thing, NeedleParams))
         return ({THREAD: SkinParams()} if any(threads) else {}) | self.skins
+
+    sensor: SensorParams = Field(
+        default_factory=SensorParams, description="lens and sensor with endoscope looks"
+    )
+
+    @property
+    def surroundings(self) -> Literal["abdomen", "dry-lab", "none"]:
+        """The place, chosen by the scene where it is not stated."""
+        if self.place is not None:
+            return self.place
+        is_training_set = self.table is not None or self.fixtures or self.objects
+        return "dry-lab" if is_training_set or not self.soft_bodies else "abdomen"
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:

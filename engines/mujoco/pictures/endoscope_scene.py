@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -12,37 +13,53 @@ from numpy.typing import NDArray
 from engines.mujoco.markers.frames import SceneFrames
 from engines.mujoco.markers.solids import Shape, extents, solids
 from engines.mujoco.markers.store import ShownMarker
+from engines.mujoco.model import place as place_arms
 from engines.mujoco.model import spec
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
+from engines.mujoco.pictures.filament.backend import Backend
 from engines.mujoco.pictures.skins import Skins
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.stereo import StereoRenderer
+from engines.mujoco.place.dress import dress_scene
 from robots import rotation
 from robots.dvrk.endoscope import FAR, optical_in_roll
 from robots.dvrk.mounted import MountedEcm
 from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
+if TYPE_CHECKING:
+    from engines.mujoco.pictures.filament.renderer import FilamentRenderer
+
 __all__ = ["EndoscopeScene", "add_sky", "look_at"]
 
 _SKY, _GROUND = [0.75, 0.8, 0.85], [0.35, 0.37, 0.4]
 """Behind everything seen from a room, above and below; an endoscope sees only what its own lamp lights."""
+
+_TONES = {"filmic": "pbr_neutral", "linear": "linear"}
+"""Filament's names of tone mappings."""
 
 
 class EndoscopeScene:
     """The model of the scene, its state, and the cameras in it."""
 
     def __init__(
-        self, params: EndoscopeParams, gl: str, bodies: Mapping[str, SoftBody] = MappingProxyType({})
+        self,
+        params: EndoscopeParams,
+        engine: Backend | str,
+        bodies: Mapping[str, SoftBody] = MappingProxyType({}),
     ) -> None:
         """Build the scene with the soft `bodies`, and prepare to draw it.
 
-        `gl`: the OpenGL to use, by its name in MUJOCO_GL.
+        `engine`: what draws, as `find_drawing` returns it: for Filament, or the name of an OpenGL.
         """
         scene, ecm = spec(params), params.arms.get("ECM")
-        if params.view is not None or ecm is None:
-            add_sky(scene)
-        self._skins = Skins(scene, bodies, params.soft_bodies)
+        self._skins: Skins | None = None
+        if isinstance(engine, Backend):
+            dress_scene(scene, params.sensor.exposure, _TONES[params.sensor.tone])
+        else:
+            if params.view is not None or ecm is None:
+                add_sky(scene)
+            self._skins = Skins(scene, bodies, params.soft_bodies)
         self._model = scene.compile()
         self._data = mujoco.MjData(self._model)
         self._frames = SceneFrames(params, self._model)
@@ -58,9 +75,27 @@ class EndoscopeScene:
         far = far or float(
             np.linalg.norm(self._mounting[:3, 3] - self._model.stat.center) + 2.0 * self._model.stat.extent
         )
-        self._renderer = StereoRenderer(
-            self._model, params.camera, (params.near, far), gl, shadows=params.shadows
+        clip = params.near, far
+        self._renderer = (
+            self._filament(params, clip, engine, bodies)
+            if isinstance(engine, Backend)
+            else StereoRenderer(self._model, params.camera, clip, engine, shadows=params.shadows)
         )
+
+    def _filament(
+        self,
+        params: EndoscopeParams,
+        clip: tuple[float, float],
+        backend: Backend,
+        bodies: Mapping[str, SoftBody],
+    ) -> FilamentRenderer:
+        from engines.mujoco.pictures.filament.renderer import FilamentRenderer
+        from engines.mujoco.pictures.surroundings import make_place
+
+        place_arms(self._model, self._data, params.arms)
+        mujoco.mj_kinematics(self._model, self._data)
+        place = make_place(params, self._model, bodies, self._pose()[:3, 3])
+        return FilamentRenderer(self._model, params, clip, backend, bodies, place)
 
     def draw(
         self, positions: Vector, markers: Sequence[ShownMarker] = ()
@@ -71,7 +106,8 @@ class EndoscopeScene:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
-        self._skins.show(model, data)
+        if self._skins is not None:
+            self._skins.show(model, data)
         pose = self._pose()
         shapes = [
             solid

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, TypeVar
 
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 from engines.mujoco import model
 from engines.mujoco.markers.store import ShownMarker, shown_markers
 from engines.mujoco.params import MujocoParams, SceneParams
-from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.clearest_view import Sight, clearest_position
+from engines.mujoco.pictures.drawing import find_drawing
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 from engines.mujoco.pictures.soft_body import SoftBody
@@ -28,6 +29,8 @@ from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange, Surf
 from schemas.vectors import Vector, VectorCodec
 
 __all__ = ["Camera", "RecordedScene"]
+
+_log = logging.getLogger(__name__)
 
 Camera = Literal["overview", "left", "right"]
 
@@ -51,13 +54,20 @@ _FINE_PIXELS = 1024
 class RecordedScene:
     """The robot of a recording and all soft bodies in it."""
 
-    def __init__(self, recording: Recording, robot: str | None = None, *, trust: bool = False) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        robot: str | None = None,
+        *,
+        looks: Literal["plain", "endoscope"] = "plain",
+        trust: bool = False,
+    ) -> None:
         """Find the participant `robot`, by default the first of kind mujoco; `trust` allows changed files.
 
         Raises RecordingError if there is none, or if no scene can be built of its parameters, and TrustError
         if these name files with other contents than the recorded ones.
         """
-        self._recording = recording
+        self._recording, self._looks = recording, looks
         participants = recording.scenario().participants
         robots = [name for name, spec in participants.items() if spec.kind == "mujoco"]
         if not robots or robot not in (None, *robots):
@@ -76,7 +86,7 @@ class RecordedScene:
             raise TypeError(f"{params} are no parameters of kind mujoco")
         self._params, self._files = params, parameters.files
         self._qpos = f"/engine/{name}/out/qpos"
-        self._looks, self._recorded_lens = _looks(participants), _recorded_lens(participants)
+        self._skins, self._recorded_lens = _skins(participants), _recorded_lens(participants)
         self._room_view = _room_view(participants)
         self._nodes = _by_body(
             [topic for topic, kind in recording.topics.items() if kind == SoftBodyState.ros_type]
@@ -165,14 +175,14 @@ class RecordedScene:
         self, times_ns: Iterable[int], shown: Mapping[str, Any], bodies: Mapping[str, SoftBody]
     ) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
         """Yield both pictures at each time with the cameras `shown`; `bodies` are moved."""
-        gl = opengl.find()
-        if not gl.name:
-            raise TrocarError(
-                f"no OpenGL works here ({gl.detail}), so there are no pictures. To fix it: {opengl.REMEDY}"
-            )
+        drawing = find_drawing(self._looks)
+        if not drawing.engine:
+            raise TrocarError(f"'{self._recording.file}' {drawing.shortcoming}")
+        if drawing.shortcoming:
+            _log.warning("'%s' %s", self._recording.file, drawing.shortcoming)
         # a default that is stated may be refused
         stated = self._params.model_dump(include=set(SceneParams.model_fields), exclude_unset=True)
-        looks = {"looks": True, "skins": {name: self._looks.get(name, {}) for name in bodies}}
+        looks = {"looks": self._looks, "skins": {name: self._skins.get(name, {}) for name in bodies}}
         size = {"width": shown["width"], "height": shown["height"]}
         others = {name: value for name, value in shown.items() if name not in size}
         params = EndoscopeParams.model_validate(stated | looks | others, context=self._files.context)
@@ -190,7 +200,7 @@ class RecordedScene:
             if (topic := self._film_topic(self._nodes[name])) is not None
         }
         markers = [_Newest(self._recording, topic) for topic in self._markers]
-        scene = EndoscopeScene(params, gl.name, bodies)
+        scene = EndoscopeScene(params, drawing.engine, bodies)
         try:
             for time_ns in times_ns:
                 for name, newest in nodes.items():
@@ -314,7 +324,7 @@ def _by_body(topics: list[str]) -> dict[str, str]:
     }
 
 
-def _looks(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
+def _skins(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
     """Return how the scenario's own cameras show each soft body."""
     return {
         name: look

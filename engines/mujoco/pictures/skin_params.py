@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from engines.mujoco.textures.surface import Recipe
+from engines.mujoco.textures.tissues import TISSUES, tinted
 from hub.participant import Params
 
 __all__ = ["Rgb", "SkinParams"]
@@ -20,22 +22,44 @@ Rgb = tuple[
 _COLOURS: dict[str, Rgb] = {
     "tissue": (0.80, 0.38, 0.33),
     "adrenal": (0.83, 0.60, 0.28),
+    "bowel": (0.86, 0.55, 0.48),
     "colon": (0.86, 0.55, 0.48),
     "fat": (0.90, 0.76, 0.42),
+    "gallbladder": (0.50, 0.52, 0.36),
     "kidney": (0.60, 0.24, 0.20),
     "liver": (0.52, 0.20, 0.15),
+    "muscle": (0.60, 0.22, 0.18),
+    "peritoneum": (0.80, 0.52, 0.45),
+    "skin": (0.80, 0.38, 0.33),
     "thread": (0.35, 0.1, 0.55),
 }
 """Chosen by eye for a white lamp at the camera, after descriptions of the living organs in anatomy: liver and
-kidney red-brown, the liver darker; the colon a greyish pink; the adrenal gland the yellow of its cortex;
-`tissue`, for all others, the pink of muscle. A thread is violet, as sutures of polyglactin are dyed.
+kidney red-brown, the liver darker; the colon a greyish pink; the adrenal gland the yellow of its cortex; the
+gallbladder green with bile; `tissue`, for all others and the skin of a pad, the pink of muscle. A thread is
+violet, as sutures of polyglactin are dyed.
 """
 
 
 class SkinParams(Params):
     """The look of one soft body."""
 
-    colour: Literal["tissue", "adrenal", "colon", "fat", "kidney", "liver"] | Rgb | None = Field(
+    colour: (
+        Literal[
+            "tissue",
+            "adrenal",
+            "bowel",
+            "colon",
+            "fat",
+            "gallbladder",
+            "kidney",
+            "liver",
+            "muscle",
+            "peritoneum",
+            "skin",
+        ]
+        | Rgb
+        | None
+    ) = Field(
         default=None,
         description=(
             "name of a tissue, or red, green and blue from 0 to 1; default: the tissue whose name ends the"
@@ -47,4 +71,16 @@ class SkinParams(Params):
         """Return red, green and blue, each from 0 to 1, of the body `name`."""
         if isinstance(self.colour, tuple):
             return self.colour
-        return _COLOURS[self.colour or next(filter(name.endswith, _COLOURS), "tissue")]
+        return _COLOURS[self.colour or _tissue(name)]
+
+    def recipe(self, name: str) -> Recipe:
+        """Return the recipe of the textures of the body `name`."""
+        if isinstance(self.colour, tuple):
+            return tinted(TISSUES["tissue"], self.colour)
+        tissue = self.colour or _tissue(name)
+        return TISSUES[tissue] if tissue in TISSUES else tinted(TISSUES["tissue"], _COLOURS[tissue])
+
+
+def _tissue(name: str) -> str:
+    """Return the tissue of a body by its name."""
+    return next(filter(name.endswith, _COLOURS), "tissue")

@@ -1,0 +1,1 @@
+"""Pictures by MuJoCo's physically based renderer, Filament."""

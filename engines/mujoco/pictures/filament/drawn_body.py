@@ -1,0 +1,140 @@
+"""A soft body as the physically based renderer draws it: vertices, frames and faces that change.
+
+The outside is painted once, in the rest shape, so the picture moves with the tissue. The inside of cuts and
+burnt tissue have tiles, laid in the rest shape too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from mujoco import mjrf
+from numpy.typing import NDArray
+
+from engines.mujoco.pictures.filament.tangent_frames import TangentFrames
+from engines.mujoco.pictures.filament.upload import Textures, vertex_layout, write_mesh
+from engines.mujoco.pictures.skin_mesh import SkinMesh
+from engines.mujoco.pictures.soft_body import SoftBody
+from engines.mujoco.textures.atlas import SIDES, Atlas, Indices, facing_side
+from engines.mujoco.textures.noise import Noise
+from engines.mujoco.textures.surface import Recipe, make_tile
+from engines.mujoco.textures.tissues import char, coagulum, cut_inside
+from schemas.soft_surface import FaceKind
+from schemas.vectors import Vector
+
+__all__ = ["DrawnBody"]
+
+_PIXELS = 1024
+"""Side of the picture of the outside: 0.1 to 0.4 mm a texel on an organ."""
+_TILE, _TILE_PIXELS = 0.02, 256
+"""Side of the tiles of other kinds, m and pixels."""
+_INNER: Mapping[FaceKind, Recipe] = {
+    FaceKind.CUT: cut_inside,
+    FaceKind.COAGULATED: coagulum,
+    FaceKind.CHARRED: char,
+}
+
+
+class DrawnBody:
+    """One soft body in a scene."""
+
+    def __init__(
+        self, context: mjrf.Context, scene: mjrf.Scene, body: SoftBody, recipe: Recipe, noise: Noise
+    ) -> None:
+        self._context, self._scene, self._body, self._noise = context, scene, body, noise
+        triangles = body.triangles.astype(np.int64)
+        self._rest = body.rest.astype(np.float64)
+        self._atlas = Atlas(self._rest, triangles, _PIXELS)
+        self._charts = {
+            tuple(nodes): int(chart)
+            for nodes, chart in zip(np.sort(triangles, axis=1).tolist(), self._atlas.chart, strict=True)
+        }
+        self._textures = {FaceKind.OUTSIDE: Textures.of_maps(context, self._atlas.paint(recipe, noise))}
+        self._renderables: list[mjrf.Renderable] = []
+        self._version = -1
+        self._skin: _Skin | None = None
+
+    def update(self) -> None:
+        """Show the surface as it is now."""
+        changed = self._version != self._body.version
+        if changed:
+            self._version = self._body.version
+            self._clear()
+            self._skin = self._renew()
+        if self._skin is None:
+            return
+        self._skin.write(self._body.nodes.astype(np.float64))
+        if changed:
+            self._add_renderables(self._skin)
+
+    def _clear(self) -> None:
+        for renderable in self._renderables:
+            self._scene.remove_renderable(renderable)
+        self._renderables.clear()
+
+    def _renew(self) -> _Skin | None:
+        """Return the mesh of a changed surface, faces of one kind together; None without faces."""
+        surface = self._body.surface
+        present = np.flatnonzero(surface.faces[:, 0] >= 0)
+        order = present[np.argsort(surface.kinds[present], kind="stable")]
+        if not len(order):
+            return None
+        faces, kinds = surface.faces[order].astype(np.int64), surface.kinds[order]
+        origins, rest = surface.origins[faces], self._rest[surface.origins]
+        mesh = SkinMesh(rest, faces, kinds)
+        split = len(mesh.faces) // len(faces)
+        charts = np.where(kinds == FaceKind.OUTSIDE, self._outer_charts(origins), self._tile_sides(origins))
+        frames = TangentFrames(mesh.faces, charts.repeat(split))
+        frames.set_uv(self._uv(mesh.vertices(rest)[frames.source], frames.chart))
+        return _Skin(self._context, mesh, frames, kinds.repeat(split))
+
+    def _add_renderables(self, skin: _Skin) -> None:
+        """Add a renderable for each kind of face."""
+        for kind in FaceKind:
+            first, last = np.searchsorted(skin.kinds, [kind, kind + 1]) * 3
+            if first == last:
+                continue
+            if kind not in self._textures:
+                tile = make_tile(_INNER[kind], self._noise, _TILE, _TILE_PIXELS)
+                self._textures[kind] = Textures.of_maps(self._context, tile)
+            renderable = self._context.create_renderable(
+                mjrf.RenderableParams(cast_shadow=True, receive_shadow=True)
+            )
+            renderable.set_mesh(skin.drawn, int(first), int(last - first))
+            renderable.set_material(self._textures[kind].material())
+            self._scene.add_renderable(renderable)
+            self._renderables.append(renderable)
+
+    def _outer_charts(self, origins: Indices) -> Indices:
+        """Return the chart of each face of the outside by its nodes at rest, shape (f,); 0 for others."""
+        return np.array([self._charts.get(tuple(nodes), 0) for nodes in np.sort(origins, axis=1).tolist()])
+
+    def _tile_sides(self, origins: Indices) -> Indices:
+        a, b, c = (self._rest[origins[:, i]] for i in range(3))
+        return len(self._atlas.axes) + facing_side(np.cross(b - a, c - a))
+
+    def _uv(self, points: Vector, charts: Indices) -> NDArray[np.float32]:
+        outer = len(self._atlas.axes)
+        uv = self._atlas.uv(points, np.minimum(charts, outer - 1))
+        inner = charts >= outer
+        axes = SIDES[charts[inner] - outer, :2]
+        uv[inner] = np.einsum("nj,nij->ni", points[inner], axes) / _TILE
+        return uv
+
+
+class _Skin:
+    """A mesh in the renderer's memory, of which positions change."""
+
+    def __init__(
+        self, context: mjrf.Context, mesh: SkinMesh, frames: TangentFrames, kinds: NDArray[np.uint8]
+    ) -> None:
+        self._mesh, self._frames, self.kinds = mesh, frames, kinds
+        self._faces = frames.faces.astype(np.uint32)
+        self._layout = vertex_layout(len(frames.source), self._faces.size)
+        self.drawn = context.create_mesh(self._layout)
+
+    def write(self, nodes: Vector) -> None:
+        """Move the vertices to where `nodes`, shape (n, 3), m, put them."""
+        vertices = self._frames.vertices(self._mesh.vertices(nodes))
+        write_mesh(self.drawn, self._layout, vertices, self._faces)

@@ -1,0 +1,48 @@
+"""A place as the physically based renderer draws it: meshes that stay as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mujoco import mjrf
+
+from engines.mujoco.pictures.filament.tangent_frames import TangentFrames
+from engines.mujoco.pictures.filament.upload import Textures, vertex_layout, write_mesh
+from engines.mujoco.place.part import PlacePart
+from engines.mujoco.textures.noise import Noise
+from engines.mujoco.textures.surface import Recipe, make_tile
+
+__all__ = ["DrawnPlace"]
+
+_TILE_PIXELS = 512
+
+
+class DrawnPlace:
+    """The parts of a place in a scene."""
+
+    def __init__(
+        self, context: mjrf.Context, scene: mjrf.Scene, parts: Sequence[PlacePart], noise: Noise
+    ) -> None:
+        self._textures: dict[Recipe, Textures] = {}
+        self._drawn: list[tuple[mjrf.Mesh, mjrf.Renderable]] = []
+        for part in parts:
+            if part.recipe not in self._textures:
+                tile = make_tile(part.recipe, noise, part.tile, _TILE_PIXELS)
+                self._textures[part.recipe] = Textures.of_maps(context, tile)
+            self._drawn.append(_add(context, scene, part, self._textures[part.recipe]))
+
+
+def _add(
+    context: mjrf.Context, scene: mjrf.Scene, part: PlacePart, textures: Textures
+) -> tuple[mjrf.Mesh, mjrf.Renderable]:
+    frames = TangentFrames(part.faces, np.zeros(len(part.faces), np.int64))
+    frames.set_uv(part.uv[frames.source])
+    layout = vertex_layout(len(frames.source), frames.faces.size)
+    mesh = context.create_mesh(layout)
+    write_mesh(mesh, layout, frames.vertices(part.vertices), frames.faces.astype(np.uint32))
+    renderable = context.create_renderable(mjrf.RenderableParams(cast_shadow=False, receive_shadow=True))
+    renderable.set_mesh(mesh, 0, frames.faces.size)
+    renderable.set_material(textures.material())
+    scene.add_renderable(renderable)
+    return mesh, renderable

@@ -1,0 +1,197 @@
+"""Draws what two cameras side by side see of a MuJoCo model, with Filament."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import tan
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from mujoco import mjrf
+from numpy.typing import NDArray
+
+from engines.mujoco.markers.solids import Solid
+from engines.mujoco.pictures.endoscope_params import EndoscopeParams
+from engines.mujoco.pictures.filament.backend import Backend
+from engines.mujoco.pictures.filament.drawn_body import DrawnBody
+from engines.mujoco.pictures.filament.drawn_geoms import DrawnGeoms
+from engines.mujoco.pictures.filament.drawn_place import DrawnPlace
+from engines.mujoco.pictures.filament.drawn_solids import DrawnSolids
+from engines.mujoco.pictures.filament.lamp import Lamp
+from engines.mujoco.pictures.filament.light_control import LightControl
+from engines.mujoco.pictures.filament.sensor import Sensor
+from engines.mujoco.pictures.soft_body import SoftBody
+from engines.mujoco.place.part import PlacePart
+from engines.mujoco.textures.noise import Noise
+from schemas.vectors import Vector
+
+__all__ = ["FilamentRenderer"]
+
+_SEED = 3
+"""Seed of the noise behind all textures."""
+_SHADOW_PIXELS = 1024
+_SAMPLES = 4
+_TRIES = 6
+"""Most pictures until the light of the first one is right."""
+_AMBIENT = 9000.0
+"""Light from all sides: tissue around reflects the lamp."""
+_AMBIENT_COLOUR = (1.0, 0.88, 0.82)
+
+
+class FilamentRenderer:
+    """Owns a context of the renderer, which belongs to the thread that made it."""
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        params: EndoscopeParams,
+        clip: tuple[float, float],
+        backend: Backend,
+        bodies: Mapping[str, SoftBody],
+        place: Sequence[PlacePart],
+    ) -> None:
+        """Prepare to draw.
+
+        Args:
+            model: what to draw, made by `place.dress_scene`.
+            params: cameras, sensor and looks of soft bodies.
+            clip: near and far distance between which they see, m.
+            backend: the graphics interface to use.
+            bodies: soft bodies, drawn beside the model.
+            place: surroundings.
+        """
+        self._camera = camera = params.camera
+        self._sensor = Sensor(params.sensor, camera.width, camera.height)
+        self._control = LightControl() if params.sensor.automatic_light else None
+        self._is_lit = False
+        skins = params.soft_bodies
+        half = clip[0] * tan(0.5 * camera.field_of_view)
+        self._frustum = half * camera.height / camera.width, *clip
+        self._context = backend.context()
+        self._scene = self._context.create_scene(mjrf.SceneParams())
+        self._scene.configure_from_model(model)
+        self._scene.set_msaa(_SAMPLES)
+        self._resources = mjrf.ModelResources(self._context, model)
+        noise = Noise(_SEED)
+        self._geoms = DrawnGeoms(self._context, self._scene, model, noise)
+        self._rigid = mjrf.ModelRenderables(self._scene, self._resources)
+        options = mujoco.MjvOption()
+        options.sitegroup[:] = 0
+        self._rigid.set_options(options)
+        self._lamp = Lamp(self._context, self._scene, _SHADOW_PIXELS)
+        self._ambient = _add_ambient(self._context, self._scene)
+        self._bodies = [
+            DrawnBody(self._context, self._scene, body, skins[name].recipe(name), noise)
+            for name, body in bodies.items()
+        ]
+        self._place = DrawnPlace(self._context, self._scene, place, noise)
+        self._solids = DrawnSolids(self._context, self._scene)
+        self._pixels = np.zeros((camera.height, 2 * camera.width, 3), np.uint8)
+        self._target = self._context.create_render_target(
+            mjrf.RenderTargetConfig(
+                width=2 * camera.width,
+                height=camera.height,
+                color_format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8,
+                depth_format=mjrf.PixelFormat.PIXEL_FORMAT_DEPTH32F,
+            )
+        )
+        self._read = mjrf.ReadRequest(target=self._target)
+        self._read.set_buffer(self._pixels)
+
+    def render(
+        self, data: mujoco.MjData, pose: Vector, solids: Sequence[Solid] = ()
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Return the pictures of the left and the right camera, each of shape (height, width, 3), RGB.
+
+        The first row is the top.
+
+        Args:
+            data: state whose kinematics are up to date.
+            pose: the optical frame midway between the cameras, in the world, shape (4, 4).
+            solids: to be drawn beside the model.
+        """
+        self._rigid.update(data)
+        self._geoms.update(data)
+        for body in self._bodies:
+            body.update()
+        self._solids.show(solids)
+        self._lamp.aim(pose)
+        width, height = self._camera.width, self._camera.height
+        requests = [
+            mjrf.RenderRequest(
+                scene=self._scene,
+                camera=self._eye(pose, eye - 0.5),
+                viewport=mjrf.Rect(left=eye * width, bottom=0, width=width, height=height),
+                target=self._target,
+            )
+            for eye in (0, 1)
+        ]
+        left, right = self._pixels[:, :width], self._pixels[:, width:]
+        for _ in range(1 if self._control is None or self._is_lit else _TRIES):
+            self._context.wait_for_frame(self._context.render(requests, [self._read]))
+            if self._control is None or not self._adjust_light(self._control, left):
+                break
+        self._is_lit = True
+        return self._sensor.expose(left), self._sensor.expose(right)
+
+    def _adjust_light(self, control: LightControl, picture: NDArray[np.uint8]) -> bool:
+        """Dim the lamp by a picture; return whether the first picture needs another try."""
+        is_far = control.follow(picture) if self._is_lit else control.follow(picture, 1.0)
+        self._lamp.dim(control.factor)
+        self._ambient[1].set_intensity(_AMBIENT * control.factor)
+        return is_far and not self._is_lit
+
+    def _eye(self, pose: Vector, side: float) -> mjrf.Camera:
+        right, down, ahead, middle = pose[:3, :4].T.astype(np.float32)
+        top, near, far = self._frustum
+        return mjrf.Camera(
+            pos=middle + np.float32(side * self._camera.baseline) * right,
+            forward=ahead,
+            up=-down,
+            frustum_center=0.0,
+            frustum_bottom=-top,
+            frustum_top=top,
+            frustum_near=near,
+            frustum_far=far,
+        )
+
+    def close(self) -> None:
+        """Free everything in the renderer's memory, the context last. May be called twice."""
+        for name in (
+            "_reads",
+            "_targets",
+            "_solids",
+            "_bodies",
+            "_place",
+            "_ambient",
+            "_lamp",
+            "_rigid",
+            "_resources",
+        ):
+            self.__dict__.pop(name, None)
+        self.__dict__.pop("_scene", None)
+        self.__dict__.pop("_context", None)
+
+
+def _add_ambient(context: mjrf.Context, scene: mjrf.Scene) -> tuple[mjrf.Texture, mjrf.Light]:
+    """Add light from all sides, and what metal reflects: the environment that MuJoCo's Studio brings."""
+    file = (Path(mujoco.__file__).parent / "studio" / "assets" / "ibl.ktx").read_bytes()
+    texture = context.create_texture(
+        mjrf.TextureConfig(
+            width=len(file),
+            height=0,
+            format=mjrf.PixelFormat.PIXEL_FORMAT_KTX,
+            sampler_type=mjrf.SamplerType.TEXTURE_CUBE,
+        )
+    )
+    data = mjrf.TextureData()
+    data.set_image(file)
+    texture.upload(data)
+    light = context.create_light(
+        mjrf.LightParams(
+            type=mjrf.LightType.LIGHT_IMAGE, texture=texture, intensity=_AMBIENT, color=_AMBIENT_COLOUR
+        )
+    )
+    scene.add_light(light)
+    return texture, light

@@ -1,0 +1,92 @@
+"""Textures and meshes in the memory of the renderer."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from mujoco import mjrf
+from numpy.typing import NDArray
+
+from engines.mujoco.textures.surface import Maps, Pixels
+
+__all__ = ["Textures", "vertex_layout", "write_mesh"]
+
+
+class Textures(NamedTuple):
+    """The maps of a surface; the renderer does not keep them alive."""
+
+    colour: mjrf.Texture
+    normal: mjrf.Texture
+    orm: mjrf.Texture
+
+    @classmethod
+    def of_maps(cls, context: mjrf.Context, maps: Maps) -> Textures:
+        """Upload maps."""
+        srgb, linear = mjrf.ColorSpace.COLORSPACE_SRGB, mjrf.ColorSpace.COLORSPACE_LINEAR
+        return cls(
+            _texture(context, maps.colour, srgb),
+            _texture(context, maps.normal, linear),
+            _texture(context, maps.orm, linear),
+        )
+
+    def material(self, *, metallic: float = 0.0) -> mjrf.Material:
+        """Return a material with these textures."""
+        return mjrf.Material(
+            metallic=metallic,
+            roughness=1.0,
+            color_texture=self.colour,
+            normal_texture=self.normal,
+            orm_texture=self.orm,
+        )
+
+
+def _texture(context: mjrf.Context, pixels: Pixels, space: mjrf.ColorSpace) -> mjrf.Texture:
+    height, width, _ = pixels.shape
+    texture = context.create_texture(
+        mjrf.TextureConfig(
+            width=width,
+            height=height,
+            format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8,
+            color_space=space,
+            sampler_type=mjrf.SamplerType.TEXTURE_2D,
+        )
+    )
+    data = mjrf.TextureData()
+    data.set_image(pixels.tobytes())
+    texture.upload(data)
+    return texture
+
+
+def vertex_layout(vertices: int, indices: int) -> mjrf.MeshConfig:
+    """Return the layout of a mesh of at most so many: position, tangent frame, texture coordinates."""
+    usage, kind = mjrf.VertexAttributeUsage, mjrf.VertexAttributeType
+    return mjrf.MeshConfig(
+        max_vertices=vertices,
+        max_indices=indices,
+        attributes=[
+            mjrf.VertexAttribute(
+                usage=usage.VERTEX_ATTRIBUTE_USAGE_POSITION, type=kind.VERTEX_ATTRIBUTE_TYPE_FLOAT3
+            ),
+            mjrf.VertexAttribute(
+                usage=usage.VERTEX_ATTRIBUTE_USAGE_TANGENTS, type=kind.VERTEX_ATTRIBUTE_TYPE_FLOAT4
+            ),
+            mjrf.VertexAttribute(
+                usage=usage.VERTEX_ATTRIBUTE_USAGE_UV, type=kind.VERTEX_ATTRIBUTE_TYPE_FLOAT2
+            ),
+        ],
+        interleaved=True,
+        index_type=mjrf.IndexType.INDEX_TYPE_U32,
+        primitive_type=mjrf.MeshPrimitiveType.MESH_PRIMITIVE_TYPE_TRIANGLES,
+    )
+
+
+def write_mesh(
+    mesh: mjrf.Mesh, layout: mjrf.MeshConfig, vertices: NDArray[np.float32], faces: NDArray[np.uint32]
+) -> None:
+    """Upload vertices, shape (n, 9): position, quaternion of the tangent frame, uv; faces, shape (m, 3)."""
+    low, high = vertices[:, :3].min(axis=0), vertices[:, :3].max(axis=0)
+    data = mjrf.MeshData(compute_bounds=False, bounds_min=low, bounds_max=high)
+    data.set_vertices(layout, vertices.tobytes())
+    data.set_indices(layout, faces.tobytes())
+    mesh.upload(data)

@@ -1,0 +1,120 @@
+"""An abdomen filled with gas, around organs: wall, bed of fat, loops of small bowel.
+
+Sizes: 3 to 5 l of gas lift the wall 60 to 90 mm over the organs; a loop of small bowel is 25 to 30 mm thick.
+The dome is larger where the camera would be outside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from engines.mujoco.place.part import PlacePart, ripple, sheet
+from engines.mujoco.textures.tissues import TISSUES
+from schemas.vectors import Vector
+
+__all__ = ["make_abdomen"]
+
+_LEAST_RADIUS, _LEAST_HEIGHT = 0.15, 0.13
+"""Least radius and height of the dome, m."""
+_CLEARANCE = 1.3
+"""The dome is this many times as far away as the camera."""
+_BEDDED = 0.003
+"""Depth by which the lowest point of an organ is in the bed, m."""
+_HOLLOW = 0.012
+"""Free width around organs before the bed rises, m."""
+_LOOP_RADIUS, _LOOPS = 0.0125, 3
+_CLEAR_ANGLE = 1.05
+"""Half the angle around the direction of the camera in which no loop lies, rad."""
+
+
+def make_abdomen(low: Vector, high: Vector, camera: Vector | None) -> list[PlacePart]:
+    """Return the surroundings of organs in a box from `low` to `high`, m; `camera`: a lens inside."""
+    centre = np.array([*(0.5 * (low + high))[:2], low[2] + _BEDDED])
+    footprint = 0.5 * float(np.linalg.norm((high - low)[:2])) + _HOLLOW
+    away = np.zeros(3) if camera is None else camera - centre
+    reach = float(np.linalg.norm(away[:2]))
+    radius = max(_LEAST_RADIUS, _CLEARANCE * reach, 1.6 * footprint)
+    height = max(_LEAST_HEIGHT, _CLEARANCE * float(away[2]), 1.5 * float(high[2] - low[2]))
+    towards = float(np.arctan2(away[1], away[0])) if reach > 0.0 else -0.5 * np.pi
+    return [
+        _bed(centre, footprint, radius),
+        _wall(centre, radius, height),
+        *_loops(centre, footprint, radius, towards),
+    ]
+
+
+def _bed_height(x: Vector, y: Vector, footprint: float, radius: float) -> Vector:
+    """Return the height of the bed over its middle, m."""
+    outside = np.clip((np.hypot(x, y) - footprint) / (radius - footprint), 0.0, 1.0)
+    waves = 0.004 * ripple(x, y, 0.045, 1) + 0.0015 * ripple(x, y, 0.014, 2)
+    return 0.045 * outside**1.5 + waves * (0.25 + 0.75 * np.minimum(4.0 * outside, 1.0)) - 0.001
+
+
+def _bed(centre: Vector, footprint: float, radius: float) -> PlacePart:
+    side = 2.1 * radius
+
+    def place(u: Vector, v: Vector) -> Vector:
+        x, y = (u - 0.5) * side, (v - 0.5) * side
+        return centre + np.stack([x, y, _bed_height(x, y, footprint, radius)], axis=1)
+
+    return sheet(place, (side, side), (44, 44), TISSUES["fat"], 0.09)
+
+
+def _wall(centre: Vector, radius: float, height: float) -> PlacePart:
+    """Dome of the abdominal wall, seen from inside."""
+
+    def place(u: Vector, v: Vector) -> Vector:
+        turn, rise = 2.0 * np.pi * u, 0.5 * np.pi * v
+        folds = 1.0 + 0.01 * ripple(turn * radius * np.cos(rise), rise * height, 0.06, 5)
+        across = radius * np.cos(rise) * folds
+        return centre + np.stack(
+            [across * np.cos(turn), across * np.sin(turn), height * np.sin(rise) * folds], axis=1
+        )
+
+    part = sheet(
+        place, (round(2.0 * np.pi * radius / 0.12) * 0.12, 0.24), (32, 12), TISSUES["peritoneum"], 0.12
+    )
+    return part._replace(faces=part.faces[:, ::-1])
+
+
+def _loops(centre: Vector, footprint: float, radius: float, towards: float) -> Iterator[PlacePart]:
+    """Loops of small bowel beside and behind the organs, as seen from the direction `towards`, rad."""
+    for loop in range(_LOOPS):
+        distance = footprint + (1.2 + 1.75 * loop) * _LOOP_RADIUS
+        if distance > 0.95 * radius:
+            return
+        start, end = towards + _CLEAR_ANGLE, towards + 2.0 * np.pi - _CLEAR_ANGLE
+        steps = np.linspace(0.0, 1.0, 90)
+        turn = start + (end - start) * steps
+        across = distance + 0.007 * np.sin(9.0 * turn + 2.0 * loop) + 0.004 * np.sin(17.0 * turn + loop)
+        x, y = across * np.cos(turn), across * np.sin(turn)
+        z = _bed_height(x, y, footprint, radius) + _LOOP_RADIUS * (
+            0.55 + 0.5 * np.sin(5.0 * turn + 1.7 * loop)
+        )
+        z -= 2.5 * _LOOP_RADIUS * np.clip(1.0 - 9.0 * np.minimum(steps, 1.0 - steps), 0.0, 1.0)
+        yield _tube(centre + np.stack([x, y, z], axis=1), _LOOP_RADIUS, loop)
+
+
+def _tube(line: Vector, radius: float, seed: int) -> PlacePart:
+    """Return a tube of bowel along a line, shape (k, 3), m: narrower and wider by turns."""
+    ways = np.gradient(line, axis=0)
+    steps = np.linalg.norm(ways, axis=1)
+    ahead = ways / steps[:, None]
+    aside = np.cross(ahead, [0.0, 0.0, 1.0])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    up = np.cross(aside, ahead)
+    along = np.cumsum(steps)
+    width = radius * (1.0 + 0.10 * np.sin(along / 0.011 + seed) + 0.05 * np.sin(along / 0.004 + 3.0 * seed))
+    ends = np.minimum(along, along[-1] - along) / (1.5 * radius)
+    width *= np.sqrt(np.clip(2.0 * ends - ends * np.abs(ends), 0.0, 1.0)) * (ends < 1.0) + (ends >= 1.0)
+
+    def place(u: Vector, v: Vector) -> Vector:
+        index = np.rint(v * (len(line) - 1)).astype(np.int64)
+        turn = 2.0 * np.pi * u
+        across = np.cos(turn)[:, None] * aside[index] + np.sin(turn)[:, None] * up[index]
+        return line[index] + width[index, None] * across
+
+    part = sheet(place, (0.08, float(along[-1])), (12, len(line) - 1), TISSUES["bowel"], 0.08)
+    return part._replace(faces=part.faces[:, ::-1])
