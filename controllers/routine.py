@@ -36,6 +36,7 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.quantity import Angle, Duration, Length, Power
 from schemas.ros import (
+    EmptyMessage,
     Float64Message,
     Header,
     JointState,
@@ -131,6 +132,16 @@ class SetSpeed(_Command):
         return f"{self.arm}/trajectory_j/set_ratio_v", Float64Message(data=self.share)
 
 
+class CloseClip(_Command):
+    """Close a clip on the tube between the jaws of a clip applier; done at once."""
+
+    do: Literal["clip"]
+
+    def message(self) -> tuple[str, Message]:
+        """Return port and message."""
+        return f"{self.arm}/clip", EmptyMessage()
+
+
 class SetPower(_Command):
     """Let the generator of an energy instrument give a power from now on, 0 to stop; done at once."""
 
@@ -161,7 +172,16 @@ class Together(Params):
 
 
 Step = Annotated[
-    MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | SetSpeed | SetPower | Wait | Together,
+    MoveTip
+    | MoveJoints
+    | MoveJaw
+    | MoveHand
+    | ChangeState
+    | SetSpeed
+    | CloseClip
+    | SetPower
+    | Wait
+    | Together,
     Field(discriminator="do"),
 ]
 
@@ -267,7 +287,9 @@ class Routine(Controller):
         for command in _commands(step):
             port, message = command.message()
             self._outputs[port] += (message,)
-            self._busy[self._arms.index(command.arm)] = 0.0 if isinstance(command, SetSpeed) else 1.0
+            self._busy[self._arms.index(command.arm)] = (
+                0.0 if isinstance(command, SetSpeed | CloseClip) else 1.0
+            )
 
     def _receive(self, inputs: Inputs) -> None:
         for i, arm in enumerate(self._arms):
@@ -295,7 +317,9 @@ class Routine(Controller):
         return not self._busy.any()
 
 
-def _commands(step: Step) -> Iterator[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | SetSpeed]:
+def _commands(
+    step: Step,
+) -> Iterator[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | SetSpeed | CloseClip]:
     """Yield the commands of a step."""
     if isinstance(step, Together):
         yield from step.orders

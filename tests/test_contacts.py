@@ -109,6 +109,17 @@ def test_an_energy_instrument_heats_tissue_of_our_own_without_a_word(write, numb
     assert probe.energy is None
 
 
+def test_a_clip_applier_brings_its_clip_to_tissue_of_our_own(write):
+    change = ["scene.arms.PSM1.instrument='420327'"]
+    (probe,) = (
+        load(write(TOUCHES), [*change, "participants.tissue.kind=fem"]).params["tissue"].probes.values()
+    )
+    assert probe.clip.diameters == (3.5e-3, 7e-3)
+    assert probe.grasp is not None
+    (probe,) = load(write(TOUCHES), change).params["tissue"].probes.values()
+    assert probe.clip is None
+
+
 def test_an_instrument_that_passes_through_is_named_with_lines_to_add(write):
     text = TOUCHES.replace(", touches: [liver]", "")
     file = load(write(text))

@@ -20,7 +20,7 @@ _LONGEST_NS, _HALVES = 1_000_000, 4
 class BulletParams(PressedOrgansParams):
     """Tissue in Bullet."""
 
-    unused_of_tools: ClassVar[frozenset[str]] = frozenset({"energy"})
+    unused_of_tools: ClassVar[frozenset[str]] = frozenset({"energy", "clip"})
 
     timestep: Duration | None = Field(
         default=None,

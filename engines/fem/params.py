@@ -33,15 +33,13 @@ class FemParams(PressedOrgansParams):
     )
 
     @model_validator(mode="after")
-    def _something_to_suck_or_clip(self) -> Self:
+    def _something_to_suck(self) -> Self:
         organs = self.organs.values()
         for name, probe in self.probes.items():
             if probe.suction and not any(organ.bleeding or organ.lumen for organ in organs):
                 raise ValueError(
                     f"probe '{name}': suction finds no blood: no organ has `bleeding` or `lumen`"
                 )
-            if probe.clip and not any(organ.lumen for organ in organs):
-                raise ValueError(f"probe '{name}': a clip shuts a tube: no organ has a `lumen`")
         return self
 
     def has_sub_grid(self, probe: str) -> bool:

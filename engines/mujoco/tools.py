@@ -23,6 +23,8 @@ def instrument_tool(arm: str, mounted: MountedPsm, base: Vector) -> Tool:
         probe = {"spheres": len(spheres), "radius": radii[0] if len(set(radii)) == 1 else radii}
         probe |= {} if mounted.tool.jaw is None else {"grasp": {}}
         probe |= {"energy": {"mode": mounted.tool.energy}} if mounted.tool.energy else {}
+        if clip := mounted.tool.clip:
+            probe["clip"] = {"length": clip.length, "diameters": clip.diameters}
     return Tool(
         name=arm,
         touches=mounted.touches,

@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 
 from robots.dvrk.drive import JAW_COLUMN, disc_shares
+from robots.dvrk.end_effectors.clips import CLIPS, Clip
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
 from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.end_effectors.end_effector import EndEffector
@@ -118,6 +119,12 @@ class Instrument:
         if "BIPOLAR" in self.name:
             return "bipolar"
         return "monopolar" if "MONOPOLAR" in self.name or "CAUTERY" in self.name else None
+
+    @property
+    def clip(self) -> Clip | None:
+        """The clip of a clip applier, by its name."""
+        size, _, _ = self.name.partition("_CLIP_APPLIER")
+        return CLIPS.get(size) if size != self.name else None
 
     @property
     def jaw(self) -> Jaw | None:

@@ -132,3 +132,13 @@ def test_power_lasts_from_its_order_to_the_next_one(tmp_path):
     assert run.outputs["done"][0] == 1.0
     with pytest.raises(ValidationError, match="400"):
         RoutineParams.model_validate({"steps": [watts[0] | {"power": "1 kW"}]})
+
+
+def test_a_clip_is_closed_once_and_awaits_nothing(tmp_path):
+    run = Run(tmp_path, [{"do": "clip", "arm": "PSM1"}, {"do": "wait", "time": "2 ms"}])
+    found = []
+    for _ in range(6):
+        run.step()
+        found.append(len(run.outputs["PSM1/clip"]))
+    assert sum(found) == 1
+    assert run.outputs["done"][0] == 1.0

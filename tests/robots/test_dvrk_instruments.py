@@ -94,3 +94,13 @@ def test_a_hook_touches_from_heel_to_tip_and_a_spatula_along_its_end():
 )
 def test_energy_instruments_are_known_by_their_names(number, energy):
     assert instrument(number).energy == energy
+
+
+@pytest.mark.parametrize(
+    ("number", "least", "most"), [("400003", 2e-3, 4e-3), ("420327", 3.5e-3, 7e-3), ("400230", 5e-3, 13e-3)]
+)
+def test_clip_appliers_are_known_by_their_names(number, least, most):
+    clip = instrument(number).clip
+    assert clip.diameters == (least, most)
+    assert clip.length > most
+    assert instrument("400006").clip is None

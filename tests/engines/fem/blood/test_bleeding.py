@@ -215,8 +215,6 @@ def test_bleeding_needs_cutting_and_kind_fem():
         FemParams.model_validate(given(uncut))
     with pytest.raises(ValueError, match="suction finds no blood"):
         FemParams.model_validate(given({**uncut, "bleeding": None}, SCALPEL | {"suction": {}}))
-    with pytest.raises(ValueError, match="a clip shuts a tube"):
-        FemParams.model_validate(given(probe=SCALPEL | {"clip": {}}))
     with pytest.raises(ValueError, match="leave it out here"):
         BulletParams.model_validate(
             {
