@@ -2,9 +2,10 @@
 
 An action has five numbers of -1 to 1 for each hand: displacement of the tip along x, y and z of the world, a
 turn, and the jaw, which closes below 0 and opens from 0 on, as in SurRoL (med-air/SurRoL at a903fa6,
-surrol/tasks/psm_env.py: 10 mm, 30 degrees of yaw or 15 of pitch, jaw 40 degrees or shut in a step of 0.2 s).
-What is out of range is clipped. The tip's goal moves by the action and stays inside the workspace; the joints
-go there evenly within the step. A goal that the arm cannot reach is not taken, and counted.
+surrol/tasks/psm_env.py: 10 mm, 30 degrees of yaw or 15 of pitch, jaw 40 degrees or shut in a step of 0.2 s);
+an electrode has no jaw, and power below 0. What is out of range is clipped. The tip's goal moves by the
+action and stays inside the workspace; the joints go there evenly within the step. A goal that the arm cannot
+reach is not taken, and counted.
 """
 
 from __future__ import annotations
@@ -32,12 +33,14 @@ from hub.participant import (
 )
 from robots import rotation
 from robots.dvrk.crtk import Mounting
+from robots.dvrk.end_effectors.electrode import Electrode
+from robots.dvrk.end_effectors.jaw import Jaw
 from robots.dvrk.inverse import inverse
 from robots.dvrk.parameters import ArmName
 from robots.transform import inverse_transform, matrix_to_pose, rigid_transform
 from schemas.errors import MotionError, ScenarioError
 from schemas.ports import Port
-from schemas.quantity import Angle, Duration, Length
+from schemas.quantity import Angle, Duration, Length, Power
 from schemas.ros import Float64Message, JointState, PoseStamped
 from schemas.vectors import Vector
 
@@ -79,6 +82,9 @@ class ActionsParams(Params):
             " torque, which is what sub-steps of 2 ms can hold"
         ),
     )
+    power: Annotated[Power, Field(gt=0.0, le=400.0)] = Field(
+        default=30.0, description="of the generator of an electrode without a jaw, while it is on"
+    )
     workspace: tuple[_Point, _Point] = Field(
         description="two opposite corners, in the world, between which the goals of the tips stay"
     )
@@ -111,6 +117,8 @@ class _Hand:
     def __init__(self, arm: ArmName, params: ActionsParams, held: PsmParams) -> None:
         self.base = base_in_world(arm, params)
         self.arm, self.chain, self.params = arm, held.chain, params
+        self.power = np.zeros(1 if isinstance(held.tool.end_effector, Electrode) else 0)
+        """Power of an electrode, W, shape (1,); empty with a jaw."""
         corners = np.array(params.workspace)
         self.low, self.high = corners.min(axis=0), corners.max(axis=0)
         self._into_base = inverse_transform(self.base)
@@ -129,6 +137,7 @@ class _Hand:
         else:
             about = np.array([0.5 * params.turn * float(action[3]), 0.0, 0.0])
             orientation = rotation.product(now.goal[3:], rotation.exp(about))
+        self.power[:] = params.power if action[4] < 0.0 else 0.0
         now.jaw_start = float(now.jaw[0])
         now.jaw_end = params.opening if action[4] >= 0.0 else params.closing
         tip = rigid_transform(rotation.matrix(orientation), position)
@@ -154,7 +163,7 @@ class _Progress(Record):
 
 
 class Actions(Controller):
-    """Leads arms and jaws by actions."""
+    """Leads arms, jaws and generators by actions."""
 
     params_model: ClassVar[type[Params]] = ActionsParams
     params: ActionsParams
@@ -164,21 +173,27 @@ class Actions(Controller):
         self._hands: list[_Hand] = []
         for arm in params.hands:
             held = params.arms.present_arms[arm]
-            if not isinstance(held, PsmParams) or held.tool.jaw is None:
-                raise ScenarioError(f"{arm} holds no instrument with a jaw", path=("participants", name))
+            if not isinstance(held, PsmParams) or not isinstance(held.tool.end_effector, Jaw | Electrode):
+                raise ScenarioError(
+                    f"{arm} holds no instrument with a jaw or an electrode", path=("participants", name)
+                )
             self._hands.append(_Hand(arm, params, held))
         self._progress = _Progress()
-        self.keep(self._progress, *(hand.state for hand in self._hands))
+        powers = [hand.power for hand in self._hands if hand.power.size]
+        self.keep(self._progress, *(hand.state for hand in self._hands), *powers)
         self._outputs: dict[str, Any] = {}
         for hand in self._hands:
             self._outputs[f"{hand.arm}/servo_jp"] = hand.state.command
-            self._outputs[f"{hand.arm}/jaw/servo_jp"] = hand.state.jaw
+            if hand.power.size:
+                self._outputs[f"{hand.arm}/energy"] = hand.power
+            else:
+                self._outputs[f"{hand.arm}/jaw/servo_jp"] = hand.state.jaw
             self._outputs[f"{hand.arm}/goal_cp"] = hand.state.goal
             self._outputs[f"{hand.arm}/refused"] = hand.state.refused
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The action in; goals of joints, jaw and tip, and the number of goals out of reach, out."""
+        """The action in; goals of joints, jaw and tip, power, and the number of goals out of reach, out."""
         count = _NUMBERS * len(self._hands)
         action = signal_in(
             "action",
@@ -218,9 +233,11 @@ class Actions(Controller):
 def _ports(hand: _Hand) -> tuple[Port, ...]:
     names = tuple(joint.name for joint in hand.chain.joints)
     joints, goal, refused = f"{hand.arm}/servo_jp", f"{hand.arm}/goal_cp", f"{hand.arm}/refused"
+    jaw = signal_out(f"{hand.arm}/jaw/servo_jp", JointState, names=("jaw",))
+    energy = signal_out(f"{hand.arm}/energy", description="power of the generator", unit="W")
     return (
         signal_out(joints, JointState, names=names),
-        signal_out(f"{hand.arm}/jaw/servo_jp", JointState, names=("jaw",)),
+        energy if hand.power.size else jaw,
         signal_out(goal, PoseStamped, frame="world"),
         signal_out(refused, Float64Message, "goals out of reach, which were not taken"),
     )

@@ -102,7 +102,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._view = self._new_view()
         self._describe_spaces(len(self._view.vector()), (height, width, 3))
         self._closed = False
-        self._episode, self._seen = 0, set[str]()
+        self._episode, self._seen, self._harm = 0, set[str](), 0.0
         self._goal = np.zeros(exercise.goal_size)
 
     def _new_view(self) -> EnvironmentView:
@@ -152,6 +152,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._session.restart(self._next_recording())
         self._view = self._new_view() if not self._session.restores else self._view
         self._seen.clear()
+        self._harm = 0.0
         inputs = {f"robot.{thing}/place": (_stamp_pose(pose),) for thing, pose in starts.items()}
         self._session.advance(self._settling, inputs)
         observation = self._observe()
@@ -174,7 +175,9 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._session.advance(self._count, {"actions.action": np.clip(given, -1.0, 1.0)})
         observation = self._observe()
         events = cast("tuple[TaskEvent, ...]", self._session["task.events"])
-        extra = event_bonus([event.event for event in events], self._seen)
+        harm, before = self.exercise.harm(self._view), self._harm
+        self._harm = harm
+        extra = event_bonus([event.event for event in events], self._seen) + before - harm
         info = self._info(observation, extra)
         worth = float(self.compute_reward(observation["achieved_goal"], observation["desired_goal"], info))
         terminated = self.exercise.has_lost_object(self._view) or (self._terminates and info["is_success"])

@@ -24,6 +24,7 @@ from tasks.pick_and_place import PickAndPlaceTask
 from tasks.task import Task
 
 __all__ = [
+    "Dissect",
     "Exercise",
     "NeedleHandOver",
     "NeedlePick",
@@ -38,6 +39,8 @@ Starts = Mapping[str, Vector]
 """Where things are put at reset: poses, shape (7,), by name."""
 _NEAR = Tolerance(5e-3)
 """SurRoL's: 5 mm."""
+_DEAD = 1e-7
+"""Dead volume of a bed that costs 1 in the shaped reward, m^3."""
 
 
 class Exercise(ABC):
@@ -63,6 +66,10 @@ class Exercise(ABC):
     @abstractmethod
     def achieved_goal(self, view: EnvironmentView) -> Vector:
         """Return the achieved part of the goal, shape (goal_size,)."""
+
+    def harm(self, view: EnvironmentView) -> float:  # noqa: ARG002
+        """Return the harm done so far, in units of the shaped reward."""
+        return 0.0
 
     def has_lost_object(self, view: EnvironmentView) -> bool:
         """Return whether a thing has fallen out of the scene."""
@@ -209,4 +216,29 @@ class Retraction(Exercise):
 
     def achieved_goal(self, view: EnvironmentView) -> Vector:
         """Return the lifted height of the held tissue, 0 while nothing is held."""
-        return view.tissue[1:] * view.tissue[0]
+        return np.array([view.tissue["tissue/lift"] * view.tissue["tissue/held"]])
+
+
+class Dissect(Exercise):
+    """Burn a sheet of fat off its bed of liver with the hook of PSM1; PSM2 holds the sheet.
+
+    Power below the sheet frees the sheet, and kills cells of the bed when too near or too long.
+    """
+
+    scene = "dissect"
+    hands = ("PSM1", "PSM2")
+    goal_size = 1
+    puts = False
+    tolerance = Tolerance(0.5e-3)
+
+    def draw(self, rng: Generator) -> tuple[Starts, Vector]:
+        """Draw the length over which the sheet is to be freed: 2.5 to 5 mm."""
+        return {}, rng.uniform(2.5e-3, 5e-3, 1)
+
+    def achieved_goal(self, view: EnvironmentView) -> Vector:
+        """Return the freed length."""
+        return np.array([view.tissue["tissue/freed"]])
+
+    def harm(self, view: EnvironmentView) -> float:
+        """Return the dead volume of the bed, in units of 100 mm^3."""
+        return view.tissue["tissue/dead"] / _DEAD

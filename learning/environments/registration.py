@@ -20,6 +20,7 @@ ENVIRONMENTS: Mapping[str, tuple[str, int]] = MappingProxyType(
         "trocar/BiPegTransfer-v0": ("TwoHandedPegTransfer", 150),
         "trocar/PickAndPlace-v0": ("PickAndPlace", 50),
         "trocar/Retraction-v0": ("Retraction", 50),
+        "trocar/Dissect-v0": ("Dissect", 150),
     }
 )
 """Class of the exercise and steps of an episode, by id."""

@@ -74,3 +74,12 @@ def test_a_hand_that_is_not_there_is_refused():
         make(hands=["PSM2"])
     with pytest.raises(ScenarioError, match="no instrument with a jaw"):
         make(arms={"PSM1": {}})
+
+
+def test_an_electrode_has_power_instead_of_a_jaw():
+    hook = {"arms": {"PSM1": ARMS["PSM1"] | {"instrument": "400183"}}, "power": "25 W"}
+    trocar.check_engine(lambda: make(**hook), period_ns=PERIOD, inputs={"action": [0, 0, 0, 0, -1.0]})
+    for last, watts in ((-0.5, 25.0), (0.0, 0.0)):
+        found = acted(make(**hook), [0, 0, 0, 0, last])
+        assert found["PSM1/energy"] == watts
+        assert "PSM1/jaw/servo_jp" not in found

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from learning.environments.environment import Environment
-from learning.environments.oracles import needles, others, rings
+from learning.environments.oracles import needles, others, rings, tissue
 from learning.environments.oracles.waypoints import Oracle, WaypointPlan
 
 __all__ = ["ORACLES", "Oracle", "oracle"]
@@ -23,6 +23,7 @@ ORACLES: Mapping[str, Callable[[Environment], WaypointPlan]] = MappingProxyType(
         "TwoHandedPegTransfer": rings.bi_peg_transfer,
         "PickAndPlace": others.piece,
         "Retraction": others.retraction,
+        "Dissect": tissue.dissect,
     }
 )
 """Plans, by the class of their exercise."""

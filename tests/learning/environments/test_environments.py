@@ -177,6 +177,26 @@ def test_tissue_is_grasped_and_lifted_and_a_new_episode_has_it_where_it_was(tmp_
     assert trocar.verify(tmp_path / "episode-00001").same
 
 
+def test_a_sheet_is_burnt_off_its_bed_and_is_whole_in_a_new_episode(tmp_path):
+    env = gymnasium.make("trocar/Dissect-v0", reward="shaped", record=tmp_path)
+    dead, hashes = env.unwrapped.layout["tissue/dead"], list[list[str]]()
+    for most in (60, 16):
+        observation, _ = env.reset(seed=3)
+        assert observation["achieved_goal"] == 0.0
+        policy, info, bonus = oracle(env.unwrapped), {"is_success": False}, 0.0
+        hashes.append([])
+        while len(hashes[-1]) < most and not info["is_success"]:
+            observation, *_, info = env.step(policy(observation))
+            hashes[-1].append(env.unwrapped.state_hash)
+            bonus += info["bonus"]
+        assert info["is_success"] == (most == 60)
+        assert bonus == pytest.approx(-1e7 * observation["observation"][dead][0], rel=1e-3)
+    assert bonus < 0.0, "some of the bed has died"
+    assert hashes[1] == hashes[0][:16]
+    env.close()
+    assert trocar.verify(tmp_path / "episode-00001").same
+
+
 def test_what_is_unknown_is_refused():
     for arguments, problem in (
         ({"reward": "dense"}, "neither 'sparse' nor 'shaped'"),

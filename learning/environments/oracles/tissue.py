@@ -1,0 +1,68 @@
+"""A plan for the hook that burns a sheet off its bed. Metres and radians in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from learning.environments.environment import Environment
+from learning.environments.oracles.waypoints import Seen, Waypoint, WaypointPlan
+from schemas.vectors import Vector
+
+__all__ = ["dissect"]
+
+_FORCEPS = np.array([-0.5, 0.0, -0.8660254])
+"""Direction of the forceps, from the tip to the ends of the fingers."""
+_HOOK = np.array([0.8660254, 0.0, -0.5])
+_FINGERS, _HEEL = 15.5e-3, 14.9e-3
+"""Distance of the ends of the fingers, and of the heel of the hook, from the tip."""
+_FOOT = np.array([0.0, 0.9e-3, 0.0])
+"""From the heel of the hook to the middle of its foot."""
+_BITE = np.array([-9e-3, 0.0, -1.2e-3])
+"""Where the ends of the fingers take the sheet."""
+_UP = np.array([2e-3, 0.0, 7.2e-3])
+"""How far the sheet is drawn."""
+_FIRST, _PITCH, _HEIGHT = -11e-3, 1.3e-3, -0.8e-3
+"""Where the first track of the hook is, the distance of the next, and the height of all."""
+_HALF, _PACE = 4.8e-3, 0.6e-3
+"""Half of a track, and its part in a step."""
+_TRACKS = 6
+
+
+def dissect(_: Environment) -> WaypointPlan:
+    """Return a plan to draw the sheet up, and to burn track after track until enough is free."""
+    bite = _BITE - _FINGERS * _FORCEPS
+    plan: WaypointPlan = [
+        (1, lambda _: Waypoint(bite, None, False)),
+        (1, lambda _: Waypoint(bite, None, True, wait=2, near=5e-3)),
+        (1, lambda _: Waypoint(bite + _UP, None, True)),
+        (0, lambda _: Waypoint(_tip_at(_FIRST - 2e-3, -_HALF), None, False)),
+    ]
+    return plan + [(0, _burn(place)) for place in _tracks()]
+
+
+def _tracks() -> list[Vector]:
+    """Return the places of the hook's tip, to and fro across the sheet."""
+    across = np.linspace(-_HALF, _HALF, round(2.0 * _HALF / _PACE) + 1).tolist()
+    return [
+        _tip_at(_FIRST + track * _PITCH, y)
+        for track in range(_TRACKS)
+        for y in (across if track % 2 == 0 else reversed(across))
+    ]
+
+
+def _tip_at(x: float, y: float) -> Vector:
+    """Return the place of the tip for the middle of the foot at (x, y)."""
+    return np.array([x, y, _HEIGHT]) - _FOOT - _HEEL * _HOOK
+
+
+def _burn(place: Vector) -> Callable[[Seen], Waypoint]:
+    """Return a waypoint with power, or a stop without where enough is free."""
+
+    def to(seen: Seen) -> Waypoint:
+        if seen["tissue/freed"][0] >= seen.goal[0]:
+            return Waypoint(seen["PSM1/tip/position"], None, False, wait=1000)
+        return Waypoint(place, None, True, near=0.6e-3)
+
+    return to
