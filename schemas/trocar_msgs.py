@@ -274,7 +274,7 @@ class TaskEvent(Message):
     event: String
     """`grasped`, `lifted`, `handed over`, `placed`, `dropped`, `out of workspace`, `out of view` or
     `collision`; of a needle in a phantom also `entered`, `exited`, `stitched` (or, from the tissue itself,
-    `pulled out`) and `withdrawn`.
+    `pulled out`) and `withdrawn`; of tissue `cut`, `torn` and `burnt`.
     """
     object: String = ""
     """Name of the object; empty: none."""

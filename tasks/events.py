@@ -19,6 +19,9 @@ EventKind = Literal[
     "exited",
     "stitched",
     "withdrawn",
+    "cut",
+    "torn",
+    "burnt",
 ]
 
 
@@ -32,5 +35,5 @@ class Event(NamedTuple):
     place: int = -1
     """Where the object was placed."""
     value: float = 0.0
-    """How much, in `unit`: the height of a lift or drop, the impulse of a collision."""
+    """How much, in `unit`: the height of a lift or drop, the impulse of a collision, the area of a cut."""
     unit: str = ""

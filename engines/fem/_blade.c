@@ -3,7 +3,7 @@
 An edge is a line of samples between two spheres, which go where the instrument goes. In the tissue each sample has a
 front, the point of the resting body up to which it has cut. The front resists like dry friction: the edge carries the
 tissue along until the force is toughness times width, then it slips, and the front follows. So the work of cutting is
-toughness times swept area. An edge pushes forward only; backwards it leaves its cut.
+toughness times swept area. An edge pushes forward only; backwards it leaves its cut. A blunt edge never slips.
 */
 
 #include "_solid.h"
@@ -19,9 +19,14 @@ toughness times swept area. An edge pushes forward only; backwards it leaves its
 
 typedef struct {
     int32_t node[4];
-    double share[4], edge[3], forward[3], goal[3], mass, impulse[3];
+    double share[4], edge[3], forward[3], goal[3], mass, width, impulse[3];
     double most, borne; /* impulse of slipping, and its part that the mesh bears */
 } Front;
+
+static int is_blunt(const Edges *edges, int edge)
+{
+    return isinf(edges->toughness[edge]);
+}
 
 /* Place of a sample at an end of a sub-step. */
 static void sample_at(const Spheres *spheres, const Edges *edges, int edge, double along, int place, double x[3])
@@ -204,6 +209,10 @@ void engage(const Body *body, const Spheres *spheres, const Edges *edges, int su
         double line[3];
         int found = -1;
         edge_line(spheres, edges, edge, 0, line);
+        for (int s = 0; s < edges->samples && edges->toughness[edge] < 0.0; s++)
+            edges->element[edge * edges->samples + s] = -1;
+        if (edges->toughness[edge] < 0.0)
+            continue;
         for (int s = 0; s < edges->samples; s++) {
             int k = edge * edges->samples + s;
             double along = (s + 0.5) / edges->samples, x[3], next[3], way[3];
@@ -226,6 +235,8 @@ void engage(const Body *body, const Spheres *spheres, const Edges *edges, int su
                     edges->element[k] = -1; /* it is elsewhere: not in its cut */
             }
             if (edges->element[k] < 0) {
+                int has_left = edges->element[k] != -1;
+                double last[3] = {front[0], front[1], front[2]};
                 edges->element[k] = -1;
                 sample_at(spheres, edges, edge, along, sub_steps, next);
                 for (int i = 0; i < 3; i++)
@@ -240,6 +251,8 @@ void engage(const Body *body, const Spheres *spheres, const Edges *edges, int su
                 for (int n = 0; n < found; n++)
                     if (enter(body, near[n], x, way, front, ahead, begun + 3 * k)) {
                         edges->element[k] = near[n];
+                        if (has_left && distance(last, front) < (double)body->limits[3])
+                            memcpy(begun + 3 * k, last, sizeof last); /* it has come back: no hole in what is swept */
                         break;
                     }
             } else
@@ -287,8 +300,13 @@ static int prepare(const Body *body, const Spheres *spheres, const Edges *edges,
         inverse += front->share[a] * front->share[a] * (double)body->inverse_mass[front->node[a]];
     }
     front->mass = inverse > 0.0 ? 1.0 / inverse : 0.0;
-    front->most = edges->toughness * length / edges->samples * seconds;
-    front->borne = front->most * bearing(body, element);
+    front->width = length / edges->samples;
+    if (is_blunt(edges, edge))
+        front->most = front->borne = INFINITY;
+    else {
+        front->most = edges->toughness[edge] * front->width * seconds;
+        front->borne = front->most * bearing(body, element);
+    }
     front->impulse[0] = front->impulse[1] = front->impulse[2] = 0.0;
     return front->mass > 0.0;
 }
@@ -364,7 +382,7 @@ void follow(const Body *body, const Spheres *spheres, const Edges *edges, int su
             for (int i = 0; i < 3; i++)
                 gap[i] += slide * front.edge[i] * (double)seconds; /* along itself an edge slides freely */
             to_rest(body, edges->element[k], gap, advance);
-            *edges->area += slip * front.most / (edges->toughness * (double)seconds);
+            *edges->area += slip * front.width;
             for (int i = 0; i < 3; i++) {
                 edges->front[3 * k + i] += advance[i];
                 if (slip > 0.0)
@@ -396,7 +414,7 @@ int sweep(const Body *body, const Spheres *spheres, const Edges *edges, int sub_
 {
     int found = 0;
     for (int edge = 0; edge < edges->count; edge++)
-        for (int s = 0; s + 1 < edges->samples; s++) {
+        for (int s = 0; s + 1 < edges->samples && !is_blunt(edges, edge); s++) {
             int k = edge * edges->samples + s, in[2] = {edges->element[k] != -1, edges->element[k + 1] != -1};
             double corner[4][3]; /* before and after, of both samples */
             if (!in[0] && !in[1])

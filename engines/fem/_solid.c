@@ -13,9 +13,9 @@ int read_way(Solid *self, PyObject *args, Way *way, Course *course)
 {
     Py_buffer *held = way->held;
     memset(way, 0, sizeof *way);
-    if (!PyArg_ParseTuple(args, "y*y*y*w*ffiffy*dw*w*w*w*", held, held + 1, held + 2, held + 3, &way->spheres.friction,
-                          &course->seconds, &course->sub_steps, &course->gravity, &way->drag, held + 4,
-                          &way->edges.toughness, held + 5, held + 6, held + 7, held + 8))
+    if (!PyArg_ParseTuple(args, "y*y*y*w*ffiffy*y*w*w*w*w*", held, held + 1, held + 2, held + 3, &way->spheres.friction,
+                          &course->seconds, &course->sub_steps, &course->gravity, &way->drag, held + 4, held + 9,
+                          held + 5, held + 6, held + 7, held + 8))
         return -1;
     Spheres *spheres = &way->spheres;
     Edges *edges = &way->edges;
@@ -26,7 +26,7 @@ int read_way(Solid *self, PyObject *args, Way *way, Course *course)
     edges->count = (int)(held[4].len / 8);
     edges->samples = edges->count ? (int)(held[5].len / 4) / edges->count : 0;
     edges->ends = held[4].buf, edges->element = held[5].buf, edges->front = held[6].buf, edges->ahead = held[7].buf;
-    edges->area = held[8].buf;
+    edges->area = held[8].buf, edges->toughness = held[9].buf;
     if (edges->samples <= MOST_SAMPLES)
         return 0;
     release_way(way);
@@ -44,7 +44,8 @@ PyDoc_STRVAR(advance_doc, "advance(path, radius, free, force, friction, seconds,
 toughness, element, front, ahead, area)\n--\n\n\
 Advance by sub-steps of `seconds` while spheres go along `path`, shape (sub_steps + 1, n, 3), m; add the force on each\n\
 sphere to `force`, shape (sub_steps, n, 3), N. The last arguments are edges of blades: `ends`, shape (e, 2), are\n\
-spheres; `element`, shape (e, samples), `front` and `ahead`, shape (e, samples, 3), and `area` are their state.\n\
+spheres; `toughness`, shape (e,), J/m^2, infinite of a blunt edge, negative of one that passes through; `element`,\n\
+shape (e, samples), `front` and `ahead`, shape (e, samples, 3), and `area` are their state.\n\
 Return how many faces have been cut open.");
 
 static PyObject *advance(Solid *self, PyObject *args)

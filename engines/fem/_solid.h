@@ -65,14 +65,14 @@ typedef struct {
 typedef struct {
     int count, samples;
     const int32_t *ends; /* (count, 2): spheres */
-    double toughness;    /* J/m^2 */
+    const double *toughness; /* (count,): J/m^2; infinite of a blunt edge; negative of one that passes through */
     int32_t *element;    /* (count, samples): where the front of the cut is; -1: nowhere; -2 - e: it has left e */
     double *front;       /* (count, samples, 3): the front of the cut in the resting body */
     double *ahead;       /* (count, samples, 3): direction of its advance, a unit vector */
     double *area;        /* (1,): swept so far, m^2 */
 } Edges;
 
-#define WAY_BUFFERS 9
+#define WAY_BUFFERS 10
 
 /* A body on its way through a step: its instruments, and memory. */
 typedef struct {

@@ -19,7 +19,7 @@ class Solid:
         gravity: float,
         drag: float,
         ends: NDArray[np.int32],
-        toughness: float,
+        toughness: NDArray[np.float64],
         element: NDArray[np.int32],
         front: NDArray[np.float64],
         ahead: NDArray[np.float64],

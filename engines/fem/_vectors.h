@@ -21,3 +21,9 @@ static inline int normalise(double v[3])
         v[i] /= size;
     return 1;
 }
+
+static inline double distance(const double a[3], const double b[3])
+{
+    double off[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+    return sqrt(dot(off, off));
+}

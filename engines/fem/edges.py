@@ -3,30 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import copysign, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engines.fem.arrays import aligned_integers
+from robots.vector3 import cross
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
-__all__ = ["NO_EDGES", "Edges"]
+__all__ = ["NO_EDGES", "Edges", "Scissors"]
+
+_MOVING = 0.02
+"""Least rate at which scissors open or close, rad/s: above the trembling of jaws that are held."""
+_ABSENT = -1.0
+"""Toughness for an edge that passes through."""
+
+
+class Scissors(NamedTuple):
+    """A pair of edges that turn about a hinge."""
+
+    left: int
+    """Number of the edge, from the hinge to its end."""
+    right: int
+    hinge: int
+    """Number of a sphere on the hinge, on the side from where the left edge closes clockwise."""
 
 
 class Edges:
     """Edges of blades in one body, and their state: `_blade.c` moves it."""
 
-    def __init__(self, ends: Sequence[tuple[int, int]], samples: int, toughness: float) -> None:
+    def __init__(
+        self,
+        ends: Sequence[tuple[int, int]],
+        samples: int,
+        toughness: float,
+        scissors: Sequence[Scissors] = (),
+    ) -> None:
         """Start outside the body.
 
         Args:
             ends: the spheres at the ends of each edge.
             samples: points along an edge, at most 64.
             toughness: work per area of cut, J/m^2.
+            scissors: pairs of edges that cut while they close on each other, and press while they are still.
         """
         n = len(ends)
+        self._tissue, self._scissors = toughness, scissors
         self.ends: NDArray[np.int32] = aligned_integers(np.array(ends, np.int64).reshape(-1, 2))
-        self.toughness = toughness
+        self.toughness: Vector = np.full(n, toughness)
+        """Work per area of cut by each edge now, J/m^2, shape (n,).
+
+        Infinite: the edge is blunt; negative: the edge passes through.
+        """
         self.element: NDArray[np.int32] = aligned_integers(np.full((n, samples), -1))
         """Element with the front of a sample's cut; negative: none, shape (n, samples)."""
         self.front: Vector = np.zeros((n, samples, 3))
@@ -35,6 +66,24 @@ class Edges:
         """Direction of its advance, shape (n, samples, 3)."""
         self.swept: Vector = np.zeros(1)
         """Area that has been cut, m^2."""
+
+    def sharpen(self, start: Vector, end: Vector, seconds: float) -> None:
+        """Let scissors cut if they close in a step of `seconds`, press if still, and leave if they open.
+
+        `start`, `end`: centres of the spheres, m, shapes (k, 3).
+        """
+        for pair in self._scissors:
+            closing = (self._opening(pair, start) - self._opening(pair, end)) / seconds
+            now = self._tissue if closing > _MOVING else _ABSENT if closing < -_MOVING else np.inf
+            self.toughness[[pair.left, pair.right]] = now
+
+    def _opening(self, pair: Scissors, centres: Vector) -> float:
+        """Return the sine of the angle between a pair of edges, negative once they have passed each other."""
+        (left, left_end), (right, right_end) = centres[self.ends[[pair.left, pair.right]]]
+        u, v, axis = left_end - left, right_end - right, centres[pair.hinge] - 0.5 * (left + right)
+        normal = cross(v, u)
+        size = sqrt(_dot(u, u) * _dot(v, v))
+        return copysign(sqrt(_dot(normal, normal)) / size, _dot(normal, axis)) if size else 0.0
 
     @property
     def area(self) -> float:
@@ -45,6 +94,10 @@ class Edges:
     def state(self) -> tuple[NDArray[np.generic], ...]:
         """Arrays that change."""
         return self.element, self.front, self.ahead, self.swept
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return plain_sum((a * b).tolist())
 
 
 NO_EDGES = Edges((), 0, 1.0)

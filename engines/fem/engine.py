@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from engines.fem.blood.blood import Blood, bleeds, blood_ports
 from engines.fem.boxes import box_rows
+from engines.fem.edges import Scissors
 from engines.fem.heat.heating import Heating, heat_ports
 from engines.fem.layer_outputs import LayerOutputs, layer_ports
 from engines.fem.organ import Organ, relaxation
 from engines.fem.params import FemParams
 from engines.fem.probe import Probe
 from engines.fem.spheres import MOST_CONTACTS, Spheres, near_faces
-from engines.fem.tissue_events import event_ports
+from engines.fem.tissue_events import change_ports
 from engines.fem.together import Together
 from engines.tissue.elasticity.body_yield import BodyYield
 from engines.tissue.ports import node_ports, node_states, surface_changes, surface_ports
@@ -62,7 +63,7 @@ class FemEngine(Stepped):
         """Nodes of every organ, changed surfaces, events, layers, grasps of probes with fingers, and heat."""
         grasping = (name for name, probe in self.params.probes.items() if probe.grasp)
         grasps = (port for name in grasping for port in grasp_ports(name))
-        changes = (*surface_ports(self.params), *event_ports(self.params.organs))
+        changes = (*surface_ports(self.params), *change_ports(self.params.organs))
         surfaces = changes if self.params.changes_surfaces else ()
         layers = layer_ports(self.params.organs, self.params.node_period)
         heat, blood = heat_ports(self.params), blood_ports(self.params)
@@ -107,6 +108,8 @@ class FemEngine(Stepped):
             probe.begin(inputs, seconds)
         forces = self._spheres.forces
         forces[:] = 0.0
+        for organ in self._organs:
+            organ.sharpen(seconds)
         if self._together is None:
             for organ in self._organs:
                 forces += organ.advance(seconds, self.params.gravity)
@@ -133,9 +136,15 @@ class FemEngine(Stepped):
         if self._blood is not None:
             outputs.update(self._blood.step(inputs, end, h, looked=touch))
             outputs.update(self._blood.pictures(end) if due else {})
-        if self.params.changes_surfaces:
-            outputs.update({f"{organ.name}/events": organ.events.finish(end) for organ in self._organs})
+        for organ in self._changing:
+            outputs[f"{organ.name}/events"] = organ.events.finish(end)
+            outputs.update(organ.sums)
         return outputs
+
+    @property
+    def _changing(self) -> list[Organ]:
+        """Organs whose surface may change."""
+        return self._organs if self.params.changes_surfaces else []
 
     def _pictured(self, t: int) -> dict[str, Value]:
         """Return nodes, changed surfaces and layers of all organs at `t` ns."""
@@ -222,8 +231,6 @@ class FemEngine(Stepped):
             for organ, params in zip(self._organs, self.params.organs.values(), strict=True)
         ]
         outputs = self._pictured(0)
-        if self.params.changes_surfaces:
-            outputs |= {f"{organ.name}/events": () for organ in self._organs}
         self._unused = {
             port: value
             for name, probe in self.params.probes.items()
@@ -236,12 +243,14 @@ class FemEngine(Stepped):
         names = [bond.name for bond, own in zip(bonds, radii, strict=True) for _ in own]
         self._spheres = Spheres(np.concatenate([np.zeros(0), *radii]), self._sub_steps, names)
         series = [relaxation(organ) for organ in self.params.organs.values()]
-        first, blades = 0, list[tuple[int, int]]()
+        first, blades, scissors = 0, list[tuple[int, int]](), list[Scissors]()
         for bond in bonds:
             name, params = bond.name, self.params.probes[bond.name]
             surfaces = self._surfaces if self.params.has_sub_grid(name) else None
             probe = Probe(params, bond, self._bonded[name], self._spheres, first, surfaces, series)
-            blades += [(first + a, first + b) for a, b in params.blades]
+            if pair := params.scissors:
+                scissors.append(Scissors(len(blades), len(blades) + 1, first + pair.hinge))
+            blades += [(first + a, first + b) for a, b in params.edges]
             first += len(probe.radii)
             self._probes.append(probe)
             outputs.update(probe.outputs)
@@ -249,7 +258,9 @@ class FemEngine(Stepped):
                 self._grasps.append((Grasp(params.grasp, probe, self._organs, self._surfaces), probe))
                 outputs.update(nothing_held(name))
         for organ in self._organs:
-            organ.meet(self._spheres, blades)
+            organ.meet(self._spheres, blades, scissors)
+        for organ in self._changing:
+            outputs |= {f"{organ.name}/events": (), **organ.sums}
         if any(self.params.probes[bond.name].energy for bond in bonds):
             self._heating = Heating(self.params, self._organs, self._probes)
             outputs.update(self._heating.outputs)

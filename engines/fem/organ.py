@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from xxhash import xxh3_128_digest
 
 from engines.fem.boxes import NO_BOXES
-from engines.fem.edges import NO_EDGES, Edges
+from engines.fem.edges import NO_EDGES, Edges, Scissors
 from engines.fem.solid import Branch, Layering, Solid, SphereWay
 from engines.fem.spheres import Spheres
 from engines.fem.tissue_events import TissueEvents
@@ -100,6 +100,7 @@ class Organ:
         self._presses = self._free = np.ones(0, np.uint8)
         self.mesh_version = 0
         """Count of the changes of the mesh."""
+        self._loose = np.array([self._loose_share()])
         self.nodes: Vector = self.mesh.nodes
 
     @property
@@ -116,6 +117,18 @@ class Organ:
     def held(self) -> NDArray[np.bool_]:
         """Nodes held by a grasp, shape (n,)."""
         return self.solid.holder >= 0
+
+    @property
+    def sums(self) -> dict[str, Vector]:
+        """Area and work of cuts, and the share of loose tissue, by port; nothing for an undivided organ."""
+        if self._cutting is None:
+            return {}
+        area = self._edges.swept
+        return {
+            f"{self.name}/cut_area": area.copy(),
+            f"{self.name}/cut_work": self._cutting.toughness * area,
+            f"{self.name}/loose": self._loose,
+        }
 
     @property
     def settling_s(self) -> float:
@@ -147,6 +160,10 @@ class Organ:
         forces = self.solid.advance(seconds, self.way, self.friction, gravity)
         self.follow_surface()
         return forces
+
+    def sharpen(self, seconds: float) -> None:
+        """Let scissors cut that close in a step of `seconds`."""
+        self._edges.sharpen(self.way.path[0], self.way.path[-1], seconds)
 
     def follow_surface(self) -> None:
         """Note faces that have been cut open."""
@@ -199,10 +216,9 @@ class Organ:
     def _drop_loose_pieces(self, time_ns: int) -> None:
         """Take away loose pieces that have fallen farther than the organ is large."""
         far = np.abs(self.solid.displacement[:, :3]).max(axis=1) >= self._reach
-        corners, pieces = self.solid.tetrahedra, self.solid.pieces
-        fixed = self.anchored | self.held
-        tied = np.unique(pieces[fixed[corners].any(axis=1)])
-        fallen = np.setdiff1d(np.unique(pieces[far[corners].any(axis=1)]), [-1, *tied])
+        pieces = self.solid.pieces
+        tied = self._pieces_with(self.anchored | self.held, pieces)
+        fallen = np.setdiff1d(self._pieces_with(far, pieces), [-1, *tied])
         elements = np.flatnonzero(np.isin(pieces, fallen))
         if elements.size:
             warn_once(
@@ -210,6 +226,16 @@ class Organ:
                 " taken away, and so are those that follow"
             )
             self.remove(elements)
+
+    def _pieces_with(self, nodes: NDArray[np.bool_], pieces: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return the pieces with any of these nodes, shape (n,)."""
+        return np.unique(pieces[nodes[self.solid.tetrahedra].any(axis=1)])
+
+    def _loose_share(self) -> float:
+        """Return the share of the mass in pieces without an anchor."""
+        pieces, masses = self.solid.pieces, self.solid.element_masses
+        is_tied = np.isin(pieces, self._pieces_with(self.anchored, pieces))
+        return float(masses[~is_tied].sum() / max(masses.sum(), 1e-30))
 
     def _note_opened(self, kind: str, spheres: NDArray[np.int32]) -> None:
         """Note the newly opened faces as an event of the nearest of these spheres."""
@@ -227,6 +253,7 @@ class Organ:
         self.surface.follow(self.solid.faces, self.solid.origin)
         self.nodes = self.solid.nodes
         self.touchable = self._touchable_faces()
+        self._loose = np.array([self._loose_share()])
         self.mesh_version += 1
 
     def _touchable_faces(self) -> Indices:
@@ -246,13 +273,21 @@ class Organ:
         """Let a sphere press the organ, or pass through."""
         self._free[body] = self._presses[body] if on else 0
 
-    def meet(self, spheres: Spheres, blades: Sequence[tuple[int, int]] = ()) -> None:
-        """Let these spheres press the organ, and blades between some of them cut it, if it may be cut."""
+    def meet(
+        self,
+        spheres: Spheres,
+        blades: Sequence[tuple[int, int]] = (),
+        scissors: Sequence[Scissors] = (),
+    ) -> None:
+        """Let these spheres press the organ, and blades between some of them cut it, if it may be cut.
+
+        scissors: pairs of the blades.
+        """
         self._spheres, self.events = spheres, TissueEvents(spheres.probes)
         self._presses = np.ones(len(spheres.radii), np.uint8)
         if self._cutting is not None and blades:
             self._presses[np.unique(blades)] = 0  # ends of blades pass through
-            self._edges = Edges(blades, _SAMPLES, self._cutting.toughness)
+            self._edges = Edges(blades, _SAMPLES, self._cutting.toughness, scissors)
         self._free = self._presses.copy()
         self.way = SphereWay(spheres.path, spheres.radii, self._free, self._edges)
         """Ways of the spheres in a step."""
@@ -296,3 +331,4 @@ class Organ:
         )
         self.nodes = self.solid.nodes
         self.touchable = self._touchable_faces()
+        self._loose = np.array([self._loose_share()])

@@ -256,6 +256,11 @@ class Solid:
         return self._volumes
 
     @property
+    def element_masses(self) -> Vector:
+        """Masses of the elements, kg, 0 of one that has gone, shape (m,)."""
+        return self._element_mass.astype(np.float64)
+
+    @property
     def across(self) -> NDArray[np.int32]:
         """The face on the other side of each face of the elements, negative: none, shape (4 m,)."""
         return self._across.reshape(-1)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hub.participant import event_out
+from engines.tissue.organs.params import OrganParams
+from hub.participant import event_out, signal_out
 from schemas.ports import Port
 from schemas.ros import Header, Point, Time
 from schemas.trocar_msgs import TissueEvent
 from schemas.vectors import Vector
 
-__all__ = ["TissueEvents", "event_ports"]
+__all__ = ["TissueEvents", "change_ports"]
 
 _UNITS = {"cut": "m^2", "torn": "m^2", "burnt": "m^3"}
 """Unit of the size by kind."""
@@ -26,10 +27,21 @@ _NONE = -1
 """Time of no change."""
 
 
-def event_ports(organs: Iterable[str]) -> tuple[Port, ...]:
-    """Return the ports of the events of organs."""
-    happened = "tissue that was cut, torn or burnt, that bleeds or is clipped"
-    return tuple(event_out(f"{organ}/events", TissueEvent, happened, frame="world") for organ in organs)
+def change_ports(organs: Mapping[str, OrganParams]) -> tuple[Port, ...]:
+    """Return the ports of the events of organs, and of sums of cuts."""
+    happened, since = "tissue that was cut, torn or burnt, that bleeds or is clipped", "by edges since time 0"
+    events = (event_out(f"{organ}/events", TissueEvent, happened, frame="world") for organ in organs)
+    cut = (
+        port
+        for name, organ in organs.items()
+        if organ.cutting
+        for port in (
+            signal_out(f"{name}/cut_area", description=f"area swept {since}", unit="m^2"),
+            signal_out(f"{name}/cut_work", description=f"work of cutting {since}", unit="J"),
+            signal_out(f"{name}/loose", description="share of the mass without a way to an anchor"),
+        )
+    )
+    return *events, *cut
 
 
 class TissueEvents:

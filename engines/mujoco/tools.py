@@ -6,6 +6,7 @@ from typing import Any
 
 from hub.participant import Tool
 from robots.dvrk.end_effectors.probe import Probe
+from robots.dvrk.end_effectors.scissors import Scissors
 from robots.dvrk.mounted import MountedPsm
 from schemas.vectors import Vector
 
@@ -21,7 +22,11 @@ def instrument_tool(arm: str, mounted: MountedPsm, base: Vector) -> Tool:
     elif spheres:
         radii = [sphere.radius for sphere in spheres]
         probe = {"spheres": len(spheres), "radius": radii[0] if len(set(radii)) == 1 else radii}
-        probe |= {} if mounted.tool.jaw is None else {"grasp": {}}
+        if isinstance(jaw := mounted.tool.jaw, Scissors):
+            left, right = jaw.edges
+            probe["scissors"] = {"left": left, "right": right, "hinge": jaw.hinge}
+        elif jaw is not None:
+            probe["grasp"] = {}
         probe |= {"energy": {"mode": mounted.tool.energy}} if mounted.tool.energy else {}
         if clip := mounted.tool.clip:
             probe["clip"] = {"length": clip.length, "diameters": clip.diameters}

@@ -28,6 +28,7 @@ from robots.dvrk.end_effectors.jaw import WRIST_ACCELERATION, WRIST_VELOCITY, Ja
 from robots.dvrk.end_effectors.musha import HAND
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
+from robots.dvrk.end_effectors.scissors import CURVE, Scissors
 from robots.serial_chain import Joint, jerk_limit
 from schemas.errors import MotionError, did_you_mean
 from schemas.plain_sum import plain_sum
@@ -203,7 +204,10 @@ def _by_number() -> Mapping[str, Instrument]:
 def _from_data(name: str, row: dict[str, Any], data: dict[str, Any]) -> Instrument:
     number = next(word for word in name.split("_") if word.isdigit() and len(word) == 6)
     coupling = np.array(data["actuator_to_joint"][row["actuator_to_joint"]])
-    jaw = Jaw(*_jaw_numbers(number, row, coupling))
+    numbers = _jaw_numbers(number, row, coupling)
+    jaw = Jaw(*numbers)
+    if "SCISSORS" in name:
+        jaw = Scissors(*numbers, curve=CURVE if "CURVED" in name else 0.0)
     electrode = Electrode(foot=_FOOT if "HOOK" in name else 0.0)
     return Instrument(
         name,

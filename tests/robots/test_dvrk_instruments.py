@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from robots.dvrk.end_effectors.scissors import CURVE, Scissors
 from robots.dvrk.instruments import instrument, instruments
 from schemas.errors import MotionError
 
@@ -104,3 +105,18 @@ def test_clip_appliers_are_known_by_their_names(number, least, most):
     assert clip.diameters == (least, most)
     assert clip.length > most
     assert instrument("400006").clip is None
+
+
+@pytest.mark.parametrize("name", [name for name in instruments() if "SCISSORS" in name])
+def test_the_edges_of_scissors_meet_in_the_closed_jaw(name):
+    tool = instrument(name)
+    scissors, spheres = tool.end_effector, tool.spheres
+    assert isinstance(scissors, Scissors)
+    half_turn = np.diag([1.0, -1.0, -1.0])  # frame of the right finger, in the closed jaw
+    left, right = ([np.array(spheres[i].position) for i in edge] for edge in scissors.edges)
+    for one, other in zip(left, right, strict=True):
+        np.testing.assert_allclose(one, half_turn @ other, atol=1e-12)
+    assert np.linalg.norm(left[1][:2]) == pytest.approx(scissors.length)
+    assert left[1][2] == (CURVE if "CURVED" in name else 0.0)
+    assert spheres[scissors.hinge].position[:2] == (0.0, 0.0)
+    assert spheres[scissors.hinge].position[2] > 0.0

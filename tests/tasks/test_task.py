@@ -6,7 +6,8 @@ import pytest
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from schemas.errors import ScenarioError
-from schemas.ros import BoolMessage
+from schemas.ros import BoolMessage, Header
+from schemas.trocar_msgs import TissueEvent
 from tasks.hand_over import HandOverTask
 from tasks.params import TaskParams
 from tasks.peg_board import PegBoardParams, PegBoardTask
@@ -43,6 +44,10 @@ def dishes(**changes):
     return PickAndPlaceTask("task", PickAndPlaceParams.model_validate(params))
 
 
+def cut(kind="cut", instrument="PSM2"):
+    return TissueEvent(header=Header(), kind=kind, instrument=instrument, size=2e-6, unit="m^2")
+
+
 def inputs_of(task):
     """A value for every input."""
     found = {}
@@ -53,6 +58,7 @@ def inputs_of(task):
                 "PoseStamped": pose,
                 "WrenchStamped": [1.0, 2.0, 2.0, 0.0, 0.0, 0.0],
                 "Bool": (BoolMessage(data=True),),
+                "TissueEvent": (cut(),),
             }
             found[port.name] = kinds.get(port.type.rpartition("/")[2], [1.0])
     return found
@@ -155,6 +161,18 @@ def test_instruments_that_touch_fixtures_again_after_a_pause_have_touched_twice(
     without = practice()
     without.configure(Setup(PERIOD_NS, None))
     assert "fixture_collisions" not in {metric.name for metric in without.card(0).metrics}
+
+
+def test_changes_of_tissue_are_events_of_a_practice():
+    task = practice()
+    given = inputs_of(task)
+    events = {name: value for name, value in given.items() if isinstance(value, tuple)}
+    events["tissue/events"] = (cut(), cut("torn", "forceps"), cut("swollen"))
+    values = {name: np.array(value) for name, value in given.items() if name not in events}
+    task.configure(Setup(PERIOD_NS, None))
+    found = task.step(0, PERIOD_NS, Inputs(values, events=events))["events"]
+    assert [(one.event, one.arm) for one in found] == [("cut", "PSM2"), ("torn", "")]
+    assert (found[0].value, found[0].unit) == (2e-6, "m^2")
 
 
 def test_a_ring_beside_its_post_is_not_on_it():

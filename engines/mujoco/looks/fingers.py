@@ -15,6 +15,7 @@ from engines.mujoco.looks.part import DARK, STEEL, Collisions, Looks, Part, Prim
 from engines.mujoco.looks.solids import block, outline, part, place_solid, plate, rod, union
 from robots.dvrk.end_effectors.end_effector import Mount
 from robots.dvrk.end_effectors.jaw import FINGERS, Jaw
+from robots.dvrk.end_effectors.scissors import Scissors
 from schemas.vectors import Vector
 
 __all__ = ["ROOT", "Shape", "collision", "finger_frame", "fingers", "grips", "parts", "shape"]
@@ -42,12 +43,15 @@ class Shape:
     """How far the tip lies off the middle, along the yaw axis."""
     recess: float = 0.0
     """Distance of the finger behind the plane of a sliding pad."""
+    offset: float = 0.0
+    """Distance of a blade from the middle, along the yaw axis: blades pass each other and have no pad."""
 
 
 _DRIVER = Shape(0.0, 0.00235, 0.00170, 0.0024, 0.0014)
 _GRASPER = Shape(0.0, 0.00240, 0.00230, 0.0020, 0.0013, window=True)
 _DISSECTOR = Shape(0.0, 0.00220, 0.00090, 0.0021, 0.0011, curve=0.0028)
 _FORCEPS = Shape(0.0, 0.00220, 0.00120, 0.0020, 0.0011)
+_BLADE = Shape(0.0, 0.00080, 0.00040, 0.0030, 0.0010, offset=0.00070)
 _KINDS = {
     "NEEDLE": _DRIVER,
     "SUTURECUT": _DRIVER,
@@ -56,7 +60,7 @@ _KINDS = {
     "PROGRASP": _GRASPER,
     "BOWEL": _GRASPER,
     "MARYLAND": _DISSECTOR,
-    "SCISSORS": _DISSECTOR,
+    "SCISSORS": _BLADE,
 }
 """Shapes by a word in the instrument's name; widths within the jaw meshes in unina-icaros/dvrk-vrep (4.8 mm,
 3.0 mm for both), forms ours.
@@ -76,7 +80,8 @@ def collision(jaw: Jaw, instrument: str, mount: Mount) -> Collisions:
 def shape(instrument: str, jaw: Jaw, recess: float = 0.0) -> Shape:
     """Return the shape of the fingers of an instrument, by name."""
     kind = next((kind for word, kind in _KINDS.items() if word in instrument), _FORCEPS)
-    return replace(kind, length=jaw.length, recess=recess)
+    curve = jaw.curve if isinstance(jaw, Scissors) else kind.curve
+    return replace(kind, length=jaw.length, recess=recess, curve=curve)
 
 
 def finger_frame(mount: Mount) -> Vector:
@@ -113,8 +118,8 @@ def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
         (ROOT, back),
     ]
     blade = plate("y", outline(profile), -0.01, 0.01) ^ plate(
-        "x", outline(_top_view(form, ROOT / length), 0.0004), -0.01, 0.01
-    )
+        "x", outline(_top_view(form, ROOT / length), min(0.0004, 0.5 * form.tip_width)), -0.01, 0.01
+    ).translate((0.0, -side * form.offset, 0.0))
     low, high = sorted((-side * _HUB_WIDTH, 0.0))
     hub = rod((0.0, low, 0.0), (0.0, high, 0.0), _HUB_RADIUS)
     arm = block((0.0, low, 0.0), (back, high, ROOT + 0.0012))
@@ -128,8 +133,8 @@ def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
             0.01,
         )
         blade, pad = blade - hole, pad - hole
-    finished = [(name, union(hub, arm, blade - pad), STEEL)] + (
-        [] if form.recess else [(f"{name}_pad", pad, DARK)]
+    finished = [(name, union(hub, arm, blade if form.offset else blade - pad), STEEL)] + (
+        [] if form.recess or form.offset else [(f"{name}_pad", pad, DARK)]
     )
     solids = [
         (label, solid if side > 0 else solid.mirror((1.0, 0.0, 0.0)), material)

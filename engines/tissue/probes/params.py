@@ -15,7 +15,7 @@ from engines.tissue.probes.suction import SuctionParams
 from schemas.quantity import Damping, Force, Length, Mass, Stiffness
 from schemas.vectors import Vector
 
-__all__ = ["Coupling", "GraspParams", "ProbeParams"]
+__all__ = ["Coupling", "GraspParams", "ProbeParams", "ScissorsParams"]
 
 _STIFFNESS_RATIO = 20.0
 """Stiffness of the virtual coupling over the contact's: a quick press loses 1/21, 5 %, of its way to the
@@ -112,6 +112,22 @@ class GraspParams(BaseModel):
     )
 
 
+Edge = tuple[int, int]
+"""Two spheres of a probe, counted from 0."""
+
+
+class ScissorsParams(BaseModel):
+    """Two edges about a hinge."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    left: Edge = Field(description="edge from the hinge to its end")
+    right: Edge = Field(description="the other one")
+    hinge: int = Field(
+        description="a sphere on the hinge, on the side from where the left edge closes clockwise"
+    )
+
+
 class ProbeParams(BaseModel):
     """The spheres of an instrument and their virtual coupling. SI units after validation."""
 
@@ -149,12 +165,19 @@ class ProbeParams(BaseModel):
     clip: ClipParams | None = Field(
         default=None, description="lets two jaws put clips on a tube, by the event `<probe>/clip`; kind fem"
     )
-    blades: tuple[tuple[int, int], ...] = Field(
+    blades: tuple[Edge, ...] = Field(
         default=(),
         max_length=8,
         description=(
             "sharp edges, each from one of the probe's spheres to another, counted from 0; these spheres pass"
             " through organs with `cutting`; kind fem alone"
+        ),
+    )
+    scissors: ScissorsParams | None = Field(
+        default=None,
+        description=(
+            "edges that cut as blades do while they close on each other, and press otherwise; kind bullet:"
+            " they press; default: those of the instrument that `touches` an organ"
         ),
     )
 
@@ -197,10 +220,20 @@ class ProbeParams(BaseModel):
     @model_validator(mode="after")
     def _spheres_at_the_ends_of_blades(self) -> ProbeParams:
         last = (self.spheres or 1) - 1
-        for blade in self.blades:
+        for blade in self.edges:
             if not all(0 <= end <= last for end in blade) or blade[0] == blade[1]:
                 raise ValueError(f"blade {list(blade)}: state two different spheres from 0 to {last}")
+        if self.scissors and self.scissors.hinge not in {*range(last + 1)}.difference(*self.edges):
+            raise ValueError(
+                f"hinge {self.scissors.hinge}: state a sphere from 0 to {last} at no blade's end"
+            )
         return self
+
+    @property
+    def edges(self) -> tuple[Edge, ...]:
+        """All edges, those of scissors first."""
+        pair = () if self.scissors is None else (self.scissors.left, self.scissors.right)
+        return *pair, *self.blades
 
     @property
     def radii(self) -> Vector:

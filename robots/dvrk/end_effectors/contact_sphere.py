@@ -9,14 +9,14 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["FINGER_HALF_WIDTH", "ContactSphere", "on_jaw"]
+__all__ = ["FINGER_HALF_WIDTH", "JAW_ROOT", "ContactSphere", "on_jaw"]
 
 FINGER_HALF_WIDTH = 0.0024
 """Half width of a finger of a jaw (m): 4.8 mm is the bound of the jaws in unina-icaros/dvrk-vrep, and of
 tool_gripper1_link.STL in WPI-AIM/dvrk_env.
 """
 
-_JAW_ROOT = 0.0030
+JAW_ROOT = 0.0030
 """Distance from the wrist yaw axis (m) at which a finger is free of the hub of the opposite finger
 (`engines.mujoco.looks.fingers`).
 """
@@ -49,13 +49,13 @@ def on_jaw(length: float, ahead: Vector) -> tuple[ContactSphere, ...]:
         axis.
     """
     radius = FINGER_HALF_WIDTH
-    count = max(2, ceil((length - _JAW_ROOT) / (2.0 * radius)))
+    count = max(2, ceil((length - JAW_ROOT) / (2.0 * radius)))
     opening = np.cross((0.0, 0.0, 1.0), ahead)  # of the left finger, which turns about z
     spheres: list[ContactSphere] = []
     # the right one's frame is turned about x
     for link, turn in (("jaw_left", np.eye(3)), ("jaw_right", np.diag([1.0, -1.0, -1.0]))):
         side = turn[2, 2] * opening
-        for i, way in enumerate(np.linspace(_JAW_ROOT + radius, length - radius, count).tolist(), 1):
+        for i, way in enumerate(np.linspace(JAW_ROOT + radius, length - radius, count).tolist(), 1):
             x, y, z = (turn @ (way * ahead + radius * side)).tolist()
             spheres.append(ContactSphere(f"{link}_{i}", link, (x, y, z), radius))
     return tuple(spheres)
