@@ -95,7 +95,7 @@ def test_an_instrument_without_spheres_touches_nothing(write, monkeypatch):
 
 @pytest.mark.parametrize(
     ("number", "mode", "spheres"),
-    [("400183", "monopolar", 3), ("400179", "monopolar", 6), ("400172", "bipolar", 8)],
+    [("400183", "monopolar", 3), ("400179", "monopolar", 5), ("400172", "bipolar", 8)],
 )
 def test_an_energy_instrument_heats_tissue_of_our_own_without_a_word(write, number, mode, spheres):
     change = [f"scene.arms.PSM1.instrument='{number}'"]
