@@ -161,7 +161,7 @@ class FemEngine(Stepped):
             *(probe.digest for probe in self._probes),
             *(grasp.numbers for grasp, _ in self._grasps),
             *(organ.digest for organ in self._organs),
-            *(array.tobytes() for array in (*self._heat_state, *self._blood_state)),
+            *(array.tobytes() for array in (*self._heat_state, *self._blood_amounts)),
         )
 
     def save(self) -> bytes:
@@ -213,6 +213,10 @@ class FemEngine(Stepped):
     @property
     def _heat_state(self) -> tuple[NDArray[Any], ...]:
         return () if self._heating is None else self._heating.state
+
+    @property
+    def _blood_amounts(self) -> tuple[NDArray[Any], ...]:
+        return () if self._blood is None else self._blood.amounts
 
     @property
     def _blood_state(self) -> tuple[NDArray[Any], ...]:

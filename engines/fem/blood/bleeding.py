@@ -142,6 +142,11 @@ class Bleeding:
         )
 
     @property
+    def amounts(self) -> tuple[NDArray[np.int64], ...]:
+        """Liquid at every node, and the book, in parts of `QUANTUM`."""
+        return self.film.amounts, self._book
+
+    @property
     def state(self) -> tuple[NDArray[Any], ...]:
         """Arrays that the next step depends on."""
         shut = () if self.lumen is None else (self.lumen.shut,)

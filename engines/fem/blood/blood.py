@@ -125,6 +125,11 @@ class Blood:
         return found
 
     @property
+    def amounts(self) -> tuple[NDArray[np.int64], ...]:
+        """Liquid at every node, and the book, of every organ: from these all else follows."""
+        return tuple(array for bleeding in self.bleedings for array in bleeding.amounts)
+
+    @property
     def state(self) -> tuple[NDArray[Any], ...]:
         """Arrays that the next step depends on."""
         return (

@@ -68,7 +68,7 @@ def test_a_film_that_runs_down_a_plane_is_as_thick_as_nusselts(degrees, flow):
     thickness = QUANTUM * film.amounts[middle] / size**2
     slope = np.sin(np.radians(degrees))
     nusselt = (3.0 * BLOOD.viscosity * flow / (BLOOD.density * GRAVITY * slope)) ** (1.0 / 3.0)
-    assert thickness == pytest.approx(nusselt, rel=0.05)
+    assert thickness == pytest.approx(nusselt, rel=1e-4)
 
 
 def test_a_bowl_fills_to_one_level():
