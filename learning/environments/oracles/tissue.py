@@ -12,21 +12,18 @@ from schemas.vectors import Vector
 
 __all__ = ["dissect"]
 
-_FORCEPS = np.array([-0.5, 0.0, -0.8660254])
-"""Direction of the forceps, from the tip to the ends of the fingers."""
-_HOOK = np.array([0.8660254, 0.0, -0.5])
+_FORCEPS, _HOOK = np.array([-0.5, 0.0, -0.8660254]), np.array([0.8660254, 0.0, -0.5])
+"""Directions of the instruments' ends from their tips."""
 _FINGERS, _HEEL = 15.5e-3, 14.9e-3
-"""Distance of the ends of the fingers, and of the heel of the hook, from the tip."""
+"""Distances of the ends of the fingers and of the heel of the hook from the tips."""
 _FOOT = np.array([0.0, 0.9e-3, 0.0])
-"""From the heel of the hook to the middle of its foot."""
-_BITE = np.array([-9e-3, 0.0, -1.2e-3])
-"""Where the ends of the fingers take the sheet."""
-_UP = np.array([2e-3, 0.0, 7.2e-3])
-"""How far the sheet is drawn."""
+"""Offset of the middle of the hook's foot from its heel."""
+_BITE, _UP = np.array([-9e-3, 0.0, -1.2e-3]), np.array([2e-3, 0.0, 7.2e-3])
+"""Place of the ends of the fingers in the sheet, and way on which they draw it."""
 _FIRST, _PITCH, _HEIGHT = -11e-3, 1.3e-3, -0.8e-3
-"""Where the first track of the hook is, the distance of the next, and the height of all."""
+"""Place of the hook's first track, distance between tracks, and height of all."""
 _HALF, _PACE = 4.8e-3, 0.6e-3
-"""Half of a track, and its part in a step."""
+"""Half length of a track, and way of a step."""
 _TRACKS = 6
 
 
