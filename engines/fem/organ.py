@@ -188,7 +188,7 @@ class Organ:
         self.nodes = self.solid.nodes
         moved = self._largest_move()
         if self.solid.divisible and moved >= self._reach:
-            self._drop_loose_pieces(time_ns)
+            self._drop_loose_pieces()
             moved = self._largest_move()
         if not moved < self._reach:
             raise SessionError(
@@ -213,7 +213,7 @@ class Organ:
         moves = np.abs(self.solid.displacement[self.solid.mass > 0.0, :3])
         return float(moves.max()) if moves.size else 0.0
 
-    def _drop_loose_pieces(self, time_ns: int) -> None:
+    def _drop_loose_pieces(self) -> None:
         """Take away loose pieces that have fallen farther than the organ is large."""
         far = np.abs(self.solid.displacement[:, :3]).max(axis=1) >= self._reach
         pieces = self.solid.pieces
@@ -222,8 +222,8 @@ class Organ:
         elements = np.flatnonzero(np.isin(pieces, fallen))
         if elements.size:
             warn_once(
-                f"organ '{self.name}': at {time_ns * 1e-9:.6g} s a loose piece has fallen out of sight and is"
-                " taken away, and so are those that follow"
+                f"organ '{self.name}': a loose piece has fallen out of sight and is taken away, and so are"
+                " those that follow"
             )
             self.remove(elements)
 

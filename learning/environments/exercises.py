@@ -32,6 +32,7 @@ __all__ = [
     "PickAndPlace",
     "Reach",
     "Retraction",
+    "TissueCut",
     "TwoHandedPegTransfer",
 ]
 
@@ -242,3 +243,23 @@ class Dissect(Exercise):
     def harm(self, view: EnvironmentView) -> float:
         """Return the dead volume of the bed, in units of 100 mm^3."""
         return view.tissue["tissue/dead"] / _DEAD
+
+
+class TissueCut(Exercise):
+    """Take the free end of a strip of tissue with PSM2, and cut off a given length with PSM1's scissors."""
+
+    scene = "tissue-cut"
+    hands = ("PSM1", "PSM2")
+    goal_size = 1
+    puts = False
+    tolerance = Tolerance(3e-3)
+    length: ClassVar[float] = 28e-3
+    """Length of the strip, m."""
+
+    def draw(self, rng: Generator) -> tuple[Starts, Vector]:
+        """Draw the length to be cut off: 12 to 18 mm."""
+        return {}, rng.uniform(0.012, 0.018, 1)
+
+    def achieved_goal(self, view: EnvironmentView) -> Vector:
+        """Return the length of the tissue that has been cut off, m."""
+        return np.array([view.tissue["tissue/loose"] * self.length])

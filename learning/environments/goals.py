@@ -1,7 +1,7 @@
 """Goals of environments: the test of a reached goal, and rewards. For a single goal, or for many at once.
 
 A goal is a place, m, shape (..., 3), or (..., 4) with a fourth number to be matched: whether the receiving
-hand holds the object. A goal of height alone has a single number.
+hand holds the object. A goal of height or length alone has a single number.
 """
 
 from __future__ import annotations
@@ -17,9 +17,17 @@ __all__ = ["Reward", "Tolerance", "event_bonus", "reward"]
 
 Reward = Literal["sparse", "shaped"]
 
-WORTH = {"grasped": 0.5, "lifted": 0.5, "handed over": 1.0, "placed": 1.0, "dropped": -1.0}
+WORTH = {
+    "grasped": 0.5,
+    "lifted": 0.5,
+    "handed over": 1.0,
+    "placed": 1.0,
+    "cut": 0.5,
+    "dropped": -1.0,
+    "torn": -1.0,
+}
 """Values of the task's events in the shaped reward. An event counts when first happening in an episode; a
-drop counts each time.
+loss counts each time.
 """
 LENGTH = 0.1
 """m; a goal so far away costs 1 in the shaped reward."""
@@ -76,7 +84,8 @@ def event_bonus(events: Sequence[str], seen: set[str]) -> float:
     """Return the value of a step's kinds of events, and add the kinds to those `seen` in the episode."""
     total = 0.0
     for kind in events:
-        if kind == "dropped" or kind not in seen:
-            total += WORTH.get(kind, 0.0)
+        worth = WORTH.get(kind, 0.0)
+        if worth < 0.0 or kind not in seen:
+            total += worth
         seen.add(kind)
     return total

@@ -21,6 +21,7 @@ ENVIRONMENTS: Mapping[str, tuple[str, int]] = MappingProxyType(
         "trocar/PickAndPlace-v0": ("PickAndPlace", 50),
         "trocar/Retraction-v0": ("Retraction", 50),
         "trocar/Dissect-v0": ("Dissect", 150),
+        "trocar/TissueCut-v0": ("TissueCut", 100),
     }
 )
 """Class of the exercise and steps of an episode, by id."""

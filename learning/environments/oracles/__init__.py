@@ -24,6 +24,7 @@ ORACLES: Mapping[str, Callable[[Environment], WaypointPlan]] = MappingProxyType(
         "PickAndPlace": others.piece,
         "Retraction": others.retraction,
         "Dissect": tissue.dissect,
+        "TissueCut": tissue.tissue_cut,
     }
 )
 """Plans, by the class of their exercise."""

@@ -1,4 +1,4 @@
-"""A plan for the hook that burns a sheet off its bed. Metres and radians in the world."""
+"""Plans to burn a sheet off its bed, and to cut a strip. Metres and radians in the world."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from learning.environments.environment import Environment
+from learning.environments.exercises import TissueCut
 from learning.environments.oracles.waypoints import Seen, Waypoint, WaypointPlan
 from schemas.vectors import Vector
 
-__all__ = ["dissect"]
+__all__ = ["dissect", "tissue_cut"]
 
 _FORCEPS, _HOOK = np.array([-0.5, 0.0, -0.8660254]), np.array([0.8660254, 0.0, -0.5])
 """Directions of the instruments' ends from their tips."""
@@ -63,3 +64,38 @@ def _burn(place: Vector) -> Callable[[Seen], Waypoint]:
         return Waypoint(place, None, True, near=0.6e-3)
 
     return to
+
+
+_FREE_END = np.array([-23e-3, 0.0, -6e-3])
+"""Where a tip takes the free end of the strip, as the end hangs, m."""
+_TAUT = np.array([-26e-3, 0.0, -2e-3])
+"""Where the tip holds the strip taut, m."""
+_GRIPPED, _STRETCH = 6e-3, 3e-3
+"""Length of the strip in the jaws, and its stretch between jaws and fixed end, m."""
+
+
+def tissue_cut(env: Environment) -> WaypointPlan:
+    """Return a plan to take the strip's end, hold the strip taut, and cut in two bites."""
+    exercise = env.exercise
+    assert isinstance(exercise, TissueCut)
+    half, free = 0.5 * exercise.length, exercise.length - _GRIPPED
+
+    def at(depth: float, *, closed: bool) -> Callable[[Seen], Waypoint]:
+        def waypoint(seen: Seen) -> Waypoint:
+            off = seen.goal[0]
+            place = off - half - _STRETCH * (exercise.length - off) / free
+            return Waypoint(np.array([place, depth, -2e-3]), None, closed, wait=2 * closed, near=1.5e-3)
+
+        return waypoint
+
+    return [
+        (1, lambda _: Waypoint(_FREE_END, None, False, near=1.5e-3)),
+        (1, lambda _: Waypoint(_FREE_END, None, True, wait=2, near=5e-3)),
+        (1, lambda _: Waypoint(_TAUT, None, True, near=1.5e-3)),
+        (0, at(-40e-3, closed=False)),
+        (0, at(-15e-3, closed=False)),
+        (0, at(-15e-3, closed=True)),
+        (0, at(-15e-3, closed=False)),
+        (0, at(-9e-3, closed=False)),
+        (0, at(-9e-3, closed=True)),
+    ]

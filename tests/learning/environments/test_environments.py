@@ -16,6 +16,7 @@ from gymnasium.wrappers import RecordVideo
 
 import trocar
 from engines.mujoco.pictures import opengl
+from learning.environments.goals import event_bonus
 from schemas.errors import RecordingError, SessionError, TrocarError
 from schemas.ros import Header, Point, Pose, PoseStamped, Quaternion
 from trocar.environments import ENVIRONMENTS, oracle
@@ -195,6 +196,31 @@ def test_a_sheet_is_burnt_off_its_bed_and_is_whole_in_a_new_episode(tmp_path):
     assert hashes[1] == hashes[0][:16]
     env.close()
     assert trocar.verify(tmp_path / "episode-00001").same
+
+
+def test_a_strip_is_cut_off_and_whole_in_a_new_episode(tmp_path):
+    env = gymnasium.make("trocar/TissueCut-v0", reward="shaped", record=tmp_path)
+    bonus, hashes = 0.0, list[list[str]]()
+    for most in (30, 8):
+        observation, _ = env.reset(seed=0)
+        assert observation["achieved_goal"] == 0.0
+        policy, info = oracle(env.unwrapped), {"is_success": False}
+        hashes.append([])
+        while len(hashes[-1]) < most and not info["is_success"]:
+            observation, *_, info = env.step(policy(observation))
+            hashes[-1].append(env.unwrapped.state_hash)
+            bonus += info["bonus"]
+        assert info["is_success"] == (most == 30)
+    assert bonus == 0.5, "a first cut, and no tear"
+    assert hashes[1] == hashes[0][:8]
+    env.close()
+    assert trocar.verify(tmp_path / "episode-00001").same
+
+
+def test_a_loss_counts_each_time_and_the_rest_once():
+    seen = set[str]()
+    assert event_bonus(["cut", "cut", "torn"], seen) == 0.5 - 1.0
+    assert event_bonus(["cut", "torn", "dropped"], seen) == -2.0
 
 
 def test_what_is_unknown_is_refused():
