@@ -14,8 +14,8 @@ _SHOT, _READ = 0.03, 0.7
 
 No figures of a surgical camera are published: chosen by eye, so that grain is hardly seen.
 """
-_POOL = 1 << 20
-"""Numbers of noise kept; each picture takes them from another place."""
+_SHIFTS = 1 << 16
+"""Places in the kept numbers of noise from which a picture may take its numbers."""
 
 
 class Sensor:
@@ -26,18 +26,32 @@ class Sensor:
         self._random = np.random.default_rng(0)
         x, y = np.linspace(-1.0, 1.0, width), np.linspace(-1.0, 1.0, height)[:, None]
         corner = 0.5 * (x**2 + y**2)
-        self._light = (1.0 - params.vignette * corner**1.5)[..., None].astype(np.float32)
-        self._pool = self._random.standard_normal(_POOL if params.noise else 0, np.float32)
+        vignette = (1.0 - params.vignette * corner**1.5)[..., None]
+        self._light = np.ascontiguousarray(np.broadcast_to(vignette, (height, width, 3)), np.float32)
+        self._grey, self._deviation = np.zeros_like(self._light), np.zeros_like(self._light)
+        self._pool = self._random.standard_normal(
+            self._light.size + _SHIFTS if params.noise else 0, np.float32
+        )
         self._is_plain = not params.vignette and not params.noise
 
     def expose(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return a picture, shape (height, width, 3), RGB, as the sensor delivers it."""
+        """Return a picture, shape (height, width, 3), RGB, as the sensor delivers it.
+
+        Arrays are written in place: a picture has millions of numbers, and a GPU draws faster than they are
+        allocated.
+        """
         if self._is_plain:
             return picture.copy()
-        light = picture * self._light
+        grey, deviation = self._grey, self._deviation
+        np.multiply(picture, self._light, out=grey)
         if self._noise:
-            deviation = self._noise * np.sqrt(np.float32(_SHOT) * light + np.float32(_READ**2))
-            start = int(self._random.integers(_POOL))
-            numbers = np.take(self._pool, np.arange(start, start + light.size), mode="wrap")
-            light += deviation * numbers.reshape(light.shape)
-        return np.clip(light + np.float32(0.5), 0.0, 255.0).astype(np.uint8)
+            np.multiply(grey, np.float32(_SHOT), out=deviation)
+            deviation += np.float32(_READ**2)
+            np.sqrt(deviation, out=deviation)
+            start = int(self._random.integers(_SHIFTS))
+            deviation *= self._pool[start : start + grey.size].reshape(grey.shape)
+            deviation *= self._noise
+            grey += deviation
+        grey += np.float32(0.5)
+        np.clip(grey, 0.0, 255.0, out=grey)
+        return grey.astype(np.uint8)
