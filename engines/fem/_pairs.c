@@ -36,8 +36,16 @@ int have_moved(const Pairs *pairs)
     return 0;
 }
 
+/* Bring the places of the vertices up to date. */
+void place_vertices(Pairs *pairs)
+{
+    for (int k = 0; k < pairs->vertices; k++)
+        place_of(pairs, pairs->vertex[k].body, pairs->vertex[k].node, pairs->place + 3 * k);
+}
+
 void free_pairs(Pairs *pairs)
 {
+    PyMem_RawFree(pairs->place);
     PyMem_RawFree(pairs->changes);
     PyMem_RawFree(pairs->vertex);
     PyMem_RawFree(pairs->before);
@@ -64,14 +72,16 @@ static int find_room(Pairs *pairs)
         pairs->changes = PyMem_RawMalloc(sizeof(int) * (size_t)pairs->bodies);
     if (pairs->room < most) {
         PyMem_RawFree(pairs->vertex);
+        PyMem_RawFree(pairs->place);
         PyMem_RawFree(pairs->before);
         PyMem_RawFree(pairs->start);
         pairs->room = most;
         pairs->vertex = PyMem_RawMalloc(sizeof(Vertex) * (size_t)most);
+        pairs->place = PyMem_RawMalloc(sizeof(double) * 3 * (size_t)most);
         pairs->before = PyMem_RawMalloc(sizeof(float) * 3 * (size_t)most);
         pairs->start = PyMem_RawMalloc(sizeof(int32_t) * ((size_t)most + 1));
     }
-    return pairs->changes && pairs->vertex && pairs->before && pairs->start ? 0 : -1;
+    return pairs->changes && pairs->vertex && pairs->place && pairs->before && pairs->start ? 0 : -1;
 }
 
 /* Collect the vertices of a body, and mark them as 0 among -1 in `place`. */
@@ -99,10 +109,10 @@ static int cell_of(const Grid *grid, double x, int axis)
 /* Sort the vertices into cells; return 0 where there are none to sort, or -1 without memory. */
 static int make_grid(const Pairs *pairs, Grid *grid)
 {
-    double high[3] = {-INFINITY, -INFINITY, -INFINITY}, x[3], longest = 0.0;
+    double high[3] = {-INFINITY, -INFINITY, -INFINITY}, longest = 0.0;
     grid->low[0] = grid->low[1] = grid->low[2] = INFINITY;
     for (int k = 0; k < pairs->vertices; k++) {
-        place_of(pairs, pairs->vertex[k].body, pairs->vertex[k].node, x);
+        const double *x = pairs->place + 3 * k;
         for (int i = 0; i < 3; i++) {
             if (!isfinite(x[i]))
                 return 0;
@@ -126,7 +136,7 @@ static int make_grid(const Pairs *pairs, Grid *grid)
     for (int pass = 0; pass < 2; pass++) {
         int32_t *start = grid->start + 1; /* shifted by one while it is filled */
         for (int32_t k = 0; k < pairs->vertices; k++) {
-            place_of(pairs, pairs->vertex[k].body, pairs->vertex[k].node, x);
+            const double *x = pairs->place + 3 * k;
             int cell = (cell_of(grid, x[2], 2) * grid->count[1] + cell_of(grid, x[1], 1)) * grid->count[0] +
                        cell_of(grid, x[0], 0);
             if (pass)
@@ -154,11 +164,10 @@ static int are_neighbours(const Body *body, const Stars *stars, int32_t node, co
 }
 
 /* Whether a vertex is within reach of a face with these corners. */
-static int is_near(const Pairs *pairs, int32_t vertex, const double corner[3][3])
+static int is_near(const Pairs *pairs, int32_t vertex, const double *const corner[3])
 {
-    double x[3];
+    const double *x = pairs->place + 3 * vertex;
     float near[3][3], share[3], square = 0.0f, reach = (float)pairs->reach;
-    place_of(pairs, pairs->vertex[vertex].body, pairs->vertex[vertex].node, x);
     for (int i = 0; i < 3; i++) {
         for (int a = 0; a < 3; a++)
             near[a][i] = (float)(corner[a][i] - x[i]);
@@ -174,39 +183,42 @@ static int is_near(const Pairs *pairs, int32_t vertex, const double corner[3][3]
     return square < reach * reach;
 }
 
-/* Append the pairs of a face to `found`, with room for `room`; return their number, or -1 without memory. */
+/* Pairs in the order of their faces, with their vertices. */
 typedef struct {
     int count, room;
     Pair *pair;
     int32_t *vertex;
 } Found;
 
-static int append(Found *found, int32_t vertex, int body, int slot)
+static int append(Found *found, int32_t vertex, const Pair *pair)
 {
     if (found->count == found->room) {
         int room = 2 * found->room + 1024;
-        Pair *pair = PyMem_RawRealloc(found->pair, sizeof(Pair) * (size_t)room);
-        found->pair = pair ? pair : found->pair;
+        Pair *pairs = PyMem_RawRealloc(found->pair, sizeof(Pair) * (size_t)room);
+        found->pair = pairs ? pairs : found->pair;
         int32_t *numbers = PyMem_RawRealloc(found->vertex, sizeof(int32_t) * (size_t)room);
         found->vertex = numbers ? numbers : found->vertex;
-        if (pair == NULL || numbers == NULL)
+        if (pairs == NULL || numbers == NULL)
             return -1;
         found->room = room;
     }
-    found->pair[found->count].body = body, found->pair[found->count].slot = slot;
+    found->pair[found->count] = *pair;
     found->vertex[found->count++] = vertex;
     return 0;
 }
 
-/* Find the vertices near a face. */
-static int look_around(const Pairs *pairs, const Grid *grid, const Stars *stars, int body, int slot, Found *found)
+/* Find the vertices near a face; `first`: number of the first vertex of its body. */
+static int look_around(const Pairs *pairs, const Grid *grid, const Stars *stars, int first, int body, int slot, Found *found)
 {
     const Body *own = pairs->body[body];
     const int32_t *face = own->surface + 3 * slot;
-    double corner[3][3];
+    const double *corner[3];
+    Pair pair = {.body = body, .slot = slot};
     int low[3], high[3];
-    for (int a = 0; a < 3; a++)
-        place_of(pairs, body, face[a], corner[a]);
+    for (int a = 0; a < 3; a++) {
+        pair.corner[a] = first + stars->place[face[a]];
+        corner[a] = pairs->place + 3 * pair.corner[a];
+    }
     for (int i = 0; i < 3; i++) {
         double least = fmin(fmin(corner[0][i], corner[1][i]), corner[2][i]) - pairs->reach;
         double most = fmax(fmax(corner[0][i], corner[1][i]), corner[2][i]) + pairs->reach;
@@ -222,7 +234,7 @@ static int look_around(const Pairs *pairs, const Grid *grid, const Stars *stars,
                     continue;
                 if (!is_near(pairs, vertex, corner) || (is_own && are_neighbours(own, stars, node, face)))
                     continue;
-                if (append(found, vertex, body, slot))
+                if (append(found, vertex, &pair))
                     return -1;
             }
         }
@@ -253,6 +265,16 @@ static int sort_pairs(Pairs *pairs, const Found *found)
     return 0;
 }
 
+/* Find the vertices near all faces; return -1 without memory. */
+static int look_everywhere(const Pairs *pairs, const Grid *grid, const Stars *stars, Found *found)
+{
+    for (int b = 0, first = 0; b < pairs->bodies; first += stars[b++].count)
+        for (int f = 0; f < pairs->body[b]->faces; f++)
+            if (is_joined(pairs->body[b], f) && look_around(pairs, grid, stars + b, first, b, f, found))
+                return -1;
+    return 0;
+}
+
 /* Find all pairs anew; return -1 without memory. */
 int find_pairs(Pairs *pairs)
 {
@@ -263,19 +285,17 @@ int find_pairs(Pairs *pairs)
     pairs->vertices = 0;
     for (int b = 0; b < pairs->bodies && !failed; b++) {
         int32_t *place = no_places(pairs->body[b]);
-        if (place == NULL)
-            failed = 1;
-        else {
+        failed = place == NULL;
+        if (!failed) {
             add_vertices(pairs, b, place);
             failed = find_stars(pairs->body[b], place, stars + b);
         }
     }
-    int sorted = failed ? -1 : make_grid(pairs, &grid);
-    for (int b = 0; b < pairs->bodies && sorted > 0; b++)
-        for (int f = 0; f < pairs->body[b]->faces && sorted > 0; f++)
-            if (is_joined(pairs->body[b], f) && look_around(pairs, &grid, stars + b, b, f, &found))
-                sorted = -1;
-    failed = sorted < 0 || sort_pairs(pairs, &found);
+    if (!failed) {
+        place_vertices(pairs);
+        int made = make_grid(pairs, &grid);
+        failed = made < 0 || (made && look_everywhere(pairs, &grid, stars, &found)) || sort_pairs(pairs, &found);
+    }
     for (int b = 0; b < pairs->bodies && !failed; b++)
         pairs->changes[b] = pairs->body[b]->changes;
     pairs->are_known = !failed;

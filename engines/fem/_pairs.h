@@ -4,8 +4,9 @@ typedef struct {
     int32_t body, node;
 } Vertex;
 
+/* A face beside a vertex. */
 typedef struct {
-    int32_t body, slot; /* of a face */
+    int32_t body, slot, corner[3]; /* corners: vertices by number */
 } Pair;
 
 typedef struct {
@@ -16,6 +17,7 @@ typedef struct {
     int are_known, vertices, room, pair_room;
     int *changes;         /* (bodies,): of the meshes when the pairs were found */
     Vertex *vertex;       /* (room,) */
+    double *place;        /* (room, 3): in the frame of all bodies */
     float *before;        /* (room, 3): displacements when the pairs were found */
     int32_t *start;       /* (room + 1,): first pair by vertex */
     Pair *pair;
@@ -29,6 +31,7 @@ static inline void place_of(const Pairs *pairs, int body, int32_t node, double x
         x[i] = pairs->middle[3 * body + i] + (double)own->rest[4 * node + i] + (double)own->displacement[4 * node + i];
 }
 
+void place_vertices(Pairs *pairs);
 int have_moved(const Pairs *pairs);
 int find_pairs(Pairs *pairs);
 void free_pairs(Pairs *pairs);

@@ -14,12 +14,14 @@ and what a vertex meets does not depend on when they were found. So a restored b
 #include "_triangle.h"
 #include "_vectors.h"
 
-#define ITERATIONS 6
+#define ITERATIONS 6   /* at most */
+#define SETTLED 1e-4   /* square of a pass's impulses over those of the first: enough */
 #define RECOVERY 0.2   /* share of a depth that is undone in a sub-step */
 #define FASTEST 0.05   /* m/s: of the recovery */
 #define DEEPEST 0.3    /* of a vertex behind a face, over the height of the element there */
 #define INTERIOR 1e-4f /* least share of each node at a point inside a face */
 #define SAME_POINT 1e-7 /* m */
+#define MOST_FACES 64  /* that a vertex may meet: the first of them */
 
 /* A vertex that meets a face. */
 typedef struct {
@@ -68,22 +70,25 @@ void forget_pairs(Touch *touch)
 /* The point of a face nearest to a vertex. */
 typedef struct {
     const Pair *pair;
-    double corner[3][3], normal[3]; /* of the face */
-    double share[3], out[3], distance;   /* from the point to the vertex */
-    int is_inside;                  /* the face, not on its edge */
+    const double *corner[3];           /* of the face */
+    double normal[3];
+    double share[3], out[3], distance; /* from the point to the vertex */
+    int is_inside;                     /* the face, not on its edge */
 } Near;
 
 /* Write the point of a face nearest to x; return 0 if it is too far, or the face has no area. */
-static int look_at(const Touch *touch, const double x[3], const Pair *pair, Near *near)
+static int look_at(const Touch *touch, const double *x, const Pair *pair, Near *near)
 {
-    const Pairs *pairs = &touch->pairs;
-    const int32_t *node = pairs->body[pair->body]->surface + 3 * pair->slot;
     double u[3], v[3];
-    float corner[3][3], share[3];
-    for (int a = 0; a < 3; a++) {
-        place_of(pairs, pair->body, node[a], near->corner[a]);
-        for (int i = 0; i < 3; i++)
+    float corner[3][3], share[3], ahead = (float)touch->ahead;
+    for (int a = 0; a < 3; a++)
+        near->corner[a] = touch->pairs.place + 3 * pair->corner[a];
+    for (int i = 0; i < 3; i++) {
+        for (int a = 0; a < 3; a++)
             corner[a][i] = (float)(near->corner[a][i] - x[i]);
+        if ((corner[0][i] > ahead && corner[1][i] > ahead && corner[2][i] > ahead) ||
+            (corner[0][i] < -ahead && corner[1][i] < -ahead && corner[2][i] < -ahead))
+            return 0;
     }
     nearest(corner[0], corner[1], corner[2], share);
     near->share[0] = 1.0 - (double)share[1] - (double)share[2];
@@ -95,8 +100,10 @@ static int look_at(const Touch *touch, const double x[3], const Pair *pair, Near
     near->pair = pair;
     near->distance = sqrt(dot(near->out, near->out));
     near->is_inside = share[0] > INTERIOR && share[1] > INTERIOR && share[2] > INTERIOR;
+    if (near->distance > touch->ahead)
+        return 0;
     cross(u, v, near->normal);
-    return near->distance <= touch->ahead && normalise(near->normal);
+    return normalise(near->normal);
 }
 
 /* Weight of a face at a point of its edge or corner, which grows with its angle there. */
@@ -115,23 +122,20 @@ static double weight_at(const Near *near)
     return 2.0;
 }
 
-/* Outward direction at a point of an edge or corner, as the sum of all faces there tells (Baerentzen, Aanaes, Signed
-distance computation using the angle weighted pseudonormal, IEEE Trans. Vis. Comput. Graph. 11, 2005). */
-static int direction_at(const Touch *touch, const double x[3], int first, int end, const Near *best, double direction[3])
+/* Outward direction at the nearest point, on an edge or corner, as the sum of all faces there tells (Baerentzen, Aanaes,
+Signed distance computation using the angle weighted pseudonormal, IEEE Trans. Vis. Comput. Graph. 11, 2005). */
+static int direction_at(const Near *near, int count, const Near *best, double direction[3])
 {
     memset(direction, 0, 3 * sizeof(double));
-    for (int p = first; p < end; p++) {
-        Near near;
-        if (touch->pairs.pair[p].body != best->pair->body || !look_at(touch, x, touch->pairs.pair + p, &near))
-            continue;
-        double apart[3];
+    for (int k = 0; k < count; k++) {
+        double apart[3], weight;
         for (int i = 0; i < 3; i++)
-            apart[i] = near.out[i] - best->out[i];
-        if (dot(apart, apart) > SAME_POINT * SAME_POINT)
+            apart[i] = near[k].out[i] - best->out[i];
+        if (near[k].pair->body != best->pair->body || dot(apart, apart) > SAME_POINT * SAME_POINT)
             continue;
-        double weight = weight_at(&near);
+        weight = weight_at(near + k);
         for (int i = 0; i < 3; i++)
-            direction[i] += weight * near.normal[i];
+            direction[i] += weight * near[k].normal[i];
     }
     return normalise(direction);
 }
@@ -153,33 +157,34 @@ static int meet(const Touch *touch, int k, Meeting *meeting)
 {
     const Pairs *pairs = &touch->pairs;
     const Vertex *vertex = pairs->vertex + k;
-    int first = pairs->start[k], end = pairs->start[k + 1];
-    double x[3], direction[3];
-    Near best = {.distance = INFINITY}, near;
-    place_of(pairs, vertex->body, vertex->node, x);
-    for (int p = first; p < end; p++)
-        if (look_at(touch, x, pairs->pair + p, &near) && near.distance < best.distance)
-            best = near;
-    if (best.distance == INFINITY)
+    int found = 0, least = 0;
+    double direction[3];
+    Near near[MOST_FACES];
+    for (int p = pairs->start[k]; p < pairs->start[k + 1] && found < MOST_FACES; p++)
+        found += look_at(touch, pairs->place + 3 * k, pairs->pair + p, near + found);
+    for (int n = 1; n < found; n++)
+        least = near[n].distance < near[least].distance ? n : least;
+    if (!found)
         return 0;
-    memcpy(direction, best.normal, sizeof direction);
-    if (!best.is_inside && !direction_at(touch, x, first, end, &best, direction))
+    const Near *best = near + least;
+    memcpy(direction, best->normal, sizeof direction);
+    if (!best->is_inside && !direction_at(near, found, best, direction))
         return 0;
-    double side = dot(best.out, direction) < 0.0 ? -1.0 : 1.0;
-    if (side < 0.0 && best.distance > DEEPEST * height_behind(pairs, &best))
+    double side = dot(best->out, direction) < 0.0 ? -1.0 : 1.0;
+    if (side < 0.0 && best->distance > DEEPEST * height_behind(pairs, best))
         return 0;
     meeting->vertex = vertex, meeting->body = pairs->body[vertex->body];
-    meeting->other = pairs->body[best.pair->body], meeting->other_body = best.pair->body;
-    meeting->node = meeting->other->surface + 3 * best.pair->slot;
-    meeting->gap = side * best.distance;
+    meeting->other = pairs->body[best->pair->body], meeting->other_body = best->pair->body;
+    meeting->node = meeting->other->surface + 3 * best->pair->slot;
+    meeting->gap = side * best->distance;
     for (int i = 0; i < 3; i++) {
-        int is_clear = !best.is_inside && best.distance > SAME_POINT;
-        meeting->normal[i] = is_clear ? side * best.out[i] / best.distance : direction[i];
-        meeting->share[i] = best.share[i];
+        int is_clear = !best->is_inside && best->distance > SAME_POINT;
+        meeting->normal[i] = is_clear ? side * best->out[i] / best->distance : direction[i];
+        meeting->share[i] = best->share[i];
     }
     double inverse = (double)meeting->body->inverse_mass[vertex->node];
     for (int a = 0; a < 3; a++)
-        inverse += best.share[a] * best.share[a] * (double)meeting->other->inverse_mass[meeting->node[a]];
+        inverse += best->share[a] * best->share[a] * (double)meeting->other->inverse_mass[meeting->node[a]];
     double own = touch->friction[vertex->body], its = touch->friction[meeting->other_body];
     meeting->mass = 1.0 / inverse, meeting->friction = own < its ? own : its;
     meeting->pushed = 0.0;
@@ -198,8 +203,9 @@ static int find_meetings(Touch *touch)
     return found;
 }
 
-/* Change the velocities of vertex and face towards no approach; keep normal and friction within their cone. */
-static void resolve(Meeting *meeting, double seconds)
+/* Change the velocities of vertex and face towards no approach; keep normal and friction within their cone. Return the
+square of the impulse. */
+static double resolve(Meeting *meeting, double seconds)
 {
     float *velocity = meeting->body->velocity + 4 * meeting->vertex->node;
     double apart[3], rub[3], impulse[3], square = 0.0, recovery = -RECOVERY * meeting->gap / seconds;
@@ -230,6 +236,7 @@ static void resolve(Meeting *meeting, double seconds)
         }
     }
     meeting->pushed = pushed;
+    return dot(impulse, impulse);
 }
 
 /* Begin a step: no forces yet. */
@@ -242,8 +249,11 @@ void begin_touch(Touch *touch)
 int part_bodies(Touch *touch, double seconds, double share)
 {
     Pairs *pairs = &touch->pairs;
-    if (have_moved(pairs) && find_pairs(pairs))
-        return -1;
+    if (have_moved(pairs)) {
+        if (find_pairs(pairs))
+            return -1;
+    } else
+        place_vertices(pairs);
     if (touch->room < pairs->vertices) {
         PyMem_RawFree(touch->meeting);
         touch->room = pairs->vertices;
@@ -252,9 +262,13 @@ int part_bodies(Touch *touch, double seconds, double share)
             return -1;
     }
     int found = find_meetings(touch);
-    for (int pass = 0; pass < ITERATIONS; pass++)
+    double first = 0.0, change = INFINITY;
+    for (int pass = 0; pass < ITERATIONS && change > SETTLED * first; pass++) {
+        change = 0.0;
         for (int k = 0; k < found; k++)
-            resolve(touch->meeting + k, seconds);
+            change += resolve(touch->meeting + k, seconds);
+        first = pass ? first : change;
+    }
     for (int k = 0; k < found; k++) {
         const Meeting *meeting = touch->meeting + k;
         for (int i = 0; i < 3; i++) {
