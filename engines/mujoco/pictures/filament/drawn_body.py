@@ -12,6 +12,7 @@ import numpy as np
 from mujoco import mjrf
 from numpy.typing import NDArray
 
+from engines.mujoco.pictures.filament.drawn_film import DrawnFilm
 from engines.mujoco.pictures.filament.tangent_frames import TangentFrames
 from engines.mujoco.pictures.filament.upload import Textures, vertex_layout, write_mesh
 from engines.mujoco.pictures.skin_mesh import SkinMesh
@@ -54,6 +55,7 @@ class DrawnBody:
         self._renderables: list[mjrf.Renderable] = []
         self._version = -1
         self._skin: _Skin | None = None
+        self._film: DrawnFilm | None = None
 
     def update(self) -> None:
         """Show the surface as it is now."""
@@ -64,14 +66,23 @@ class DrawnBody:
             self._skin = self._renew()
         if self._skin is None:
             return
-        self._skin.write(self._body.nodes.astype(np.float64))
+        skin = self._skin
+        vertices = skin.write(self._body.nodes.astype(np.float64))
         if changed:
-            self._add_renderables(self._skin)
+            self._add_renderables(skin)
+        if self._body.may_be_wet:
+            if self._film is None:
+                count = len(vertices)
+                self._film = DrawnFilm(self._context, self._scene, self._body.liquid, skin.faces, count)
+            self._film.update(vertices, skin.spread(self._body.film))
 
     def _clear(self) -> None:
         for renderable in self._renderables:
             self._scene.remove_renderable(renderable)
         self._renderables.clear()
+        if self._film is not None:
+            self._film.hide()
+            self._film = None
 
     def _renew(self) -> _Skin | None:
         """Return the mesh of a changed surface, faces of one kind together; None without faces."""
@@ -130,11 +141,16 @@ class _Skin:
         self, context: mjrf.Context, mesh: SkinMesh, frames: TangentFrames, kinds: NDArray[np.uint8]
     ) -> None:
         self._mesh, self._frames, self.kinds = mesh, frames, kinds
-        self._faces = frames.faces.astype(np.uint32)
-        self._layout = vertex_layout(len(frames.source), self._faces.size)
+        self.faces = frames.faces.astype(np.uint32)
+        self._layout = vertex_layout(len(frames.source), self.faces.size)
         self.drawn = context.create_mesh(self._layout)
 
-    def write(self, nodes: Vector) -> None:
-        """Move the vertices to where `nodes`, shape (n, 3), m, put them."""
+    def write(self, nodes: Vector) -> NDArray[np.float32]:
+        """Move the vertices to where `nodes`, shape (n, 3), m, put them; return them, shape (v, 9)."""
         vertices = self._frames.vertices(self._mesh.vertices(nodes))
-        write_mesh(self.drawn, self._layout, vertices, self._faces)
+        write_mesh(self.drawn, self._layout, vertices, self.faces)
+        return vertices
+
+    def spread(self, film: NDArray[np.uint8]) -> Vector:
+        """Return the thickness of a film at the drawn vertices for that at the nodes, in the same steps."""
+        return self._mesh.spread(film.astype(np.float64))[self._frames.source]

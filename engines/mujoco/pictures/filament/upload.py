@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from engines.mujoco.textures.surface import Maps, Pixels
 
-__all__ = ["Textures", "vertex_layout", "write_mesh"]
+__all__ = ["Textures", "make_texture", "vertex_layout", "write_mesh"]
 
 
 class Textures(NamedTuple):
@@ -25,9 +25,9 @@ class Textures(NamedTuple):
         """Upload maps."""
         srgb, linear = mjrf.ColorSpace.COLORSPACE_SRGB, mjrf.ColorSpace.COLORSPACE_LINEAR
         return cls(
-            _texture(context, maps.colour, srgb),
-            _texture(context, maps.normal, linear),
-            _texture(context, maps.orm, linear),
+            make_texture(context, maps.colour, srgb),
+            make_texture(context, maps.normal, linear),
+            make_texture(context, maps.orm, linear),
         )
 
     def material(self, *, metallic: float = 0.0) -> mjrf.Material:
@@ -41,13 +41,15 @@ class Textures(NamedTuple):
         )
 
 
-def _texture(context: mjrf.Context, pixels: Pixels, space: mjrf.ColorSpace) -> mjrf.Texture:
-    height, width, _ = pixels.shape
+def make_texture(context: mjrf.Context, pixels: Pixels, space: mjrf.ColorSpace) -> mjrf.Texture:
+    """Upload a picture, shape (height, width, 3), or with opacity (height, width, 4)."""
+    height, width, channels = pixels.shape
+    kinds = {3: mjrf.PixelFormat.PIXEL_FORMAT_RGB8, 4: mjrf.PixelFormat.PIXEL_FORMAT_RGBA8}
     texture = context.create_texture(
         mjrf.TextureConfig(
             width=width,
             height=height,
-            format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8,
+            format=kinds[channels],
             color_space=space,
             sampler_type=mjrf.SamplerType.TEXTURE_2D,
         )
