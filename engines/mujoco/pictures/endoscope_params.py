@@ -82,9 +82,12 @@ class EndoscopeParams(SceneParams):
     quality: int = Field(
         default=95, ge=1, le=95, description="of a JPEG; above 95 files grow but pictures do not improve"
     )
-    shadows: bool = Field(
-        default=False,
-        description="draw shadows and reflections of plain looks: several times slower without a GPU",
+    shadows: bool | None = Field(
+        default=None,
+        description=(
+            "draw shadows, and reflections with plain looks; default: with endoscope looks. On a CPU plain"
+            " pictures with shadows take several times as long, those of an endoscope two thirds more"
+        ),
     )
     place: Literal["abdomen", "dry-lab", "none"] | None = Field(
         default=None,

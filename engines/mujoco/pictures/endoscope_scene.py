@@ -35,7 +35,7 @@ __all__ = ["EndoscopeScene", "add_sky", "look_at"]
 _SKY, _GROUND = [0.75, 0.8, 0.85], [0.35, 0.37, 0.4]
 """Behind everything seen from a room, above and below; an endoscope sees only what its own lamp lights."""
 
-_TONES = {"filmic": "pbr_neutral", "linear": "linear"}
+_TONES = {"filmic": "filmic", "linear": "linear"}
 """Filament's names of tone mappings."""
 
 
@@ -79,7 +79,7 @@ class EndoscopeScene:
         self._renderer = (
             self._filament(params, clip, engine, bodies)
             if isinstance(engine, Backend)
-            else StereoRenderer(self._model, params.camera, clip, engine, shadows=params.shadows)
+            else StereoRenderer(self._model, params.camera, clip, engine, shadows=bool(params.shadows))
         )
 
     def _filament(

@@ -20,7 +20,7 @@ def brushed_steel(noise: Noise, points: Points) -> Surface:
     scratches, stains = noise.at(along, 0.06 * _MM, 0), noise.octaves(points, 2.0 * _MM, 1, 2)
     colour = np.full((len(points), 3), (0.80, 0.80, 0.82), np.float32)
     colour = colour * (np.float32(1.0) + 0.015 * scratches + 0.01 * stains)[:, None]
-    roughness = np.float32(0.30) + np.float32(0.04) * scratches + np.float32(0.03) * stains
+    roughness = np.float32(0.36) + np.float32(0.04) * scratches + np.float32(0.03) * stains
     return Surface(colour, np.float32(0.0004 * _MM) * scratches, roughness)
 
 

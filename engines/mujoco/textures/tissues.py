@@ -91,14 +91,17 @@ def _colon(noise: Noise, points: Points) -> Surface:
 
 def _fat(noise: Noise, points: Points) -> Surface:
     bends = np.stack([noise.at(points, 2.5 * _MM, 40 + k) for k in range(3)], axis=1)
-    depth, number = noise.lobules(points + np.float32(0.8 * _MM) * bends, 4.5 * _MM)
+    depth, number = noise.lobules(points + np.float32(0.8 * _MM) * bends, 4.0 * _MM)
+    lobe, _ = noise.lobules(points + np.float32(3.0 * _MM) * bends, 17.0 * _MM)
+    fold = smooth_step(lobe, 0.0, 0.4)
     full, broad = smooth_step(depth, 0.0, 0.45), noise.octaves(points, 12.0 * _MM, 6, 2)
     fine = noise.at(points, 0.6 * _MM, 5)
     colour = blend(_base(points, (0.85, 0.64, 0.40)), (0.93, 0.79, 0.53), 0.35 + 0.65 * full)
     colour = blend(colour, (0.96, 0.87, 0.68), 1.2 * (number - 0.25) * full)
     colour = blend(colour, (0.86, 0.53, 0.42), 0.35 * smooth_step(broad, 0.3, 1.6))
+    colour = blend(colour, (0.80, 0.50, 0.34), 0.55 * (1.0 - fold))
     colour = blend(colour, _VESSEL, 0.5 * _vessels(noise, points, 9.0 * _MM, 0.05, 10, 0.45))
-    height = 0.45 * _MM * full + 0.03 * _MM * fine
+    height = 0.22 * _MM * full + 0.7 * _MM * fold + 0.03 * _MM * fine
     return Surface(_mottled(colour, 0.025 * fine), height, _wet(noise, points, 0.26))
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from engines.mujoco.pictures.filament.upload import make_texture, vertex_layout, write_mesh
 from hub.participant.view import tint_of
 from schemas.soft_surface import FILM_STEP_M
+from schemas.vectors import Vector
 
 __all__ = ["DrawnFilm"]
 
@@ -37,14 +38,14 @@ class DrawnFilm:
         )
         self._is_shown = False
 
-    def update(self, vertices: NDArray[np.float32], steps: NDArray[np.floating]) -> None:
+    def update(self, vertices: NDArray[np.float32], steps: Vector) -> None:
         """Show the liquid.
 
         Args:
             vertices: as drawn, with tangent frames, shape (n, 9).
             steps: thickness at each vertex, in `FILM_STEP_M`, shape (n,).
         """
-        is_wet = (steps[self._faces] >= _LEAST).any(axis=1)
+        is_wet: NDArray[np.bool_] = (steps[self._faces] >= _LEAST).any(axis=1)
         if not is_wet.any():
             self.hide()
             return

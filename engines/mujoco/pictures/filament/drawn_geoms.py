@@ -21,10 +21,11 @@ __all__ = ["DrawnGeoms"]
 
 class _Coat(NamedTuple):
     recipe: Recipe
-    metal: bool
+    metal: float
+    """Share of metal: less than 1 for a fine blasted surface, which scatters light."""
 
 
-_COATS: Mapping[str, _Coat] = {"steel": _Coat(brushed_steel, True), "black": _Coat(shaft_coat, False)}
+_COATS: Mapping[str, _Coat] = {"steel": _Coat(brushed_steel, 0.8), "black": _Coat(shaft_coat, 0.0)}
 """Coats by the name of a material of the robot."""
 _TILE, _PIXELS = 0.012, 256
 _HIDDEN = 5
@@ -44,14 +45,14 @@ class DrawnGeoms:
                 continue
             if name not in self._textures:
                 coat = _COATS[name]
-                tile = make_tile(coat.recipe, noise, _TILE, _PIXELS, metal=coat.metal)
+                tile = make_tile(coat.recipe, noise, _TILE, _PIXELS, metal=coat.metal > 0.0)
                 self._textures[name] = Textures.of_maps(context, tile)
             renderable = context.create_renderable(
                 mjrf.RenderableParams(cast_shadow=True, receive_shadow=True)
             )
             drawn = _upload(context, model, mesh)
             renderable.set_mesh(drawn, 0, 3 * int(model.mesh_facenum[mesh]))
-            renderable.set_material(self._textures[name].material(metallic=float(_COATS[name].metal)))
+            renderable.set_material(self._textures[name].material(metallic=_COATS[name].metal))
             scene.add_renderable(renderable)
             model.geom_group[geom] = _HIDDEN
             self._drawn.append((geom, drawn, renderable))

@@ -31,14 +31,14 @@ class Lamp:
     """Both ends, in a scene."""
 
     def __init__(self, context: mjrf.Context, scene: mjrf.Scene, shadow_pixels: int) -> None:
-        """`shadow_pixels`: side of the shadow map of each end."""
+        """`shadow_pixels`: side of the shadow map; 0: no shadows."""
         self._ends = [
             context.create_light(
                 mjrf.LightParams(
                     type=mjrf.LightType.LIGHT_SPOT,
                     color=_COLOUR,
                     intensity=candela,
-                    cast_shadow=shadow,
+                    cast_shadow=shadow and shadow_pixels > 0,
                     range=_RANGE,
                     cutoff=_CUTOFF_DEG,
                     softness=_SOFTNESS,

@@ -79,7 +79,7 @@ class FilamentRenderer:
         options = mujoco.MjvOption()
         options.sitegroup[:] = 0
         self._rigid.set_options(options)
-        self._lamp = Lamp(self._context, self._scene, _SHADOW_PIXELS)
+        self._lamp = Lamp(self._context, self._scene, 0 if params.shadows is False else _SHADOW_PIXELS)
         self._ambient = _add_ambient(self._context, self._scene)
         self._bodies = [
             DrawnBody(self._context, self._scene, body, skins[name].recipe(name), noise)

@@ -13,7 +13,7 @@ from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 from engines.mujoco.pictures.filament import backend
 from engines.mujoco.pictures.soft_body import SoftBody
-from tests.engines.mujoco.pictures.test_changed_skin import nodes_of
+from tests.engines.mujoco.pictures.test_changed_skin import film_of, nodes_of
 from tests.engines.tissue.cut_block import CutBlock
 
 SIZE = np.array([0.08, 0.06, 0.02])
@@ -38,8 +38,9 @@ class Shown:
     def __init__(self, scene: EndoscopeScene, body: SoftBody, block: CutBlock, qpos: Picture) -> None:
         self._scene, self._body, self.block, self._qpos = scene, body, block, qpos
 
-    def draw(self, nodes: Picture) -> Picture:
-        self._body.accept(nodes_of(nodes), self.block.surface.change("tissue", 0))
+    def draw(self, nodes: Picture, film: NDArray[np.int64] | None = None) -> Picture:
+        liquid = None if film is None else film_of(film)
+        self._body.accept(nodes_of(nodes), self.block.surface.change("tissue", 0), liquid)
         return self._scene.draw(self._qpos)[0].astype(float)
 
 
@@ -49,7 +50,7 @@ def shown() -> Iterator[Shown]:
     if not found.name:
         pytest.skip(f"no Filament: {found.detail}")
     params = EndoscopeParams.model_validate(SCENE)
-    block, body = CutBlock(SIZE, 250), SoftBody("tissue/nodes", may_change=True)
+    block, body = CutBlock(SIZE, 250), SoftBody("tissue/nodes", may_change=True, may_be_wet=True)
     body.accept(nodes_of(block.mesh.nodes, block.mesh.triangles))
     scene = EndoscopeScene(params, found, {"tissue": body})
     yield Shown(scene, body, block, build(params).qpos0.copy())
@@ -87,3 +88,10 @@ def test_pictures_of_tissue(shown: Shown) -> None:
     assert strip[..., 0].mean() > 2.0 * strip[..., 1].mean()  # raw inside
     again = shown.draw(shown.block.part(0.01))
     assert np.abs(again - opened).mean() < 10.0  # the light still follows
+    parted = shown.block.part(0.01)
+    wet = shown.draw(parted, np.where(parted[:, 0] > 0.01, 200, 0))
+    left, right = wet[HEIGHT // 2, WIDTH // 8], wet[HEIGHT // 2, -WIDTH // 8]
+    assert right[0] > 3.0 * right[1]  # deep blood
+    assert left[1] > 2.0 * right[1]
+    dry = shown.draw(parted, np.zeros(len(parted), np.int64))
+    assert dry[HEIGHT // 2, -WIDTH // 8, 1] > 2.0 * right[1]
