@@ -35,7 +35,7 @@ class Liquid:
 
 
 BLOOD = Liquid("blood", 1064.0, 3.35e-3)
-"""Of 30 healthy people at 37 degrees C (Wesolowski, Mlynarczak, Preprints 2019, 201907.0090)."""
+"""Mean of 30 healthy people at 37 degrees C (Wesolowski, Mlynarczak, Preprints 2019, 201907.0090)."""
 BILE = Liquid("bile", 1010.0, 1.5e-3)
 """Assumed, between water and the bile of a gallbladder."""
 

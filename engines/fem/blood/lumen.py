@@ -111,54 +111,59 @@ class Lumen:
         slots = np.flatnonzero((surface.kinds != FaceKind.OUTSIDE) & (surface.faces[:, 0] >= 0))
         slots = slots[slots >= len(self._organ.mesh.triangles)]
         origins = solid.origin[surface.faces[slots]]
+        ring, sector = self._opened_edges(origins)
+        crosses, is_open = sector >= 0, ring >= 0
+        opened = np.zeros(self._rings.shape, np.bool_)
+        opened[ring[crosses], sector[crosses]] = True
+        marks = np.zeros(len(self._rings), np.bool_)
+        marks[ring[is_open]] = True
+        elements = self._station[solid.origin[solid.tetrahedra[solid.owners[slots]]]].mean(axis=1)
+        is_left = elements < self._station[origins].mean(axis=1)
+        self._openings = []
+        for first, last in _runs(marks):
+            sectors = int(opened[first : last + 1].any(axis=0).sum())
+            here = ((ring >= first) & (ring <= last)).any(axis=1)
+            share = max(1, sectors) / self._rings.shape[1]
+            self._openings.append(_Opening(first, last, share, slots[here], is_left[here]))
+
+    def _opened_edges(self, origins: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return lower ring and sector of each edge of faces, shapes (k, 3).
+
+        The ring is -1 for an edge that is not open on the inner wall, the sector for an edge along the tube
+        too. An edge is open if one of its nodes has parted: else the crack ends there. `origins`: nodes of
+        the faces in the uncut mesh, shape (k, 3).
+        """
         edges = origins[:, _EDGES]  # (k, 3, 2)
         rings, sectors = self._ring_of[edges], self._sector_of[edges]
-        inner = (rings >= 0).all(axis=2) & (np.abs(np.diff(rings, axis=2))[..., 0] <= 1)
-        around = self._rings.shape[1]
-        opened = np.zeros((len(self._rings), around), np.bool_)
-        crossing = inner & (sectors[..., 0] != sectors[..., 1])
-        low = np.minimum(sectors[..., 0], sectors[..., 1])
-        wraps = np.abs(np.diff(sectors, axis=2))[..., 0] > 1
-        sector = np.where(wraps, around - 1, low)
-        at = rings.min(axis=2)
-        opened[at[crossing], sector[crossing]] = True
-        slit = np.zeros(len(self._rings), np.bool_)
-        slit[at[inner]] = True
-        open_face = inner.any(axis=1)
-        middles = self._station[solid.origin[solid.tetrahedra[solid.owners[slots]]]].mean(axis=1)
-        faces = self._station[origins].mean(axis=1)
-        self._openings = []
-        for first, last in _runs(slit):
-            share = max(1, int(opened[first : last + 1].any(axis=0).sum())) / around
-            here = open_face & (at.max(axis=1, initial=0, where=inner) >= first)
-            here &= at.min(axis=1, initial=len(slit), where=inner) <= last
-            self._openings.append(_Opening(first, last, share, slots[here], (middles < faces)[here]))
+        parted = np.bincount(self._organ.solid.origin, minlength=len(self._ring_of)) > 1
+        is_open = (rings >= 0).all(axis=2) & (np.abs(rings[..., 0] - rings[..., 1]) <= 1)
+        is_open &= parted[edges].any(axis=2)
+        apart = np.abs(sectors[..., 0] - sectors[..., 1])
+        sector: NDArray[np.int64] = sectors.min(axis=2)
+        sector[apart > 1] = len(self._rings[0]) - 1
+        return np.where(is_open, rings.min(axis=2), -1), np.where(is_open & (apart > 0), sector, -1)
 
     def velocity(self, nodes: Vector) -> Vector:
         """Return the flow per area out of each face of the surface, m/s, shape (f,)."""
-        surface = self._organ.surface
-        found: Vector = np.zeros(len(surface.faces))
+        found: Vector = np.zeros(len(self._organ.surface.faces))
         if not self._openings:
             return found
         resistance = self._resistances(nodes)
-        for end in ("left", "right"):
-            ordered = self._openings if end == "left" else self._openings[::-1]
-            for opening in ordered if end in self._params.supply else ():
+        for end in self._params.supply:
+            for opening in self._openings if end == "left" else self._openings[::-1]:
                 # nodes of a parted ring stay with the left part
                 behind = resistance[: opening.first] if end == "left" else resistance[opening.last + 1 :]
-                flow = opening_flow(
-                    self._params.pressure,
-                    opening.share * self._area,
-                    float(behind.sum()),
-                    self._liquid.density,
-                )
-                if self._params.most_flow is not None:
-                    flow = min(flow, self._params.most_flow)
                 is_parted = opening.share >= 1.0
-                self._pour(found, opening, flow, end if is_parted else "", nodes)
+                self._pour(found, opening, self._flow(opening, behind), end if is_parted else "", nodes)
                 if is_parted:
                     break
         return found
+
+    def _flow(self, opening: _Opening, resistances: Vector) -> float:
+        """Return the flow out of an opening behind these resistances, m^3/s."""
+        area, density = opening.share * self._area, self._liquid.density
+        flow = opening_flow(self._params.pressure, area, float(resistances.sum()), density)
+        return flow if self._params.most_flow is None else min(flow, self._params.most_flow)
 
     def _pour(self, found: Vector, opening: _Opening, flow: float, side: str, nodes: Vector) -> None:
         """Spread a flow over the open faces of an opening; of a parted tube those of one side."""
