@@ -74,7 +74,9 @@ class Heat:
         self.rebind(corners, gradients, volumes)
 
     def rebind(self, corners: Indices, gradients: Vector, volumes: Vector) -> None:
-        """Take over a changed mesh. A new node is as warm as the node in whose place it stands.
+        """Take over a changed mesh.
+
+        A new node is as warm as the node in whose place it stands; heat of elements that have gone is gone.
 
         Args:
             corners: nodes of every element, shape (m, 4).
@@ -98,6 +100,8 @@ class Heat:
             self._constants,
             _FASTEST,
         )
+        self.rise[self._capacity == 0.0] = 0.0  # their elements have gone
+        self.excess[self._volume == 0.0] = 0.0
         self._no_power = np.zeros(len(corners), np.float32)
 
     def _copy_nodes(self, corners: Indices) -> None:

@@ -42,6 +42,8 @@ __all__ = ["OrganParams"]
 
 _NODES = 250
 _POISSON_RATIO = 0.4
+_FLATTEST = 0.15
+"""Least height of a layer's row of cells, over the length of its cells: flatter ones need short sub-steps."""
 _DENSITY = 1000.0
 """Density of water, kg/m^3."""
 
@@ -186,6 +188,12 @@ class OrganParams(BaseModel):
             raise ValueError(f"two layers have the same name: {', '.join(names)}")
         if (thick := plain_sum(layer.thickness for layer in self.layers)) >= self.size[2]:
             raise ValueError(f"layers of {thick:g} m fill a block of {self.size[2]:g} m: make them thinner")
+        row, cell = (float(np.diff(np.unique(self.local.nodes[:, axis])).min()) for axis in (2, 0))
+        if row < _FLATTEST * cell:
+            raise ValueError(
+                f"a layer has cells {1e3 * row:.2g} mm high and {1e3 * cell:.2g} mm long: make it"
+                f" {1e3 * _FLATTEST * cell:.2g} mm thick at least, or state more nodes"
+            )
 
     @cached_property
     def elastic(self) -> Material:

@@ -123,6 +123,8 @@ def test_a_layered_block_keeps_the_contract_of_engines():
         ({"layers": [FLAP["layers"][0] | {"thickness": "6 mm"}]}, "layers of 0.006 m fill a block"),
         ({"layers": [FLAP["layers"][0] | {"name": "base"}]}, "'base' is the tissue below all layers"),
         ({"layers": [FLAP["layers"][0] | {"material": "fad"}]}, "no material 'fad'"),
+        ({"layers": [FLAP["layers"][0] | {"thickness": "1 um"}]}, "0.001 mm high"),
+        ({"layers": [FLAP["layers"][0] | {"thickness": "5.999 mm"}]}, "0.001 mm high"),
         ({"size": None, "shape": "colon"}, "layers are those of a block"),
     ],
 )

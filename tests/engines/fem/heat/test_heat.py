@@ -210,6 +210,11 @@ def test_an_element_that_goes_carries_its_heat_away():
     heat.advance(0.1)
     assert heat.book[6] > 0.0
     assert abs(heat.imbalance) < 1e-5 * heat.book[0]
+    corners, gradients, volume = elements(mesh)
+    heat.rebind(corners, gradients, 0.0 * volume)
+    assert heat.stored == 0.0
+    heat.advance(0.1)
+    assert heat.hottest == BODY, "nothing that is left is warm"
 
 
 def test_a_state_goes_on_to_the_bit():
