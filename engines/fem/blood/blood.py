@@ -29,27 +29,20 @@ def blood_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
         return ()
     suctions = [name for name, probe in params.probes.items() if probe.suction]
     clips = [name for name, probe in params.probes.items() if probe.clip]
-    film = "thickness of the liquid on the surface"
     return (
-        *(
-            signal_out(f"{organ}/bleeding", description="flow of blood, or of bile", unit="ml/s")
-            for organ in organs
-        ),
-        *(
-            signal_out(
-                f"{organ}/blood",
-                description="lost in all; of it on the surface, dripped off, sucked up",
-                size=4,
-                unit="ml",
-            )
-            for organ in organs
-        ),
-        *(
-            signal_out(f"{organ}/film", SurfaceFilm, film, frame="world", period_ns=params.node_period)
-            for organ in organs
-        ),
+        *(port for organ in organs for port in _organ_ports(organ, params.node_period)),
         *(port for name in suctions for port in suction_ports(name)),
         *(port for name in clips for port in clip_ports(name)),
+    )
+
+
+def _organ_ports(organ: str, period_ns: int) -> tuple[Port, ...]:
+    film = "thickness of the liquid on the surface"
+    return (
+        signal_out(f"{organ}/bleeding", description="flow of blood, or of bile", unit="ml/s"),
+        signal_out(f"{organ}/blood/lost", description="lost since time 0", unit="ml"),
+        signal_out(f"{organ}/blood/surface", description="of it still on the surface", unit="ml"),
+        signal_out(f"{organ}/film", SurfaceFilm, film, frame="world", period_ns=period_ns),
     )
 
 
@@ -118,8 +111,9 @@ class Blood:
     def _read(self) -> dict[str, Value]:
         found: dict[str, Value] = {}
         for bleeding in self.bleedings:
-            found[f"{bleeding.organ.name}/bleeding"] = np.array([bleeding.rate])
-            found[f"{bleeding.organ.name}/blood"] = bleeding.volumes
+            name, volumes = bleeding.organ.name, bleeding.volumes
+            found[f"{name}/bleeding"] = np.array([bleeding.rate])
+            found[f"{name}/blood/lost"], found[f"{name}/blood/surface"] = volumes[:1], volumes[1:2]
         for suction in self._suctions:
             found.update(suction.outputs)
         return found

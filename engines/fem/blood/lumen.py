@@ -94,11 +94,12 @@ class Lumen:
         points = self._organ.nodes[self._rings]
         middles = points.mean(axis=1)
         shut = np.flatnonzero(np.linalg.norm(middles - middles[ring], axis=1) <= 0.5 * width)
+        shut = shut[~self.shut[shut]]
         self.shut[shut] = True
         half = len(self._rings[0]) // 2
         most = (half - 1) // 2
         above = np.array(range(-most, most + 1), np.int64)
-        pairs: list[NDArray[np.int64]] = []
+        pairs = [np.zeros((0, 2), np.int64)]
         for here in shut.tolist():
             first = int(((points[here] - middles[here]) * closing).sum(axis=1).argmax())
             sectors = np.stack([first + above, first + half - above], axis=1) % (2 * half)

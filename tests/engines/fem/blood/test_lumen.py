@@ -138,6 +138,15 @@ def test_between_two_clips_the_lumen_is_without_pressure():
         assert np.isfinite(rig.organ.nodes).all()
 
 
+def test_a_second_clip_at_the_same_place_ties_nothing_more():
+    with TubeRig() as rig:
+        rig.clip(-6e-3)
+        ties = rig.organ.solid._ties.copy()
+        (event,) = rig.clip(-6e-3)
+        assert event.kind == "clipped"
+        assert np.array_equal(rig.organ.solid._ties, ties)
+
+
 def test_one_clip_leaves_the_other_end_open():
     with TubeRig() as rig:
         rig.open(0.0)
