@@ -79,6 +79,25 @@ def test_opening_blades_leave_the_tissue():
         assert np.abs(rig.force[:4]).max() == 0.0
 
 
+def test_wild_scissors_leave_no_nan():
+    random = np.random.default_rng(1)
+    with rig_of() as rig:
+        angle, hinge = OPEN, BESIDE
+        for seconds in (0.01, 0.05, 0.2, 0.01, 0.1, 0.05):
+            angles = angle, random.uniform(-0.3, 1.4)
+            hinges = hinge, BESIDE + random.uniform([-8e-3, -6e-3, -5e-3], [8e-3, 8e-3, 5e-3])
+
+            def place(t, angles=angles, hinges=hinges, seconds=seconds):
+                share = t / seconds
+                return spheres(*(a + (b - a) * share for a, b in (angles, hinges)))
+
+            rig.follow(lambda t, at=place: (at(t), (at(t + 1e-6) - at(t - 1e-6)) / 2e-6), seconds)
+            angle, hinge = angles[1], hinges[1]
+        assert np.isfinite(rig.nodes).all()
+        assert np.isfinite(rig.wrenches).all()
+        assert rig.outputs["block/cut_area"][0] > 1e-5
+
+
 def test_the_side_of_the_hinge_says_where_closing_goes():
     edges = Edges([(0, 1), (2, 3)], 40, 200.0, [Scissors(0, 1, 4)])
     for start, end, sharp in ((0.2, 0.1, True), (0.1, 0.2, False), (0.0, -0.1, True), (-0.1, 0.0, False)):
