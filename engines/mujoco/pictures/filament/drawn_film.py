@@ -45,7 +45,7 @@ class DrawnFilm:
             vertices: as drawn, with tangent frames, shape (n, 9).
             steps: thickness at each vertex, in `FILM_STEP_M`, shape (n,).
         """
-        is_wet: NDArray[np.bool_] = (steps[self._faces] >= _LEAST).any(axis=1)
+        is_wet = np.asarray((steps[self._faces] >= _LEAST).any(axis=1))
         if not is_wet.any():
             self.hide()
             return
