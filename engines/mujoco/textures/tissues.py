@@ -56,10 +56,9 @@ def _kidney(noise: Noise, points: Points) -> Surface:
     broad, fine = noise.octaves(points, 12.0 * _MM, 0, 3), noise.at(points, 0.8 * _MM, 5)
     colour = blend(_base(points, (0.56, 0.29, 0.25)), (0.43, 0.19, 0.17), 0.5 + 0.5 * broad)
     colour = blend(colour, _VESSEL, 0.35 * _vessels(noise, points, 7.0 * _MM, 0.12, 10, 0.5))
-    fat = smooth_step(noise.octaves(points, 16.0 * _MM, 20, 2), 1.0, 1.5)
-    colour = _mottled(blend(colour, _FAT, 0.75 * fat), 0.05 * fine)
-    height = 0.2 * _MM * noise.at(points, 6.0 * _MM, 8) + 0.015 * _MM * fine + 0.6 * _MM * fat
-    return Surface(colour, height, _wet(noise, points, 0.27))
+    height = 0.2 * _MM * noise.at(points, 6.0 * _MM, 8) + 0.015 * _MM * fine
+    bare = Surface(_mottled(colour, 0.05 * fine), height, _wet(noise, points, 0.27))
+    return _with_fat(noise, points, bare, smooth_step(noise.octaves(points, 16.0 * _MM, 20, 2), 1.0, 1.4))
 
 
 def _gallbladder(noise: Noise, points: Points) -> Surface:
@@ -83,10 +82,15 @@ def _bowel(noise: Noise, points: Points) -> Surface:
 
 
 def _colon(noise: Noise, points: Points) -> Surface:
-    wall, deposit = _bowel(noise, points), _fat(noise, points)
-    fat = smooth_step(noise.octaves(points, 15.0 * _MM, 20, 2), 1.25, 1.6)
-    mixed = wall.colour + (0.9 * fat)[:, None] * (deposit.colour - wall.colour)
-    return Surface(mixed, wall.height + fat * (0.9 * _MM + deposit.height), wall.roughness)
+    deposits = smooth_step(noise.octaves(points, 15.0 * _MM, 20, 2), 1.25, 1.6)
+    return _with_fat(noise, points, _bowel(noise, points), deposits)
+
+
+def _with_fat(noise: Noise, points: Points, bare: Surface, share: Values) -> Surface:
+    """Return a surface with deposits of fat; `share`: 1 in a deposit, 0 beside."""
+    fat = _fat(noise, points)
+    mixed = bare.colour + (0.92 * share)[:, None] * (fat.colour - bare.colour)
+    return Surface(mixed, bare.height + share * (0.9 * _MM + fat.height), bare.roughness)
 
 
 def _fat(noise: Noise, points: Points) -> Surface:

@@ -34,9 +34,12 @@ _SHADOW_PIXELS = 1024
 _SAMPLES = 4
 _TRIES = 6
 """Most pictures until the light of the first one is right."""
-_AMBIENT = 9000.0
-"""Light from all sides: tissue around reflects the lamp."""
-_AMBIENT_COLOUR = (1.0, 0.88, 0.82)
+_AMBIENT: Mapping[str, tuple[float, tuple[float, float, float]]] = {
+    "abdomen": (9_000.0, (1.0, 0.88, 0.82)),
+    "dry-lab": (18_000.0, (1.0, 1.0, 1.0)),
+    "none": (9_000.0, (1.0, 1.0, 1.0)),
+}
+"""Light from all sides by place, lux and colour: tissue reflects the lamp, a room has lamps of its own."""
 
 
 class FilamentRenderer:
@@ -80,7 +83,8 @@ class FilamentRenderer:
         options.sitegroup[:] = 0
         self._rigid.set_options(options)
         self._lamp = Lamp(self._context, self._scene, 0 if params.shadows is False else _SHADOW_PIXELS)
-        self._ambient = _add_ambient(self._context, self._scene)
+        self._brightness, colour = _AMBIENT[params.surroundings]
+        self._ambient = _add_ambient(self._context, self._scene, self._brightness, colour)
         self._bodies = [
             DrawnBody(self._context, self._scene, body, skins[name].recipe(name), noise)
             for name, body in bodies.items()
@@ -139,7 +143,7 @@ class FilamentRenderer:
         """Dim the lamp by a picture; return whether the first picture needs another try."""
         is_far = control.follow(picture) if self._is_lit else control.follow(picture, 1.0)
         self._lamp.dim(control.factor)
-        self._ambient[1].set_intensity(_AMBIENT * control.factor)
+        self._ambient[1].set_intensity(self._brightness * control.factor)
         return is_far and not self._is_lit
 
     def _eye(self, pose: Vector, side: float) -> mjrf.Camera:
@@ -174,7 +178,9 @@ class FilamentRenderer:
         self.__dict__.pop("_context", None)
 
 
-def _add_ambient(context: mjrf.Context, scene: mjrf.Scene) -> tuple[mjrf.Texture, mjrf.Light]:
+def _add_ambient(
+    context: mjrf.Context, scene: mjrf.Scene, brightness: float, colour: tuple[float, float, float]
+) -> tuple[mjrf.Texture, mjrf.Light]:
     """Add light from all sides, and what metal reflects: the environment that MuJoCo's Studio brings."""
     file = (Path(mujoco.__file__).parent / "studio" / "assets" / "ibl.ktx").read_bytes()
     texture = context.create_texture(
@@ -189,9 +195,7 @@ def _add_ambient(context: mjrf.Context, scene: mjrf.Scene) -> tuple[mjrf.Texture
     data.set_image(file)
     texture.upload(data)
     light = context.create_light(
-        mjrf.LightParams(
-            type=mjrf.LightType.LIGHT_IMAGE, texture=texture, intensity=_AMBIENT, color=_AMBIENT_COLOUR
-        )
+        mjrf.LightParams(type=mjrf.LightType.LIGHT_IMAGE, texture=texture, intensity=brightness, color=colour)
     )
     scene.add_light(light)
     return texture, light
