@@ -63,8 +63,6 @@ _FACTORS = {
     ("mN", "N"): 1e-3,
     ("kN/m", "N/m"): 1e3,
     ("mm/s", "m/s"): 1e-3,
-    ("ml/s", "m^3/s"): 1e-6,
-    ("ml/min/kg", "m^3/(s kg)"): 1e-6 / 60.0,
 }
 """Factors of the most frequent units, as pint has them: a session with no other unit starts half a second
 sooner.
