@@ -245,3 +245,25 @@ def test_bleeding_needs_cutting_and_kind_fem():
                 "probes": {"probe": {"suction": {}}},
             }
         )
+
+
+def test_heat_seals_a_cut():
+    block = BLOCK | {"size": ["12 mm", "8 mm", "4 mm"], "nodes": 250}
+    probe = {"radius": "2 mm", "energy": {"power": "60 W"}}
+    with FemRig(FemParams.model_validate(given(block, probe)), (0.0, 0.0, 1.7e-3)) as rig:
+        organ, watts = rig.engine._organs[0], np.zeros(1)
+        rig.inputs = Inputs({"probe/pose": rig.pose, "probe/twist": rig.twist, "probe/energy": watts})
+        middles = organ.mesh.nodes[organ.solid.tetrahedra].mean(axis=1)
+        across = organ.solid._across
+        other = np.where(across >= 0, across // 4, 0)
+        left = middles[:, 0] < 0.0
+        opened = (across >= 0) & (left[:, None] != left[other])
+        organ.solid.compiled.open(np.flatnonzero(opened.ravel()).astype(np.int32))
+        organ._note_change()
+        rig.hold(0.02)
+        before = rig.outputs["block/bleeding"][0]
+        assert before > 0.0
+        watts[0] = 60.0
+        rig.hold(0.8)
+        assert rig.outputs["block/hottest"][0] > 90.0
+        assert rig.outputs["block/bleeding"][0] < 0.9 * before
