@@ -92,8 +92,8 @@ class EndoscopeParams(SceneParams):
     place: Literal["abdomen", "dry-lab", "none"] | None = Field(
         default=None,
         description=(
-            "surroundings with endoscope looks; default: a dry lab for a scene with table, fixtures or"
-            " objects, an abdomen for one with soft bodies alone"
+            "surroundings with endoscope looks, none: an even grey; default: a dry lab for a scene with a"
+            " table, fixtures or objects, an abdomen for soft bodies alone, else none"
         ),
     )
 
@@ -117,8 +117,9 @@ class EndoscopeParams(SceneParams):
         """The place, chosen by the scene where it is not stated."""
         if self.place is not None:
             return self.place
-        is_training_set = self.table is not None or self.fixtures or self.objects
-        return "dry-lab" if is_training_set or not self.soft_bodies else "abdomen"
+        if self.table is not None or self.fixtures or self.objects:
+            return "dry-lab"
+        return "abdomen" if self.soft_bodies else "none"
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:

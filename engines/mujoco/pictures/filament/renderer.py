@@ -32,6 +32,8 @@ _SEED = 3
 """Seed of the noise behind all textures."""
 _SHADOW_PIXELS = 1024
 _SAMPLES = 4
+_BACKGROUND = (0.42, 0.45, 0.48)
+"""Colour where nothing is: an even room."""
 _TRIES = 6
 """Most pictures until the light of the first one is right."""
 _AMBIENT: Mapping[str, tuple[float, tuple[float, float, float]]] = {
@@ -72,6 +74,7 @@ class FilamentRenderer:
         half = clip[0] * tan(0.5 * camera.field_of_view)
         self._frustum = half * camera.height / camera.width, *clip
         self._context = backend.context()
+        self._context.set_clear_color(_BACKGROUND)
         self._scene = self._context.create_scene(mjrf.SceneParams())
         self._scene.configure_from_model(model)
         self._scene.set_msaa(_SAMPLES)
