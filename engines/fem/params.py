@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -50,7 +51,7 @@ class FemParams(PressedOrgansParams):
         anchors = {part for organ in self.organs.values() for part in organ.anchored_nodes}
         return self.rigid.keys() <= anchors and super().has_sub_grid(probe)
 
-    @property
+    @cached_property
     def changes_surfaces(self) -> bool:
         """Whether an organ may be divided, burnt or clipped."""
         divided = any(organ.cutting or organ.lumen for organ in self.organs.values())

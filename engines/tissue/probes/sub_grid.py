@@ -26,6 +26,7 @@ from engines.tissue.organs.body import Body
 from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, closest_points
 from engines.tissue.probes.params import Coupling
 from engines.tissue.warn_once import warn_once
+from robots.vector3 import cross
 from schemas.vectors import Vector
 
 __all__ = ["LAW_POINTS", "SubGrid", "Surface", "warn_beyond"]
@@ -266,7 +267,7 @@ class SubGrid:
             share[distances.argmin()] = 1.0
         weighted = (share / share.sum())[:, None] * weights
         corners = surface.settled[faces]
-        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal = share @ (areas / np.sqrt((areas * areas).sum(axis=1))[:, None])
         point = np.einsum("fa,fai->i", weighted, corners)
         at, away = closest_points(point, corners)
