@@ -60,11 +60,13 @@ def step_of_a_cut() -> None:
                 start = time.process_time()
                 rig.move(START + np.array([1e-4 * (i + 1), 0.0, 0.0]), 1e-3)
                 costs.append(time.process_time() - start)
-            after, cutting = held(rig), float(np.median(costs))
+            inside, cutting = held(rig), float(np.median(costs))
+            rig.move(START + np.array([0.03, 0.0, 0.05]), 0.1)
+            after = held(rig)
             print(
                 f"contact {contact}, {len(rig.nodes)} nodes: step {1e3 * before:.3f} ms before, while cutting"
                 f" {cutting / before:.2f} of it, longest {1e3 * (max(costs) - cutting):.1f} ms more,"
-                f" after {after / before:.2f} of it"
+                f" at rest in the cut {inside / before:.2f}, drawn out {after / before:.2f} of it"
             )
 
 

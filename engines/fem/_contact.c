@@ -149,6 +149,13 @@ void press(const Body *body, const Spheres *spheres, int sphere, int sub_step, f
         for (int k = 0; k < found; k++)
             resolve(body, contacts + k, moving, seconds, spheres->friction);
     for (int i = 0; i < 3; i++)
-        for (int k = 0; k < found; k++)
-            force[i] -= (double)(contacts[k].pushed * contacts[k].normal[i] + contacts[k].rubbed[i]) / (double)seconds;
+        for (int k = 0; k < found; k++) {
+            double push = (double)(contacts[k].pushed * contacts[k].normal[i] + contacts[k].rubbed[i]) / (double)seconds;
+            force[i] -= push;
+            for (int a = 0; a < 3; a++) { /* a jaw feels what presses on the nodes that it holds */
+                int holder = body->holder[contacts[k].node[a]];
+                if (holder >= 0)
+                    spheres->force[3 * (sub_step * spheres->count + holder) + i] += (double)contacts[k].share[a] * push;
+            }
+        }
 }

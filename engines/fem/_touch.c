@@ -249,11 +249,11 @@ void begin_touch(Touch *touch)
 int part_bodies(Touch *touch, double seconds, double share)
 {
     Pairs *pairs = &touch->pairs;
-    if (have_moved(pairs)) {
-        if (find_pairs(pairs))
-            return -1;
-    } else
-        place_vertices(pairs);
+    if (have_moved(pairs) && find_pairs(pairs))
+        return -1;
+    if (pairs->start[pairs->vertices] == 0)
+        return 0;
+    place_vertices(pairs);
     if (touch->room < pairs->vertices) {
         PyMem_RawFree(touch->meeting);
         touch->room = pairs->vertices;

@@ -147,6 +147,21 @@ def test_friction_stays_in_its_cone_and_reaches_it():
     assert abs(without[0]) < 0.5 * abs(force[0])
 
 
+def test_a_jaw_feels_what_presses_on_the_tissue_that_it_holds():
+    solid = free_solid(block(np.array([0.04, 0.04, 0.02]), 60), branches=[Branch(1.0, 1e-3)])
+    held = np.flatnonzero((solid.nodes[:, 2] > -1e-9) & (solid.nodes[:, 0] < 1e-3))
+    for node in held.tolist():
+        solid.hold(node, 1)
+    k, radii, free = solid.sub_steps(1e-3), np.full(2, 4e-3), np.array([1, 0], np.uint8)
+    felt = np.zeros((2, 3))
+    for step in range(300):
+        way = np.zeros((k + 1, 2, 3))
+        way[:, 0] = [12e-3, 1e-3, max(3e-3, 5e-3 - 2e-5 * step)]
+        felt = solid.advance(1e-3, SphereWay(way, radii, free), 0.0, 0.0, drag=50.0).mean(axis=0)
+    assert felt[0, 2] > 0.05
+    assert felt.sum(axis=0) == pytest.approx(np.zeros(3), abs=0.01 * felt[0, 2])
+
+
 def plain_lanes(folder):
     """Return the compiled body without SIMD."""
     library = folder / f"_solid{sysconfig.get_config_var('EXT_SUFFIX')}"
