@@ -218,6 +218,8 @@ static double resolve(Meeting *meeting, double seconds)
     double least = meeting->gap >= 0.0 ? -meeting->gap / seconds : recovery < FASTEST ? recovery : FASTEST;
     double pushed = meeting->pushed + (least - along) * meeting->mass;
     pushed = pushed > 0.0 ? pushed : 0.0;
+    if (pushed == 0.0 && meeting->pushed == 0.0)
+        return 0.0;
     for (int i = 0; i < 3; i++) {
         rub[i] = meeting->rubbed[i] - meeting->mass * (apart[i] - along * meeting->normal[i]);
         square += rub[i] * rub[i];
