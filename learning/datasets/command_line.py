@@ -8,7 +8,7 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -65,6 +65,10 @@ def dataset(
             help="The same for action; default: commanded joints of all arms. May be repeated.",
         ),
     ] = None,
+    looks: Annotated[
+        Literal["plain", "endoscope"] | None,
+        typer.Option(help="Draw all pictures with these looks; default: recorded ones where they fit."),
+    ] = None,
     trust: Annotated[
         bool, typer.Option("--trust", help="Read files other than those of the recordings.")
     ] = False,
@@ -82,7 +86,7 @@ def dataset(
             raise MissingExtraError("'trocar dataset'", "dataset", "pillow" if package == "PIL" else package)
     from learning.datasets.episode import Wanted
 
-    wanted = Wanted(fps, pixels, _tasks(task or ()), tuple(state or ()), tuple(action or ()))
+    wanted = Wanted(fps, pixels, _tasks(task or ()), tuple(state or ()), tuple(action or ()), looks)
     _run(recordings, output, wanted, trust=trust)
 
 

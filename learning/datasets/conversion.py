@@ -72,7 +72,9 @@ class Conversion:
         wanted = self._wanted
         episode = Episode.of(recording, wanted)
         size = self._size or recorded_size(recording) or DEFAULT_SIZE
-        pictures = stereo(recording, episode.times_ns, wanted.fps, size, trust=self._trust)
+        pictures = stereo(
+            recording, episode.times_ns, wanted.fps, size, looks=wanted.looks, trust=self._trust
+        )
         if self._writer is None:
             self._writer = Writer(self._directory, wanted.fps, size, episode)
             self._size = size

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,8 @@ class Wanted:
     """Ports, or fields of ports; empty: measured joints of all arms."""
     action: tuple[str, ...] = ()
     """Likewise; empty: commanded joints of all arms."""
+    looks: Literal["plain", "endoscope"] | None = None
+    """Looks with which all pictures are drawn; None: recorded pictures where they fit, else plain."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,15 +45,16 @@ def stereo(
     fps: int,
     size: tuple[int, int],
     *,
+    looks: Literal["plain", "endoscope"] | None = None,
     trust: bool = False,
 ) -> Stereo:
     """Return the pictures at `times_ns`, shape (n,), recorded or drawn.
 
-    Recorded pictures are used if the size is right and each frame has its own picture. `trust` allows a
-    drawn scene of changed files. Raises RecordingError if there is nothing to draw, TrustError for changed
-    files, TrocarError without OpenGL; so may the pictures.
+    Recorded pictures are used if no `looks` are asked for, the size is right and each frame has its own
+    picture. `trust` allows a drawn scene of changed files. Raises RecordingError if there is nothing to draw,
+    TrustError for changed files, TrocarError without OpenGL; so may the pictures.
     """
-    ports = _ports(recording)
+    ports = () if looks else _ports(recording)
     if ports and recorded_size(recording) == size:
         picked = [_newest(recording, port, times_ns) for port in ports]
         # its own picture: taken after the frame before
@@ -64,7 +66,7 @@ def stereo(
                 for port, taken in zip(ports, picked, strict=True)
             )
             return Stereo(count, recorded=True, pairs=zip(*eyes, strict=True))
-    drawn = RecordedScene(recording, trust=trust).stereo(times_ns.tolist(), size)
+    drawn = RecordedScene(recording, looks=looks or "plain", trust=trust).stereo(times_ns.tolist(), size)
     return Stereo(len(times_ns), recorded=False, pairs=drawn)
 
 

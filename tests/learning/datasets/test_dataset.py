@@ -339,3 +339,12 @@ def test_a_recording_that_cannot_be_opened_is_left_out(recordings: Path, tmp_pat
     assert done.exit_code == 1
     assert "left out: '" in done.stderr
     assert info(tmp_path / "set")["total_episodes"] == 1
+
+
+def test_looks_that_are_asked_for_are_drawn_though_pictures_are_recorded(
+    recordings: Path, tmp_path: Path
+) -> None:
+    done = run(recordings / "seen", "-o", tmp_path / "set", "--looks", "plain")
+    assert done.exit_code == 0, done.output
+    (source,) = json.loads((tmp_path / "set/meta/recordings.json").read_text())
+    assert source["pictures"] == "drawn"
