@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import accumulate
 from typing import Any, ClassVar
 
@@ -77,6 +77,7 @@ class FemEngine(Stepped):
     def configure(self, setup: Setup) -> Outputs:
         """Build the organs and let them settle. Raises ScenarioError for unfit periods."""
         self._check(setup.period_ns)
+        self._warn_of_coarse_forces(setup.bonds)
         boxes = box_rows(self.params.rigid.values())
         is_carried = bool(len(boxes)) or (self.params.organ_contact and len(self.params.organs) > 1)
         for name, organ in self.params.organs.items():
@@ -295,6 +296,17 @@ class FemEngine(Stepped):
             f"participant '{self.name}', probe '{probe.name}': a sphere is near more than {MOST_CONTACTS}"
             " faces, and touches no more: take a coarser mesh, or smaller spheres"
         )
+
+    def _warn_of_coarse_forces(self, bonds: Iterable[str]) -> None:
+        """Warn where rigid parts take the correction of the force from a probe of one sphere."""
+        bonded = [self.params.probes[name] for name in bonds]
+        is_single = any(probe.spheres in (None, 1) and probe.grasp is None for probe in bonded)
+        if is_single and self.params.sub_grid and self.params.may_lean:
+            warn_once(
+                f"participant '{self.name}': organs may lean on {', '.join(self.params.rigid)}, so a probe of"
+                " one sphere feels the force of the mesh, too large if the mesh is coarse: take more nodes,"
+                " tie the organs to it, or set sub_grid: false"
+            )
 
     def _warn_of_coupling(self) -> None:
         """Warn of parameters that mean a virtual coupling, which this engine does not have."""

@@ -43,13 +43,17 @@ class FemParams(PressedOrgansParams):
                 )
         return self
 
+    @property
+    def may_lean(self) -> bool:
+        """Whether organs may lean on a rigid part that anchors none of them."""
+        return not self.rigid.keys() <= {part for one in self.organs.values() for part in one.anchored_nodes}
+
     def has_sub_grid(self, probe: str) -> bool:
         """Return whether a probe feels the tissue's own force: not where organs may lean on rigid parts.
 
         The spring in series knows the organ on its anchors alone.
         """
-        anchors = {part for organ in self.organs.values() for part in organ.anchored_nodes}
-        return self.rigid.keys() <= anchors and super().has_sub_grid(probe)
+        return not self.may_lean and super().has_sub_grid(probe)
 
     @cached_property
     def changes_surfaces(self) -> bool:

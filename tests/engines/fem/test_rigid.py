@@ -106,6 +106,15 @@ def test_a_block_with_nothing_under_it_falls_and_the_sentence_says_so():
         run(engine, 500)
 
 
+def test_a_force_of_the_mesh_alone_is_said(caplog):
+    model = params(LOOSE, rigid={"bench": BED})
+    with FemRig(model):
+        assert [record.getMessage().count("may lean on bench") for record in caplog.records] == [1]
+    tied = params({**LOOSE, "anchors": [{"surface": "bottom", "to": "bench"}]}, rigid={"bench": BED})
+    assert tied.has_sub_grid("probe")
+    assert not model.has_sub_grid("probe")
+
+
 def test_a_sliding_block_is_saved_and_restored_to_the_bit():
     with slope(30.0, 0.3) as engine:
         run(engine, 40)
@@ -127,11 +136,14 @@ participants:
     HOST
     probes: {}
     rigid: {bed: {box: [200 mm, 200 mm, 20 mm], position: [0, 0, -27 mm]}}
-    organs: {block: {size: [40 mm, 30 mm, 16 mm], young_modulus: 10 kPa, nodes: 75, anchors: []}}
+    organs:
+      block: {size: [40 mm, 30 mm, 16 mm], young_modulus: 10 kPa, nodes: 75, anchors: []}
+      on_top:
+        {size: [20 mm, 16 mm, 8 mm], young_modulus: 10 kPa, nodes: 75, position: [0, 2 mm, 9 mm], anchors: []}
 """
 
 
-def test_a_session_in_one_process_and_in_two_has_the_same_bits(tmp_path):
+def test_a_session_of_a_pile_in_one_process_and_in_two_has_the_same_bits(tmp_path):
     hashes = []
     for host in ("host: hub", "host: elsewhere"):
         (tmp_path / "bed.yaml").write_text(SESSION.replace("HOST", host))
