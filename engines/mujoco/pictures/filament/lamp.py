@@ -7,7 +7,7 @@ from mujoco import mjrf
 
 from schemas.vectors import Vector
 
-__all__ = ["Lamp"]
+__all__ = ["Lamp", "RoomLamp"]
 
 _ASIDE, _BACK = 5.5e-3, 1.0e-3
 """Distance of either end from the middle of the lens, sideways and backwards, m: a tip of 12 mm."""
@@ -23,6 +23,9 @@ _COLOUR = (1.0, 0.97, 0.92)
 """Xenon through a light guide: nearly white, a little yellow."""
 _BULB = 1.3e-3
 """Radius of a bundle of fibres, m."""
+_ROOM_LUX, _ROOM_COLOUR = 45_000.0, (1.0, 0.96, 0.9)
+_ROOM_DIRECTION = np.array([0.45, 0.3, -1.0], np.float32)
+"""Light, colour and direction of the lamp of a dry lab, beside the intensity of the endoscope's own."""
 _RANGE = 1.0
 """m; light farther away is left out."""
 
@@ -62,3 +65,25 @@ class Lamp:
         for end, side in zip(self._ends, (-1.0, 1.0), strict=True):
             place = middle + side * _ASIDE * right - _BACK * ahead
             end.set_pose(place.astype(np.float32), ahead.astype(np.float32))
+
+
+class RoomLamp:
+    """The lamp over the table of a dry lab, far away."""
+
+    def __init__(self, context: mjrf.Context, scene: mjrf.Scene, shadow_pixels: int) -> None:
+        """`shadow_pixels`: side of the shadow map; 0: no shadows."""
+        self._light = context.create_light(
+            mjrf.LightParams(
+                type=mjrf.LightType.LIGHT_DIRECTIONAL,
+                color=_ROOM_COLOUR,
+                intensity=_ROOM_LUX,
+                cast_shadow=shadow_pixels > 0,
+                shadow_map_size=shadow_pixels,
+            )
+        )
+        self._light.set_pose(np.array([0.0, 0.0, 1.0], np.float32), _ROOM_DIRECTION)
+        scene.add_light(self._light)
+
+    def dim(self, factor: float) -> None:
+        """Set the intensity to a factor of the usual one, as the exposure of the camera follows the light."""
+        self._light.set_intensity(factor * _ROOM_LUX)

@@ -18,7 +18,7 @@ from engines.mujoco.pictures.filament.drawn_body import DrawnBody
 from engines.mujoco.pictures.filament.drawn_geoms import DrawnGeoms
 from engines.mujoco.pictures.filament.drawn_place import DrawnPlace
 from engines.mujoco.pictures.filament.drawn_solids import DrawnSolids
-from engines.mujoco.pictures.filament.lamp import Lamp
+from engines.mujoco.pictures.filament.lamp import Lamp, RoomLamp
 from engines.mujoco.pictures.filament.light_control import LightControl
 from engines.mujoco.pictures.filament.sensor import Sensor
 from engines.mujoco.pictures.soft_body import SoftBody
@@ -38,7 +38,7 @@ _TRIES = 6
 """Most pictures until the light of the first one is right."""
 _AMBIENT: Mapping[str, tuple[float, tuple[float, float, float]]] = {
     "abdomen": (9_000.0, (1.0, 0.88, 0.82)),
-    "dry-lab": (18_000.0, (1.0, 1.0, 1.0)),
+    "dry-lab": (7_000.0, (0.92, 0.96, 1.0)),
     "none": (9_000.0, (1.0, 1.0, 1.0)),
 }
 """Light from all sides by place, lux and colour: tissue reflects the lamp, a room has lamps of its own."""
@@ -85,7 +85,11 @@ class FilamentRenderer:
         options = mujoco.MjvOption()
         options.sitegroup[:] = 0
         self._rigid.set_options(options)
-        self._lamp = Lamp(self._context, self._scene, 0 if params.shadows is False else _SHADOW_PIXELS)
+        pixels = 0 if params.shadows is False else _SHADOW_PIXELS
+        is_room = params.surroundings == "dry-lab"
+        # shadows of two lamps would cost a fifth of a picture more
+        self._lamp = Lamp(self._context, self._scene, 0 if is_room else pixels)
+        self._room_lamp = RoomLamp(self._context, self._scene, pixels) if is_room else None
         self._brightness, colour = _AMBIENT[params.surroundings]
         self._ambient = _add_ambient(self._context, self._scene, self._brightness, colour)
         self._bodies = [
@@ -146,6 +150,8 @@ class FilamentRenderer:
         """Dim the lamp by a picture; return whether the first picture needs another try."""
         is_far = control.follow(picture) if self._is_lit else control.follow(picture, 1.0)
         self._lamp.dim(control.factor)
+        if self._room_lamp is not None:
+            self._room_lamp.dim(control.factor)
         self._ambient[1].set_intensity(self._brightness * control.factor)
         return is_far and not self._is_lit
 
