@@ -170,21 +170,10 @@ class FilamentRenderer:
         )
 
     def close(self) -> None:
-        """Free everything in the renderer's memory, the context last. May be called twice."""
-        for name in (
-            "_reads",
-            "_targets",
-            "_solids",
-            "_bodies",
-            "_place",
-            "_ambient",
-            "_lamp",
-            "_rigid",
-            "_resources",
-        ):
-            self.__dict__.pop(name, None)
-        self.__dict__.pop("_scene", None)
-        self.__dict__.pop("_context", None)
+        """Free everything in the renderer's memory. May be called twice."""
+        # the newest attribute first and the context last: what is in a context must not outlive it
+        while self.__dict__:
+            self.__dict__.popitem()
 
 
 def _add_ambient(
