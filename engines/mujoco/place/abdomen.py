@@ -25,6 +25,8 @@ _BEDDED = 0.003
 _HOLLOW = 0.012
 """Free width around organs before the bed rises, m."""
 _LOOP_RADIUS, _LOOPS = 0.0125, 3
+_BEND = 0.065
+"""Way along a loop from bend to bend, m: tighter ones would fold it into itself."""
 _CLEAR_ANGLE = 1.05
 """Half the angle around the direction of the camera in which no loop lies, rad."""
 
@@ -88,10 +90,11 @@ def _loops(centre: Vector, footprint: float, radius: float, towards: float) -> I
         start, end = towards + _CLEAR_ANGLE, towards + 2.0 * np.pi - _CLEAR_ANGLE
         steps = np.linspace(0.0, 1.0, 90)
         turn = start + (end - start) * steps
-        across = distance + 0.007 * np.sin(9.0 * turn + 2.0 * loop) + 0.004 * np.sin(17.0 * turn + loop)
+        bends = max(3, round(2.0 * np.pi * distance / _BEND))
+        across = distance + 0.007 * np.sin(bends * turn + 2.0 * loop) + 0.003 * np.sin(1.9 * bends * turn)
         x, y = across * np.cos(turn), across * np.sin(turn)
         z = _bed_height(x, y, footprint, radius) + _LOOP_RADIUS * (
-            0.55 + 0.5 * np.sin(5.0 * turn + 1.7 * loop)
+            0.55 + 0.5 * np.sin(0.6 * bends * turn + 1.7 * loop)
         )
         z -= 2.5 * _LOOP_RADIUS * np.clip(1.0 - 9.0 * np.minimum(steps, 1.0 - steps), 0.0, 1.0)
         yield _tube(centre + np.stack([x, y, z], axis=1), _LOOP_RADIUS, loop)
@@ -112,9 +115,9 @@ def _tube(line: Vector, radius: float, seed: int) -> PlacePart:
 
     def place(u: Vector, v: Vector) -> Vector:
         index = np.rint(v * (len(line) - 1)).astype(np.int64)
-        turn = 2.0 * np.pi * u
+        turn = 2.0 * np.pi * (u - 0.25)  # the seam is below
         across = np.cos(turn)[:, None] * aside[index] + np.sin(turn)[:, None] * up[index]
         return line[index] + width[index, None] * across
 
-    part = sheet(place, (0.08, float(along[-1])), (12, len(line) - 1), TISSUES["bowel"], 0.08)
+    part = sheet(place, (0.08, float(along[-1])), (14, len(line) - 1), TISSUES["bowel"], 0.08)
     return part._replace(faces=part.faces[:, ::-1])
