@@ -236,7 +236,7 @@ def test_thin_blood_is_red_thick_blood_is_dark_and_dry_tissue_is_as_before(
         step(dry, first, None)
         without = shoot(dry, parted, change)
         assert np.abs(shoot(wet, parted, change, nothing) - without).max() <= 3
-        steps = np.where(x < -0.01, 12, np.where(x > 0.01, 200, 0))
+        steps = np.where(x < -0.015, 12, np.where(x > 0.015, 200, 0))  # nodes are 10 mm apart
         picture = shoot(wet, parted, change, film_of(steps))
     height, width = picture.shape[:2]
     thin, thick = picture[height // 2, width // 5], picture[height // 2, 4 * width // 5]
