@@ -9,7 +9,15 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, model_validator, with_config
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetPydanticSchema,
+    model_validator,
+    with_config,
+)
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
 from engines.mujoco.object_params import ObjectParams, TableParams
@@ -34,6 +42,11 @@ class _SetupJoints(TypedDict, total=False):
     PSM2: Annotated[SetupPositions, settable("PSM2")]
     PSM3: Annotated[SetupPositions, settable("PSM3")]
     ECM: Annotated[SetupPositions, settable("ECM")]
+
+
+def _in_words(looks: Any) -> Any:
+    """Return looks in words: they were a switch, and older recordings state them so."""
+    return ("plain" if looks else "none") if isinstance(looks, bool) else looks
 
 
 def _validated_as(form: Any) -> GetPydanticSchema:
@@ -89,12 +102,12 @@ class SceneParams(Params):
             " the jaw's command is not above 0"
         ),
     )
-    looks: bool | Literal["plain", "endoscope"] = Field(
-        default=True,
+    looks: Annotated[Literal["none", "plain", "endoscope"], BeforeValidator(_in_words)] = Field(
+        default="plain",
         description=(
-            "give the robot its meshes (true or plain); without, it has collision shapes only. endoscope: as"
-            " true, and cameras draw with light, textures and surroundings as an endoscope sees them, where"
-            " Filament runs (`trocar doctor`)"
+            "none: the robot has collision shapes only; plain: it has its meshes too; endoscope: cameras draw"
+            " with light, textures and surroundings as an endoscope sees them, where Filament runs"
+            " (`trocar doctor`)"
         ),
     )
 

@@ -35,7 +35,7 @@ def asked(**given):
 def test_the_form_offers_devices_and_numbers(table):
     form = fork_form(Recording(table))
     assert form["devices"] == [{"name": "stylus", "kind": "simulated-touch"}]
-    assert {"teleop.scale=1.0", 'teleop.law="pose"', "robot.looks=false"} <= {*form["parameters"]}
+    assert {"teleop.scale=1.0", 'teleop.law="pose"', 'robot.looks="none"'} <= {*form["parameters"]}
 
 
 def test_the_arguments_are_those_of_the_command_line(table):

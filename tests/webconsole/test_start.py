@@ -30,7 +30,8 @@ def test_the_form_has_units_limits_choices_and_the_values_of_the_scenario():
     scale = fields["teleop.scale"]
     assert (scale["kind"], scale["value"], scale["least"], scale["most"]) == ("number", 1.0, 0.0, 1.0)
     assert fields["teleop.law"]["choices"] == ["pose", "velocity"]
-    assert (fields["robot.looks"]["kind"], fields["robot.looks"]["value"]) == ("switch", False)
+    assert (fields["robot.looks"]["kind"], fields["robot.looks"]["value"]) == ("choice", "none")
+    assert (fields["robot.lean"]["kind"], fields["robot.lean"]["value"]) == ("switch", False)
     assert (fields["robot.seed"]["kind"], fields["robot.seed"]["value"]) == ("whole", None)
     assert "robot.model" not in fields, "it has one value only"
     assert form["devices"] == [{"name": "stylus", "kind": "simulated-touch"}]
@@ -43,7 +44,7 @@ def test_the_form_has_units_limits_choices_and_the_values_of_the_scenario():
         {
             "stylus.max_age": ("3 kg", "expected a number in s"),
             "teleop.law": ("/etc/passwd", "expected one of pose, velocity"),
-            "robot.looks": (1, "expected true or false"),
+            "robot.lean": (1, "expected true or false"),
             "robot.seed": (True, "expected a whole number"),
         },
     ],
@@ -67,7 +68,7 @@ def test_a_wrong_value_with_a_colon_is_told_without_the_value(tmp_path):
 
 def test_the_arguments_are_those_of_the_command_line(tmp_path):
     (tmp_path / "table").mkdir()
-    changes = {"teleop.scale": 5e-5, "teleop.law": "velocity", "robot.looks": True, "robot.seed": None}
+    changes = {"teleop.scale": 5e-5, "teleop.law": "velocity", "robot.lean": True, "robot.seed": None}
     order = asked(changes=changes, lead=["stylus"], pace="realtime")
     assert start_arguments(order, tmp_path) == [
         "run",
@@ -75,7 +76,7 @@ def test_the_arguments_are_those_of_the_command_line(tmp_path):
         "--set=participants.stylus={kind: browser, host: remote}",
         "--set=teleop.scale=5e-05",
         '--set=teleop.law="velocity"',
-        "--set=robot.looks=true",
+        "--set=robot.lean=true",
         "--set=robot.seed=null",
         "--pace",
         "realtime",

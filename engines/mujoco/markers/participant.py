@@ -96,7 +96,7 @@ class Markers(Stepped):
             raise MissingExtraError(
                 f"participant '{self.name}' (kind markers)", "mujoco", error.name or "mujoco"
             ) from error
-        self._model: mujoco.MjModel = build(self.params.model_copy(update={"looks": False}))
+        self._model: mujoco.MjModel = build(self.params.model_copy(update={"looks": "none"}))
         self._data = mujoco.MjData(self._model)
         self._poses = SceneFrames(self.params, self._model)
         self._store = MarkerStore(self._frames, self._poses.fixed, tuple(self.params.objects))

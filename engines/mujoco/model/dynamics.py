@@ -123,5 +123,5 @@ def _scene_of(arm: CartArm, tool: str, own: Path | None, base: Mapping[str, Any]
     if own is not None:
         what["dynamics"] = own
     return SceneParams.model_validate(
-        {"arms": {arm: what}, "looks": False, **stand}, context=Files(Path.cwd()).context
+        {"arms": {arm: what}, "looks": "none", **stand}, context=Files(Path.cwd()).context
     )

@@ -37,7 +37,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
     for name, params in scene.arms.items():
         pose = mounts.get(name, params.pose)
-        shapes.add_arm(result, name, params, arm.add(result, name, params, pose), seen=bool(scene.looks))
+        shapes.add_arm(result, name, params, arm.add(result, name, params, pose), seen=scene.looks != "none")
     if scene.table is not None:
         objects.add_table(result, scene.table)
     for name, fixture in scene.fixtures.items():

@@ -28,7 +28,7 @@ def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
     Returns the poses of the arms' base frames in the world, shape (4, 4).
     """
     cart = spec.worldbody.add_body(name=CART)
-    shapes.add(spec, CART, CART, {CART: (cart, np.eye(4))}, seen=bool(scene.looks))
+    shapes.add(spec, CART, CART, {CART: (cart, np.eye(4))}, seen=scene.looks != "none")
     _weigh(cart, setup_joints.CART_MASS)
     mounts: dict[CartArm, Vector] = {}
     for arm in scene.arms:
@@ -41,7 +41,7 @@ def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
                 name=f"SUJ/{arm}/{joint}", **pose_attributes(inverse_transform(above) @ pose)
             )
             bodies[joint], above = (body, zero), pose
-        shapes.add(spec, f"suj/{arm}", f"SUJ/{arm}", bodies, seen=bool(scene.looks))
+        shapes.add(spec, f"suj/{arm}", f"SUJ/{arm}", bodies, seen=scene.looks != "none")
         for joint, mass in zip(setup_joints.JOINT_NAMES, setup_joints.MASSES[arm], strict=True):
             _weigh(bodies[joint][0], mass)
     return mounts

@@ -21,7 +21,7 @@ class Drawing:
     """What is missing and how to mend it, as the end of a sentence about a participant; empty: nothing."""
 
 
-def find_drawing(looks: bool | str) -> Drawing:
+def find_drawing(looks: str) -> Drawing:
     """Return what draws a scene with `looks`, as a scene's parameters state them."""
     shortcoming = ""
     if looks == "endoscope":

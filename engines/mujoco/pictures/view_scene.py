@@ -32,7 +32,7 @@ class ViewScene:
     surfaces: Mapping[str, Rgb] = {}
 
     def __init__(self, params: MujocoParams) -> None:
-        scene = params.model_copy(update={"looks": True})
+        scene = params.model_copy(update={"looks": "plain"})
         self._arms = scene.arms
         self._model = model.build(scene)
         self._data = mujoco.MjData(self._model)

@@ -98,12 +98,13 @@ class FilamentRenderer:
         ]
         self._place = DrawnPlace(self._context, self._scene, place, noise)
         self._solids = DrawnSolids(self._context, self._scene)
-        self._pixels = np.zeros((camera.height, 2 * camera.width, 3), np.uint8)
+        # with a fourth byte: without it the driver's pixels are packed one by one, 7 ms for 2 x 640 x 480
+        self._pixels = np.zeros((camera.height, 2 * camera.width, 4), np.uint8)
         self._target = self._context.create_render_target(
             mjrf.RenderTargetConfig(
                 width=2 * camera.width,
                 height=camera.height,
-                color_format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8,
+                color_format=mjrf.PixelFormat.PIXEL_FORMAT_RGBA8,
                 depth_format=mjrf.PixelFormat.PIXEL_FORMAT_DEPTH32F,
             )
         )
@@ -138,7 +139,7 @@ class FilamentRenderer:
             )
             for eye in (0, 1)
         ]
-        left, right = self._pixels[:, :width], self._pixels[:, width:]
+        left, right = self._pixels[:, :width, :3], self._pixels[:, width:, :3]
         for _ in range(1 if self._control is None or self._is_lit else _TRIES):
             self._context.wait_for_frame(self._context.render(requests, [self._read]))
             if self._control is None or not self._adjust_light(self._control, left):

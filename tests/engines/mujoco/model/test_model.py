@@ -201,7 +201,7 @@ def test_sensors_lie_in_the_order_that_is_told():
 
 
 def test_looks_neither_weigh_nor_collide():
-    bare = build(CART.model_copy(update={"looks": False}))
+    bare = build(CART.model_copy(update={"looks": "none"}))
     assert CART_MODEL.ngeom > bare.ngeom
     assert np.array_equal(CART_MODEL.body_mass, bare.body_mass)
     seen = (CART_MODEL.geom_contype == 0) & (CART_MODEL.geom_conaffinity == 0)
