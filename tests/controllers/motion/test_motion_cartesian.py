@@ -418,5 +418,6 @@ def test_a_twist_moves_the_tip_as_it_says(shares):
     assert np.allclose(
         np.concatenate([after[:3, 3] - before[:3, 3], spin]) / 1e-3,
         twist,
-        atol=0.02 * np.abs(twist).max() + 1e-9,
+        atol=0.02 * float(np.linalg.norm(twist))
+        + 1e-9,  # of 30 ms in which the joints turn evenly, not the tip
     )
