@@ -374,6 +374,16 @@ def test_a_page_leads_an_arm_and_lets_go(browser, session):
     assert run.poll() is None
 
 
+def connect_over_cdp(browser, address):
+    """Return the browser at an address; None if it does not answer: one that still starts may never do."""
+    from playwright.sync_api import TimeoutError as Silence
+
+    try:
+        return browser.browser_type.connect_over_cdp(address, timeout=15_000)
+    except Silence:
+        return None
+
+
 @contextmanager
 def own_browser(browser, directory):
     """Yield a browser in processes of its own, and what sends signals to all of them."""
@@ -387,7 +397,8 @@ def own_browser(browser, directory):
             port = directory / "DevToolsActivePort"
             until(lambda: port.exists() and port.read_text())
             address = f"http://127.0.0.1:{port.read_text().split()[0]}"
-            yield browser.browser_type.connect_over_cdp(address), lambda one: os.killpg(process.pid, one)
+            own = until(lambda: connect_over_cdp(browser, address))
+            yield own, lambda one: os.killpg(process.pid, one)
         finally:
             os.killpg(process.pid, signal.SIGKILL)
 
