@@ -39,7 +39,7 @@ def test_a_file_cut_anywhere_gives_back_a_prefix(session: Path, tmp_path: Path, 
     recording = Recording(saved.path)
     messages = list(recording.messages())
     assert messages == list(Recording(session).messages())[: saved.messages]
-    assert saved.end_ns == max(m.time_ns for m in messages)
+    assert saved.end_ns == max((m.time_ns for m in messages), default=0)  # the first chunk may be cut
     assert recording.attachments == ATTACHMENTS
     assert recording.scenario().name == "palpation"
     with AnyReader([saved.path]) as reader:
