@@ -27,6 +27,7 @@ from schemas.ros import Header, Point, Vector3
 
 __all__ = [
     "AckMessage",
+    "ActionChunk",
     "ContactModel",
     "ContactPlane",
     "CouplingEnergy",
@@ -41,6 +42,7 @@ __all__ = [
     "Latency",
     "ObserverStatus",
     "ParticipantStatus",
+    "PolicyObservation",
     "Profile",
     "ProfileRow",
     "RuleScore",
@@ -285,6 +287,41 @@ class TaskEvent(Message):
     value: Float64 = 0.0
     """Height of a lift or a drop, or impulse of a collision, in `unit`."""
     unit: String = ""
+
+
+class PolicyObservation(Message):
+    """The readings with which a policy is asked for actions; pictures go beside."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/PolicyObservation"
+    header: Header
+    """Simulated time of the readings."""
+    number: UInt32
+    """Number of the observation, from 1."""
+    state: Float64Array
+    """State in the layout of the contract."""
+    tips: Float64Array
+    """Pose of each arm's tip (x, y, z, qx, qy, qz, qw), one after the other, m."""
+
+
+class ActionChunk(Message):
+    """An answer of a policy: rows of actions in the layout of the contract, or a fault."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ActionChunk"
+    header: Header
+    """Simulated time of the observation."""
+    number: UInt32
+    """Number of the observation."""
+    width: UInt32
+    """Numbers in a row."""
+    actions: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Rows, one after the other; row i is to be reached i + 1 periods of the contract after the observation.
+    """
+    tips: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Poses of the tips at the observation."""
+    fault: String = ""
+    """Why there are no actions; empty: there are."""
+    inference_ns: Int64 = 0
+    """Wall time from question to answer; for information only."""
 
 
 class ScoreValue(Message):

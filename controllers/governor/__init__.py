@@ -1,0 +1,1 @@
+"""The governor between a policy and an arm."""

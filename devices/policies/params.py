@@ -1,0 +1,75 @@
+"""Parameters of a policy in a session."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from devices.policies.policy import BACKENDS, check_backend
+from hub.participant import Params
+from robots.dvrk.crtk import Mounting
+from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.setup_joints import CartArm
+from robots.policies.contract import Contract
+from robots.policies.terms import Terms
+from schemas.quantity import Duration
+
+__all__ = ["PolicyParams"]
+
+
+class _Arms(Params):
+    """The arms of the scene, for the names of their joints and frames."""
+
+    PSM1: MountedPsm | None = None
+    PSM2: MountedPsm | None = None
+    PSM3: MountedPsm | None = None
+    ECM: MountedEcm | None = None
+
+    @property
+    def present_arms(self) -> Mapping[CartArm, MountedPsm | MountedEcm]:
+        """Arms by name."""
+        named: dict[CartArm, MountedPsm | MountedEcm | None] = {
+            "PSM1": self.PSM1,
+            "PSM2": self.PSM2,
+            "PSM3": self.PSM3,
+            "ECM": self.ECM,
+        }
+        return {name: arm for name, arm in named.items() if arm is not None}
+
+
+class PolicyParams(Params):
+    """Where the policy is, and the contract with it."""
+
+    native_code = ("backend", "python")
+
+    arms: _Arms
+    mounting: Mounting = "free"
+    contract: Contract = Contract()
+    backend: Annotated[str, AfterValidator(check_backend)] = Field(
+        max_length=1000, description="; ".join(BACKENDS.values())
+    )
+    python: str = Field(
+        default="",
+        max_length=1000,
+        description="interpreter of a policy in a process of its own, such as /opt/lerobot/bin/python;"
+        " default: Trocar's",
+    )
+    time: Literal["simulated", "wall"] = Field(
+        default="simulated",
+        description=(
+            "simulated: the session waits for every answer; wall: answers enter when they come, as on a robot"
+        ),
+    )
+    timeout: Duration = Field(
+        default=10_000_000_000,
+        gt=0,
+        description="longest wait for the start, and for an answer, in wall time",
+    )
+    episode: int = Field(default=0, ge=0, lt=2**31, description="number sent with the reset at the start")
+
+    @property
+    def terms(self) -> Terms:
+        """The contract with all names."""
+        return Terms.of(self.contract, self.arms.present_arms, self.mounting)
