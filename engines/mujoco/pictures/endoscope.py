@@ -19,6 +19,7 @@ from engines.mujoco.markers.store import shown_markers
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.drawing import Drawing, find_drawing
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
+from engines.mujoco.pictures.lens import NO_DISTORTION, Distortion
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.ports import position_count
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, event_out, signal_in, state_hash
@@ -138,7 +139,7 @@ class Endoscope(Stepped):
         scene = self._scene or self._build_scene()
         header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
         markers = () if self._shown is None else tuple(shown_markers(self._shown))
-        pictures = scene.draw(self._positions, markers)
+        pictures = scene.draw(self._positions, markers, t)
         return self._outputs(
             {
                 f"{eye}/{name}": message
@@ -149,7 +150,7 @@ class Endoscope(Stepped):
 
     def _messages(self, eye: Eye, pixels: NDArray[np.uint8], header: Header) -> Iterator[tuple[str, Message]]:
         params = self.params
-        yield "camera_info", camera_info(params.camera, eye, header)
+        yield "camera_info", camera_info(params.camera, eye, header, params.distortion)
         if params.images != "compressed":
             yield (
                 "image_raw",
@@ -226,14 +227,16 @@ class Endoscope(Stepped):
             self._scene = None
 
 
-def camera_info(camera: StereoCamera, eye: Eye, header: Header) -> CameraInfo:
+def camera_info(
+    camera: StereoCamera, eye: Eye, header: Header, distortion: Distortion = NO_DISTORTION
+) -> CameraInfo:
     """Return the calibration of one camera of a rectified stereo pair, in the left camera's optical frame."""
     return CameraInfo(
         header=header,
         height=camera.height,
         width=camera.width,
         distortion_model="plumb_bob",
-        d=np.zeros(5),
+        d=np.array(distortion),
         k=camera.intrinsics().reshape(-1),
         r=np.eye(3).reshape(-1),
         p=camera.projection(eye).reshape(-1),

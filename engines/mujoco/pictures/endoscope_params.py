@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import SceneParams
+from engines.mujoco.pictures.lens import NO_DISTORTION, Distortion, check_distortion
 from engines.mujoco.pictures.sensor_params import SensorParams
 from engines.mujoco.pictures.skin_params import SkinParams
 from hub.participant import Params
@@ -49,6 +50,13 @@ class EndoscopeParams(SceneParams):
     )
     field_of_view: Angle = Field(default=endoscope.FIELD_OF_VIEW, gt=0.0, lt=3.0, description="horizontal")
     baseline: Length = Field(default=endoscope.BASELINE, ge=0.0, description="distance of the two cameras")
+    distortion: Distortion = Field(
+        default=NO_DISTORTION,
+        description=(
+            "of the lens, k1, k2, p1, p2 and k3 of the model `plumb_bob`, published in `camera_info`;"
+            " default: none, as after rectification"
+        ),
+    )
     near: Length = Field(default=endoscope.NEAR, gt=0.0, description="anything nearer is invisible")
     far: Length | None = Field(
         default=None,
@@ -125,4 +133,5 @@ class EndoscopeParams(SceneParams):
     def _sees_something(self) -> Self:
         if self.far is not None and self.far <= self.near:
             raise ValueError(f"far ({self.far:g} m) must be beyond near ({self.near:g} m)")
+        check_distortion(self.camera, self.distortion)
         return self

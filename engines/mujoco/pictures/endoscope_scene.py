@@ -17,6 +17,7 @@ from engines.mujoco.model import place as place_arms
 from engines.mujoco.model import spec
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.pictures.filament.backend import Backend
+from engines.mujoco.pictures.lens import Lens
 from engines.mujoco.pictures.skins import Skins
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.stereo import StereoRenderer
@@ -29,6 +30,7 @@ from schemas.vectors import Vector
 
 if TYPE_CHECKING:
     from engines.mujoco.pictures.filament.renderer import FilamentRenderer
+    from engines.mujoco.pictures.filament.sensor import Sensor
 
 __all__ = ["EndoscopeScene", "add_sky", "look_at"]
 
@@ -76,10 +78,12 @@ class EndoscopeScene:
             np.linalg.norm(self._mounting[:3, 3] - self._model.stat.center) + 2.0 * self._model.stat.extent
         )
         clip = params.near, far
+        self._lens = Lens(params.camera, params.distortion)
+        self._sensor: Sensor | None = None
         self._renderer = (
             self._filament(params, clip, engine, bodies)
             if isinstance(engine, Backend)
-            else StereoRenderer(self._model, params.camera, clip, engine, shadows=bool(params.shadows))
+            else StereoRenderer(self._model, self._lens.drawn, clip, engine, shadows=bool(params.shadows))
         )
 
     def _filament(
@@ -90,17 +94,25 @@ class EndoscopeScene:
         bodies: Mapping[str, SoftBody],
     ) -> FilamentRenderer:
         from engines.mujoco.pictures.filament.renderer import FilamentRenderer
+        from engines.mujoco.pictures.filament.sensor import Sensor
         from engines.mujoco.pictures.surroundings import make_place
 
+        self._sensor = Sensor(params.sensor, params.width, params.height)
         place_arms(self._model, self._data, params.arms)
         mujoco.mj_kinematics(self._model, self._data)
         place = make_place(params, self._model, bodies, self._pose()[:3, 3])
-        return FilamentRenderer(self._model, params, clip, backend, bodies, place)
+        return FilamentRenderer(self._model, params, self._lens.drawn, clip, backend, bodies, place)
 
     def draw(
-        self, positions: Vector, markers: Sequence[ShownMarker] = ()
+        self, positions: Vector, markers: Sequence[ShownMarker] = (), time_ns: int = 0
     ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """Return both pictures, shape (height, width, 3), at `positions`, shape (nq,), with `markers`."""
+        """Return both pictures, shape (height, width, 3), RGB.
+
+        Args:
+            positions: of the joints, shape (nq,).
+            markers: to be drawn.
+            time_ns: simulated time, by which noise and what is on the lens differ.
+        """
         model, data = self._model, self._data
         data.qpos[:] = positions
         mujoco.mj_kinematics(model, data)
@@ -114,7 +126,10 @@ class EndoscopeScene:
             for marker in markers
             for solid in solids(marker, lambda frame: self._frames.pose(frame, data), pose, self._shapes)
         ]
-        return self._renderer.render(data, pose, shapes)
+        left, right = (self._lens.distort(drawn) for drawn in self._renderer.render(data, pose, shapes))
+        if self._sensor is None:
+            return left, right
+        return self._sensor.expose(left, time_ns, 0), self._sensor.expose(right, time_ns, 1)
 
     def _shapes(self, thing: str) -> list[Shape]:
         """Return the shapes of an object that can be seen and are no meshes, in its frame."""

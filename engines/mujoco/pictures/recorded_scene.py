@@ -44,7 +44,7 @@ _REACH = 0.1
 """Distance from the subject within which a tip belongs to the subject, m."""
 _STATES = 5
 """Most states of the robot that count for the place of the overview."""
-_LENS = ("field_of_view", "baseline", "near", "far")
+_LENS = ("field_of_view", "baseline", "near", "far", "distortion", "sensor", "place")
 _OVERSAMPLING = 2
 """Pixels drawn for each one of the picture, along either side: smooths edges."""
 _FINE_PIXELS = 1024
@@ -212,9 +212,8 @@ class RecordedScene:
                             None if change is None else self._decoded(SurfaceChange, change),
                             None if film is None else self._decoded(SurfaceFilm, film),
                         )
-                yield scene.draw(
-                    self._positions(positions.at(time_ns), time_ns), self._shown(markers, time_ns)
-                )
+                positioned = self._positions(positions.at(time_ns), time_ns)
+                yield scene.draw(positioned, self._shown(markers, time_ns), time_ns)
         finally:
             scene.close()
 

@@ -20,11 +20,13 @@ _LEAST_RADIUS, _LEAST_HEIGHT = 0.15, 0.13
 """Least radius and height of the dome, m."""
 _CLEARANCE = 1.3
 """The dome is this many times as far away as the camera."""
-_BEDDED = 0.003
-"""Depth by which the lowest point of an organ is in the bed, m."""
+_BEDDED, _BEDDED_SHARE = 0.003, 0.15
+"""Depth by which the lowest point of an organ is in the bed, m, at most this share of the organ's height."""
 _HOLLOW = 0.012
 """Free width around organs before the bed rises, m."""
 _LOOP_RADIUS, _LOOPS = 0.0125, 3
+_NEAREST_LOOP = 0.045
+"""Least distance of a loop from the middle of the organs, m: a small organ lies alone on the bed."""
 _BEND = 0.065
 """Way along a loop from bend to bend, m: tighter ones would fold it into itself."""
 _CLEAR_ANGLE = 1.05
@@ -33,7 +35,8 @@ _CLEAR_ANGLE = 1.05
 
 def make_abdomen(low: Vector, high: Vector, camera: Vector | None) -> list[PlacePart]:
     """Return the surroundings of organs in a box from `low` to `high`, m; `camera`: a lens inside."""
-    centre = np.array([*(0.5 * (low + high))[:2], low[2] + _BEDDED])
+    bedded = min(_BEDDED, _BEDDED_SHARE * float(high[2] - low[2]))
+    centre = np.array([*(0.5 * (low + high))[:2], low[2] + bedded])
     footprint = 0.5 * float(np.linalg.norm((high - low)[:2])) + _HOLLOW
     away = np.zeros(3) if camera is None else camera - centre
     reach = float(np.linalg.norm(away[:2]))
@@ -51,7 +54,7 @@ def _bed_height(x: Vector, y: Vector, footprint: float, radius: float) -> Vector
     """Return the height of the bed over its middle, m."""
     outside = np.clip((np.hypot(x, y) - footprint) / (radius - footprint), 0.0, 1.0)
     waves = 0.004 * ripple(x, y, 0.045, 1) + 0.0015 * ripple(x, y, 0.014, 2)
-    return 0.045 * outside**1.5 + waves * (0.25 + 0.75 * np.minimum(4.0 * outside, 1.0)) - 0.001
+    return 0.045 * outside**1.5 + waves * np.minimum(0.1 + 4.0 * outside, 1.0) - 0.001
 
 
 def _bed(centre: Vector, footprint: float, radius: float) -> PlacePart:
@@ -84,11 +87,11 @@ def _wall(centre: Vector, radius: float, height: float) -> PlacePart:
 def _loops(centre: Vector, footprint: float, radius: float, towards: float) -> Iterator[PlacePart]:
     """Loops of small bowel beside and behind the organs, as seen from the direction `towards`, rad."""
     for loop in range(_LOOPS):
-        distance = footprint + (1.2 + 1.75 * loop) * _LOOP_RADIUS
+        distance = max(footprint, _NEAREST_LOOP) + (1.2 + 1.75 * loop) * _LOOP_RADIUS
         if distance > 0.95 * radius:
             return
         start, end = towards + _CLEAR_ANGLE, towards + 2.0 * np.pi - _CLEAR_ANGLE
-        steps = np.linspace(0.0, 1.0, 90)
+        steps = np.linspace(0.0, 1.0, 150)
         turn = start + (end - start) * steps
         bends = max(3, round(2.0 * np.pi * distance / _BEND))
         across = distance + 0.007 * np.sin(bends * turn + 2.0 * loop) + 0.003 * np.sin(1.9 * bends * turn)
@@ -119,5 +122,5 @@ def _tube(line: Vector, radius: float, seed: int) -> PlacePart:
         across = np.cos(turn)[:, None] * aside[index] + np.sin(turn)[:, None] * up[index]
         return line[index] + width[index, None] * across
 
-    part = sheet(place, (0.08, float(along[-1])), (14, len(line) - 1), TISSUES["bowel"], 0.08)
+    part = sheet(place, (0.08, float(along[-1])), (24, len(line) - 1), TISSUES["bowel"], 0.08)
     return part._replace(faces=part.faces[:, ::-1])

@@ -6,12 +6,15 @@ texel knows its place in space, and noise in space has the same value on both si
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from math import ceil, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.mujoco.textures.noise import Noise, Points
+from engines.mujoco.textures.noise import Noise, Points, Values
 from engines.mujoco.textures.surface import Maps, Recipe, Surface, make_maps
 from schemas.vectors import Vector
 
@@ -68,25 +71,56 @@ class Atlas:
 
     def paint(self, recipe: Recipe, noise: Noise) -> Maps:
         """Return the maps of the whole surface."""
-        index, points = self._texels()
-        found = recipe(noise, points)
-        count = self._pixels**2
-        nearest = _spread(index, count, self._pixels)
+        texels = self._texels()
+        found = recipe(noise, self._places(texels))
         return make_maps(
-            Surface(*(values[nearest] for values in found)), (self._pixels, self._pixels), self.texel
+            Surface(*(values[texels.nearest] for values in found)), (self._pixels, self._pixels), self.texel
         )
 
-    def _texels(self) -> tuple[Indices, Points]:
-        """Return the texels inside triangles, as numbers row by row, and their places, shape (k, 3), m."""
+    def at_texels(self, values: Callable[[Points], Values]) -> Values:
+        """Return values at the places of all texels, shape (pixels^2,)."""
+        texels = self._texels()
+        return values(self._places(texels))[texels.nearest]
+
+    def interpolate(self, values: Vector) -> Values:
+        """Return values at all texels, shape (pixels^2,), for values at the nodes, shape (n,)."""
+        texels = self._lookup
+        corners = values.astype(np.float32)[self._triangles]
+        return np.einsum("kj,kj->k", texels.weights, corners[texels.triangle])[texels.nearest]
+
+    @cached_property
+    def _lookup(self) -> _Texels:
+        return self._texels()
+
+    def _places(self, texels: _Texels) -> Points:
+        corners = self._rest.astype(np.float32)[self._triangles]
+        return np.einsum("kj,kji->ki", texels.weights, corners[texels.triangle])
+
+    def _texels(self) -> _Texels:
         corners = self._rest[self._triangles]
         flat = self.uv(corners.reshape(-1, 3), self.chart.repeat(3)).astype(np.float64) * self._pixels
         numbers: list[Indices] = []
-        places: list[Points] = []
-        for triangle, corner in zip(flat.reshape(-1, 3, 2) - 0.5, corners, strict=True):
-            row, column, weights = _filled(triangle)
+        weights: list[NDArray[np.float32]] = []
+        for triangle in flat.reshape(-1, 3, 2) - 0.5:
+            row, column, weight = _filled(triangle)
             numbers.append(row * self._pixels + column)
-            places.append((weights @ corner).astype(np.float32))
-        return np.concatenate(numbers), np.concatenate(places)
+            weights.append(weight.astype(np.float32))
+        return _Texels(
+            np.repeat(np.arange(len(corners), dtype=np.int32), [len(one) for one in numbers]),
+            np.concatenate(weights),
+            _spread(np.concatenate(numbers), self._pixels**2, self._pixels),
+        )
+
+
+class _Texels(NamedTuple):
+    """The texels inside triangles."""
+
+    triangle: NDArray[np.int32]
+    """Triangle of each, shape (k,)."""
+    weights: NDArray[np.float32]
+    """Weights of its corners, shape (k, 3)."""
+    nearest: NDArray[np.int32]
+    """For every texel of the picture the nearest of these, shape (pixels^2,)."""
 
 
 def _filled(triangle: Vector) -> tuple[Indices, Indices, Vector]:
@@ -166,10 +200,10 @@ def _pack(extents: Vector, pixels: int) -> tuple[float, NDArray[np.float64]]:
         texel /= _SHRINK
 
 
-def _spread(index: Indices, count: int, width: int) -> Indices:
+def _spread(index: Indices, count: int, width: int) -> NDArray[np.int32]:
     """Return for each of `count` texels the nearest texel of `index` as a place in it; far from all: 0."""
-    nearest = np.full(count, -1)
-    nearest[index] = np.arange(len(index))
+    nearest = np.full(count, -1, np.int32)
+    nearest[index] = np.arange(len(index), dtype=np.int32)
     for _ in range(ceil(_MARGIN)):
         for step in (1, -1, width, -width):
             moved = np.roll(nearest, step)

@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CELLS", "Noise", "Points", "Values"]
+__all__ = ["CELLS", "SEED", "Noise", "Points", "Values"]
 
 Points = NDArray[np.floating[Any]]
 """Shape (n, 3), m."""
 Values = NDArray[np.floating[Any]]
 """Shape (n,)."""
 
+SEED = 3
+"""Seed of the noise behind all textures."""
 CELLS = 64
 """Cells along each axis after which the noise repeats; a power of two."""
 _BLUR = 0.8

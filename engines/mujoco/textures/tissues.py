@@ -45,11 +45,11 @@ def _wet(noise: Noise, points: Points, mean: float, channel: int = 90) -> Values
 def _liver(noise: Noise, points: Points) -> Surface:
     broad, lobules = noise.octaves(points, 14.0 * _MM, 0, 2), noise.at(points, 0.55 * _MM, 5)
     middle = noise.at(points, 2.5 * _MM, 6)
-    colour = blend(_base(points, (0.48, 0.235, 0.195)), (0.37, 0.16, 0.14), 0.5 + 0.5 * broad)
-    colour = blend(colour, (0.60, 0.37, 0.30), 0.20 * smooth_step(noise.at(points, 6.0 * _MM, 7), 0.5, 1.8))
+    colour = blend(_base(points, (0.50, 0.235, 0.195)), (0.41, 0.175, 0.15), 0.5 + 0.35 * broad)
+    colour = blend(colour, (0.60, 0.37, 0.30), 0.15 * smooth_step(noise.at(points, 6.0 * _MM, 7), 0.5, 1.8))
     colour = _mottled(colour, 0.07 * lobules, 0.05 * middle)
     height = 0.05 * _MM * middle + 0.010 * _MM * lobules + 0.25 * _MM * noise.at(points, 7.0 * _MM, 8)
-    return Surface(colour, height, _wet(noise, points, 0.24))
+    return Surface(colour, height, _wet(noise, points, 0.16))
 
 
 def _kidney(noise: Noise, points: Points) -> Surface:
@@ -57,7 +57,7 @@ def _kidney(noise: Noise, points: Points) -> Surface:
     colour = blend(_base(points, (0.56, 0.29, 0.25)), (0.43, 0.19, 0.17), 0.5 + 0.5 * broad)
     colour = blend(colour, _VESSEL, 0.35 * _vessels(noise, points, 7.0 * _MM, 0.12, 10, 0.5))
     height = 0.2 * _MM * noise.at(points, 6.0 * _MM, 8) + 0.015 * _MM * fine
-    bare = Surface(_mottled(colour, 0.05 * fine), height, _wet(noise, points, 0.27))
+    bare = Surface(_mottled(colour, 0.05 * fine), height, _wet(noise, points, 0.19))
     return _with_fat(noise, points, bare, smooth_step(noise.octaves(points, 16.0 * _MM, 20, 2), 1.0, 1.4))
 
 
@@ -69,16 +69,17 @@ def _gallbladder(noise: Noise, points: Points) -> Surface:
     colour = blend(colour, _VESSEL, 0.75 * _vessels(noise, points, 7.0 * _MM, 0.07, 10, 0.65))
     colour = blend(colour, _VESSEL, 0.45 * _vessels(noise, points, 2.6 * _MM, 0.13, 30, 0.5))
     height = 0.15 * _MM * noise.at(points, 5.0 * _MM, 8) + 0.012 * _MM * fine + 0.5 * _MM * fat
-    return Surface(_mottled(colour, 0.04 * fine), height, _wet(noise, points, 0.2))
+    return Surface(_mottled(colour, 0.04 * fine), height, _wet(noise, points, 0.14))
 
 
 def _bowel(noise: Noise, points: Points) -> Surface:
     broad, fine = noise.octaves(points, 10.0 * _MM, 0, 3), noise.at(points, 0.6 * _MM, 5)
-    colour = blend(_base(points, (0.84, 0.55, 0.48)), (0.74, 0.40, 0.36), 0.4 + 0.5 * broad)
-    colour = blend(colour, _VESSEL, 0.60 * _vessels(noise, points, 8.0 * _MM, 0.055, 10, 0.65))
-    colour = blend(colour, _VEIN, 0.35 * _vessels(noise, points, 3.0 * _MM, 0.10, 30, 0.55))
-    height = 0.18 * _MM * noise.at(points, 4.0 * _MM, 8) + 0.015 * _MM * fine
-    return Surface(_mottled(colour, 0.04 * fine), height, _wet(noise, points, 0.22))
+    colour = blend(_base(points, (0.88, 0.61, 0.54)), (0.80, 0.46, 0.41), 0.35 + 0.45 * broad)
+    across = points * np.array([0.4, 1.0, 1.0], np.float32)
+    colour = blend(colour, _VESSEL, 0.55 * _vessels(noise, across, 6.0 * _MM, 0.05, 10, 0.6))
+    colour = blend(colour, _VEIN, 0.35 * _vessels(noise, across, 2.6 * _MM, 0.08, 30, 0.6))
+    height = 0.12 * _MM * noise.at(points, 4.0 * _MM, 8) + 0.01 * _MM * fine
+    return Surface(_mottled(colour, 0.03 * fine), height, _wet(noise, points, 0.15))
 
 
 def _colon(noise: Noise, points: Points) -> Surface:
@@ -95,18 +96,19 @@ def _with_fat(noise: Noise, points: Points, bare: Surface, share: Values) -> Sur
 
 def _fat(noise: Noise, points: Points) -> Surface:
     bends = np.stack([noise.at(points, 2.5 * _MM, 40 + k) for k in range(3)], axis=1)
-    depth, number = noise.lobules(points + np.float32(0.8 * _MM) * bends, 4.0 * _MM)
+    depth, number = noise.lobules(points + np.float32(0.7 * _MM) * bends, 4.5 * _MM)
     lobe, _ = noise.lobules(points + np.float32(3.0 * _MM) * bends, 17.0 * _MM)
-    fold = smooth_step(lobe, 0.0, 0.4)
-    full, broad = smooth_step(depth, 0.0, 0.45), noise.octaves(points, 12.0 * _MM, 6, 2)
-    fine = noise.at(points, 0.6 * _MM, 5)
-    colour = blend(_base(points, (0.85, 0.64, 0.40)), (0.93, 0.79, 0.53), 0.35 + 0.65 * full)
-    colour = blend(colour, (0.96, 0.87, 0.68), 1.2 * (number - 0.25) * full)
-    colour = blend(colour, (0.86, 0.53, 0.42), 0.35 * smooth_step(broad, 0.3, 1.6))
-    colour = blend(colour, (0.80, 0.50, 0.34), 0.55 * (1.0 - fold))
-    colour = blend(colour, _VESSEL, 0.5 * _vessels(noise, points, 9.0 * _MM, 0.05, 10, 0.45))
-    height = 0.22 * _MM * full + 0.7 * _MM * fold + 0.03 * _MM * fine
-    return Surface(_mottled(colour, 0.025 * fine), height, _wet(noise, points, 0.26))
+    fold = smooth_step(lobe, 0.0, 0.6)
+    full, broad = smooth_step(depth, -0.1, 0.6), noise.octaves(points, 12.0 * _MM, 6, 2)
+    fine = noise.at(points, 0.5 * _MM, 5)
+    colour = blend(_base(points, (0.88, 0.68, 0.43)), (0.95, 0.80, 0.54), 0.35 + 0.65 * full)
+    colour = blend(colour, (0.97, 0.88, 0.68), 1.0 * (number - 0.25) * full)
+    colour = blend(colour, (0.90, 0.58, 0.46), 0.4 * smooth_step(broad, 0.2, 1.6))
+    colour = blend(colour, (0.86, 0.56, 0.40), 0.45 * (1.0 - fold))
+    colour = blend(colour, _VESSEL, 0.45 * _vessels(noise, points, 9.0 * _MM, 0.035, 10, 0.4))
+    colour = blend(colour, _VESSEL, 0.25 * _vessels(noise, points, 3.0 * _MM, 0.06, 30, 0.35))
+    height = 0.25 * _MM * full + 0.6 * _MM * fold + 0.012 * _MM * fine
+    return Surface(_mottled(colour, 0.02 * fine), height, _wet(noise, points, 0.19))
 
 
 def _peritoneum(noise: Noise, points: Points) -> Surface:
@@ -117,7 +119,7 @@ def _peritoneum(noise: Noise, points: Points) -> Surface:
     colour = blend(colour, _VESSEL, 0.70 * _vessels(noise, points, 14.0 * _MM, 0.05, 10, 0.7))
     colour = blend(colour, _VEIN, 0.40 * _vessels(noise, points, 5.0 * _MM, 0.08, 30, 0.5))
     height = 0.3 * _MM * noise.at(points, 6.0 * _MM, 8) + 0.03 * _MM * fine
-    return Surface(_mottled(colour, 0.04 * fine), height, _wet(noise, points, 0.3))
+    return Surface(_mottled(colour, 0.04 * fine), height, _wet(noise, points, 0.2))
 
 
 def _muscle(noise: Noise, points: Points) -> Surface:
@@ -126,7 +128,7 @@ def _muscle(noise: Noise, points: Points) -> Surface:
     colour = blend(_base(points, (0.62, 0.22, 0.18)), (0.45, 0.12, 0.11), 0.5 + 0.45 * bundles)
     colour = blend(colour, (0.85, 0.68, 0.58), 0.4 * noise.lines(along, 2.6 * _MM, 0.12, 2))
     height = 0.06 * _MM * fibres + 0.15 * _MM * bundles
-    return Surface(_mottled(colour, 0.07 * fibres), height, _wet(noise, points, 0.26))
+    return Surface(_mottled(colour, 0.07 * fibres), height, _wet(noise, points, 0.19))
 
 
 def _tissue(noise: Noise, points: Points) -> Surface:
@@ -135,7 +137,7 @@ def _tissue(noise: Noise, points: Points) -> Surface:
     colour = blend(colour, _VESSEL, 0.65 * _vessels(noise, points, 8.0 * _MM, 0.06, 10, 0.65))
     colour = blend(colour, _VEIN, 0.40 * _vessels(noise, points, 3.0 * _MM, 0.10, 30, 0.5))
     height = 0.2 * _MM * noise.at(points, 4.5 * _MM, 8) + 0.02 * _MM * fine
-    return Surface(_mottled(colour, 0.05 * fine), height, _wet(noise, points, 0.23))
+    return Surface(_mottled(colour, 0.05 * fine), height, _wet(noise, points, 0.16))
 
 
 def _skin(noise: Noise, points: Points) -> Surface:

@@ -6,7 +6,8 @@ import numpy as np
 from mujoco import mjrf
 from numpy.typing import NDArray
 
-from engines.mujoco.pictures.filament.upload import make_texture, vertex_layout, write_mesh
+from engines.mujoco.pictures.filament.drawn_coat import DrawnCoat
+from engines.mujoco.textures.surface import Pixels
 from hub.participant.view import tint_of
 from schemas.soft_surface import FILM_STEP_M
 from schemas.vectors import Vector
@@ -15,28 +16,29 @@ __all__ = ["DrawnFilm"]
 
 _STEPS = 256
 """Thicknesses of a film, in `FILM_STEP_M`."""
-_LEAST = 1.0
+_LEAST = 0.1
 """Least thickness that is drawn, in steps."""
 _LIFT = 1.0e-4
 """Distance of the coat from the faces, m, so that it is not in them."""
 _ROUGHNESS = 0.08
+_DEEP = 0.3
+"""Reflectance of a deep pool over the number of a screen's colour."""
+_ROUNDS = 2
+"""Passes that round the edge of a pool, which is one of triangles."""
 
 
 class DrawnFilm:
     """The liquid on one mesh of a soft body."""
 
     def __init__(
-        self, context: mjrf.Context, scene: mjrf.Scene, liquid: str, faces: NDArray[np.uint32], vertices: int
+        self, context: mjrf.Context, scene: mjrf.Scene, liquid: str, faces: NDArray[np.uint32], below: Vector
     ) -> None:
-        """Prepare a coat for `faces`, drawn vertices of shape (m, 3), of `vertices` in all."""
-        self._scene, self._faces = scene, faces
-        self._layout = vertex_layout(vertices, faces.size)
-        self._mesh = context.create_mesh(self._layout)
-        self._texture = make_texture(context, _coat_colours(liquid), mjrf.ColorSpace.COLORSPACE_SRGB)
-        self._renderable = context.create_renderable(
-            mjrf.RenderableParams(cast_shadow=False, receive_shadow=True)
-        )
-        self._is_shown = False
+        """Prepare a film for `faces`, drawn vertices of shape (m, 3).
+
+        `below`: mean colour of the tissue, sRGB from 0 to 1, shape (3,).
+        """
+        self._faces, self._around = faces, np.maximum(np.bincount(faces.ravel()), 1)
+        self._coat = DrawnCoat(context, scene, faces, _coat_colours(liquid, below), _ROUGHNESS)
 
     def update(self, vertices: NDArray[np.float32], steps: Vector) -> None:
         """Show the liquid.
@@ -45,49 +47,36 @@ class DrawnFilm:
             vertices: as drawn, with tangent frames, shape (n, 9).
             steps: thickness at each vertex, in `FILM_STEP_M`, shape (n,).
         """
-        is_wet = np.asarray((steps[self._faces] >= _LEAST).any(axis=1))
-        if not is_wet.any():
-            self.hide()
+        if not steps.any():
+            self._coat.hide()
             return
-        # an upload has as many faces as its mesh: dry ones shrink to a point
-        wet = self._faces * is_wet[:, None].astype(np.uint32)
-        coat = vertices.copy()
-        lift = np.float32(_LIFT) + np.float32(FILM_STEP_M) * steps.astype(np.float32)
-        coat[:, :3] += lift[:, None] * _normals(vertices[:, 3:7])
-        coat[:, 7], coat[:, 8] = (np.minimum(steps, _STEPS - 1) + 0.5) / _STEPS, 0.5
-        write_mesh(self._mesh, self._layout, coat, wet)
-        if not self._is_shown:
-            self._renderable.set_mesh(self._mesh, 0, wet.size)
-            self._renderable.set_material(
-                mjrf.Material(
-                    color=(1.0, 1.0, 1.0, 0.999),
-                    metallic=0.0,
-                    roughness=_ROUGHNESS,
-                    color_texture=self._texture,
-                )
-            )
-            self._scene.add_renderable(self._renderable)
-            self._is_shown = True
+        steps = self._rounded(steps)
+        uv = np.full((len(steps), 2), 0.5, np.float32)
+        uv[:, 0] = (np.minimum(steps, _STEPS - 1) + 0.5) / _STEPS
+        is_wet = np.asarray((steps[self._faces] >= _LEAST).any(axis=1))
+        self._coat.show(vertices, uv, (_LIFT + FILM_STEP_M * steps).astype(np.float32), is_wet)
+
+    def _rounded(self, steps: Vector) -> Vector:
+        """Return values at the vertices, each drawn towards those of the faces around."""
+        for _ in range(_ROUNDS):
+            mean = steps[self._faces].mean(axis=1).repeat(3)
+            steps = np.bincount(self._faces.ravel(), mean, len(steps)) / self._around
+        return steps
 
     def hide(self) -> None:
         """Show no liquid."""
-        if self._is_shown:
-            self._scene.remove_renderable(self._renderable)
-            self._is_shown = False
+        self._coat.hide()
 
 
-def _coat_colours(liquid: str) -> NDArray[np.uint8]:
-    """Return colour and opacity over the thickness of a film, shape (1, 256, 4)."""
+def _coat_colours(liquid: str, below: Vector) -> Pixels:
+    """Return colour and opacity over the thickness of a film, shape (1, 256, 4).
+
+    A coat has one opacity for all colours: that of the colour which the liquid takes away most. So the coat
+    brings back, of the light that tissue `below` reflects, the colours that the liquid lets through.
+    """
     tint = tint_of(liquid)
     through = np.exp(-FILM_STEP_M * np.arange(_STEPS)[:, None] / np.array(tint.depth_m))
-    opacity = 1.0 - through.mean(axis=1)
-    # the share of light that passes tints what is below
-    passed = through / np.maximum(through.max(axis=1, keepdims=True), 1e-6)
-    colours = np.column_stack([np.array(tint.deep) * (0.5 + 0.5 * passed), opacity])
+    opacity = 1.0 - through.min(axis=1, keepdims=True)
+    light = (through - (1.0 - opacity)) * below**2.2 + (1.0 - through) * _DEEP * np.array(tint.deep)
+    colours = np.concatenate([(light / np.maximum(opacity, 1e-6)) ** (1.0 / 2.2), opacity], axis=1)
     return np.rint(255.0 * np.clip(colours, 0.0, 1.0)).astype(np.uint8)[None]
-
-
-def _normals(quaternions: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the z axes, shape (n, 3), of quaternions (x, y, z, w), shape (n, 4)."""
-    x, y, z, w = quaternions.T
-    return np.stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)

@@ -19,7 +19,7 @@ _CUTOFF_DEG, _SOFTNESS = 52.0, 1.0
 """Half the angle of the cone of light, and its soft share. Fibre of a numerical aperture of 0.6 to 0.9 lights
 37 to 64 degrees.
 """
-_COLOUR = (1.0, 0.97, 0.92)
+_COLOUR = (1.0, 0.975, 0.94)
 """Xenon through a light guide: nearly white, a little yellow."""
 _BULB = 1.3e-3
 """Radius of a bundle of fibres, m."""

@@ -20,16 +20,14 @@ from engines.mujoco.pictures.filament.drawn_place import DrawnPlace
 from engines.mujoco.pictures.filament.drawn_solids import DrawnSolids
 from engines.mujoco.pictures.filament.lamp import Lamp, RoomLamp
 from engines.mujoco.pictures.filament.light_control import LightControl
-from engines.mujoco.pictures.filament.sensor import Sensor
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.place.part import PlacePart
-from engines.mujoco.textures.noise import Noise
+from engines.mujoco.textures.noise import SEED, Noise
+from robots.dvrk.endoscope import StereoCamera
 from schemas.vectors import Vector
 
 __all__ = ["FilamentRenderer"]
 
-_SEED = 3
-"""Seed of the noise behind all textures."""
 _SHADOW_PIXELS = 1024
 _SAMPLES = 4
 _BACKGROUND = (0.42, 0.45, 0.48)
@@ -37,7 +35,7 @@ _BACKGROUND = (0.42, 0.45, 0.48)
 _TRIES = 6
 """Most pictures until the light of the first one is right."""
 _AMBIENT: Mapping[str, tuple[float, tuple[float, float, float]]] = {
-    "abdomen": (9_000.0, (1.0, 0.88, 0.82)),
+    "abdomen": (9_000.0, (1.0, 0.76, 0.67)),
     "dry-lab": (7_000.0, (0.92, 0.96, 1.0)),
     "none": (9_000.0, (1.0, 1.0, 1.0)),
 }
@@ -51,6 +49,7 @@ class FilamentRenderer:
         self,
         model: mujoco.MjModel,
         params: EndoscopeParams,
+        camera: StereoCamera,
         clip: tuple[float, float],
         backend: Backend,
         bodies: Mapping[str, SoftBody],
@@ -60,14 +59,14 @@ class FilamentRenderer:
 
         Args:
             model: what to draw, made by `place.dress_scene`.
-            params: cameras, sensor and looks of soft bodies.
+            params: sensor and looks of soft bodies.
+            camera: the two cameras.
             clip: near and far distance between which they see, m.
             backend: the graphics interface to use.
             bodies: soft bodies, drawn beside the model.
             place: surroundings.
         """
-        self._camera = camera = params.camera
-        self._sensor = Sensor(params.sensor, camera.width, camera.height)
+        self._camera = camera
         self._control = LightControl() if params.sensor.automatic_light else None
         self._is_lit = False
         skins = params.soft_bodies
@@ -79,7 +78,7 @@ class FilamentRenderer:
         self._scene.configure_from_model(model)
         self._scene.set_msaa(_SAMPLES)
         self._resources = mjrf.ModelResources(self._context, model)
-        noise = Noise(_SEED)
+        noise = Noise(SEED)
         self._geoms = DrawnGeoms(self._context, self._scene, model, noise)
         self._rigid = mjrf.ModelRenderables(self._scene, self._resources)
         options = mujoco.MjvOption()
@@ -116,7 +115,7 @@ class FilamentRenderer:
     ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Return the pictures of the left and the right camera, each of shape (height, width, 3), RGB.
 
-        The first row is the top.
+        The first row is the top. The next call draws into the same memory.
 
         Args:
             data: state whose kinematics are up to date.
@@ -145,7 +144,7 @@ class FilamentRenderer:
             if self._control is None or not self._adjust_light(self._control, left):
                 break
         self._is_lit = True
-        return self._sensor.expose(left), self._sensor.expose(right)
+        return left, right
 
     def _adjust_light(self, control: LightControl, picture: NDArray[np.uint8]) -> bool:
         """Dim the lamp by a picture; return whether the first picture needs another try."""

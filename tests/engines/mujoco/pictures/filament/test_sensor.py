@@ -14,21 +14,64 @@ GREY = np.full((96, 120, 3), 128, np.uint8)
 
 def test_everything_off_is_the_truth() -> None:
     sensor = Sensor(SensorParams(vignette=0.0, noise=0.0), 120, 96)
-    assert np.array_equal(sensor.expose(GREY), GREY)
+    assert np.array_equal(sensor.expose(GREY, 0, 0), GREY)
 
 
 def test_corners_are_darker_and_the_middle_is_not() -> None:
-    picture = Sensor(SensorParams(vignette=0.4, noise=0.0), 120, 96).expose(GREY)
+    picture = Sensor(SensorParams(vignette=0.4, noise=0.0), 120, 96).expose(GREY, 0, 0)
     assert picture[48, 60].tolist() == [128] * 3
     assert picture[0, 0, 0] == pytest.approx(0.6 * 128, abs=2)
 
 
 def test_noise_has_no_bias_grows_with_light_and_differs_between_pictures() -> None:
     sensor = Sensor(SensorParams(vignette=0.0, noise=3.0), 120, 96)
-    one, other = sensor.expose(GREY), sensor.expose(GREY)
+    one, other = sensor.expose(GREY, 0, 0), sensor.expose(GREY, 40_000_000, 0)
     assert abs(float(one.mean()) - 128.0) < 0.5
     assert not np.array_equal(one, other)
-    assert one.std() > 1.3 * sensor.expose(GREY // 4).std()
+    assert not np.array_equal(one, sensor.expose(GREY, 0, 1))
+    assert np.array_equal(one, sensor.expose(GREY, 0, 0))  # drawn again
+    assert one.std() > 1.3 * sensor.expose(GREY // 4, 0, 0).std()
+
+
+def test_a_warm_balance_is_red_and_automatic_balance_removes_most_of_a_cast() -> None:
+    warm = Sensor(SensorParams(vignette=0.0, noise=0.0, warmth=1.0), 120, 96).expose(GREY, 0, 0)[48, 60]
+    assert warm[0] / warm[2] == pytest.approx(2.0, abs=0.03)
+    balanced = Sensor(SensorParams(vignette=0.0, noise=0.0, white_balance="automatic"), 120, 96)
+    cast = np.full_like(GREY, (200, 120, 80))
+    first = balanced.expose(cast, 0, 0)[48, 60].astype(float)
+    for _ in range(80):
+        last = balanced.expose(cast, 0, 0)[48, 60].astype(float)
+    assert first[0] / first[2] > 2.2  # a lag
+    assert last[0] / last[2] < 1.5
+
+
+def test_fog_takes_contrast_until_it_is_wiped_and_dirt_darkens_places() -> None:
+    stripes = np.where((np.arange(120) // 8 % 2 == 0)[None, :, None], 220, 30) * np.ones((96, 1, 3))
+    stripes = stripes.astype(np.uint8)
+    event = {"time": "1 s", "duration": "0.5 s"}
+    params = {
+        "vignette": 0,
+        "noise": 0,
+        "fog": 0.9,
+        "events": [event | {"fog": 0.0}, event | {"time": "3 s", "dirt": 1.0}],
+    }
+    sensor = Sensor(SensorParams.model_validate(params), 120, 96)
+    contrast = [float(sensor.expose(stripes, round(1e9 * t), 0).std()) for t in (0.0, 1.25, 2.0)]
+    assert contrast[0] < 0.8 * contrast[1]
+    assert contrast[1] < 0.9 * contrast[2]
+    assert np.array_equal(sensor.expose(stripes, 2_000_000_000, 0), stripes)
+    smeared = [sensor.expose(GREY, 4_000_000_000, eye).astype(int) for eye in (0, 1)]
+    assert (smeared[0] < 100).any()
+    assert (smeared[0] == 128).any()
+    assert not np.array_equal(smeared[0], smeared[1])
+
+
+def test_a_video_link_loses_fine_colours() -> None:
+    squares = np.indices((96, 120)).sum(axis=0) % 2
+    picture = np.where(squares[..., None] == 0, (200, 60, 60), (60, 60, 200)).astype(np.uint8)
+    sent = Sensor(SensorParams(vignette=0.0, noise=0.0, compression=70), 120, 96).expose(picture, 0, 0)
+    assert sent.shape == picture.shape
+    assert np.abs(sent[..., 0].astype(int) - sent[..., 2]).mean() < 60
 
 
 @pytest.mark.parametrize("start", [40, 100, 240])
