@@ -15,7 +15,8 @@ from engines.mujoco.markers.solids import Shape, extents, solids
 from engines.mujoco.markers.store import ShownMarker
 from engines.mujoco.model import place as place_arms
 from engines.mujoco.model import spec
-from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
+from engines.mujoco.pictures.camera_mount import CameraMount
+from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.filament.backend import Backend
 from engines.mujoco.pictures.lens import Lens
 from engines.mujoco.pictures.skins import Skins
@@ -23,16 +24,13 @@ from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.stereo import StereoRenderer
 from engines.mujoco.place.dress import dress_scene
 from robots import rotation
-from robots.dvrk.endoscope import FAR, optical_in_roll
-from robots.dvrk.mounted import MountedEcm
-from robots.transform import rigid_transform
 from schemas.vectors import Vector
 
 if TYPE_CHECKING:
     from engines.mujoco.pictures.filament.renderer import FilamentRenderer
     from engines.mujoco.pictures.filament.sensor import Sensor
 
-__all__ = ["EndoscopeScene", "add_sky", "look_at"]
+__all__ = ["EndoscopeScene", "add_sky"]
 
 _SKY, _GROUND = [0.75, 0.8, 0.85], [0.35, 0.37, 0.4]
 """Behind everything seen from a room, above and below; an endoscope sees only what its own lamp lights."""
@@ -54,30 +52,19 @@ class EndoscopeScene:
 
         `engine`: what draws, as `find_drawing` returns it: for Filament, or the name of an OpenGL.
         """
-        scene, ecm = spec(params), params.arms.get("ECM")
+        scene = spec(params)
         self._skins: Skins | None = None
         if isinstance(engine, Backend):
             dress_scene(scene, params.sensor.exposure, _TONES[params.sensor.tone])
         else:
-            if params.view is not None or ecm is None:
+            if params.view is not None or "ECM" not in params.arms:
                 add_sky(scene)
             self._skins = Skins(scene, bodies, params.soft_bodies)
         self._model = scene.compile()
         self._data = mujoco.MjData(self._model)
         self._frames = SceneFrames(params, self._model)
-        self._carrier = -1
-        far = params.far
-        if params.view is not None:
-            self._mounting = look_at(params.view)
-        elif isinstance(ecm, MountedEcm):
-            self._carrier, self._mounting = self._model.body("ECM/roll").id, optical_in_roll(ecm.endoscope)
-            far = far or FAR
-        else:
-            self._mounting = look_at(_overview_camera(self._model))
-        far = far or float(
-            np.linalg.norm(self._mounting[:3, 3] - self._model.stat.center) + 2.0 * self._model.stat.extent
-        )
-        clip = params.near, far
+        self._mount = CameraMount(params, self._model)
+        clip = self._mount.clip
         self._lens = Lens(params.camera, params.distortion)
         self._sensor: Sensor | None = None
         self._renderer = (
@@ -100,7 +87,7 @@ class EndoscopeScene:
         self._sensor = Sensor(params.sensor, params.width, params.height)
         place_arms(self._model, self._data, params.arms)
         mujoco.mj_kinematics(self._model, self._data)
-        place = make_place(params, self._model, bodies, self._pose()[:3, 3])
+        place = make_place(params, self._model, bodies, self._mount.pose(self._data)[:3, 3])
         return FilamentRenderer(self._model, params, self._lens.drawn, clip, backend, bodies, place)
 
     def draw(
@@ -120,7 +107,7 @@ class EndoscopeScene:
         mujoco.mj_camlight(model, data)
         if self._skins is not None:
             self._skins.show(model, data)
-        pose = self._pose()
+        pose = self._mount.pose(data)
         shapes = [
             solid
             for marker in markers
@@ -148,39 +135,6 @@ class EndoscopeScene:
     def close(self) -> None:
         """Free the OpenGL context."""
         self._renderer.close()
-
-    def _pose(self) -> Vector:
-        """Return the optical frame midway between the cameras, in the world, shape (4, 4)."""
-        if self._carrier < 0:
-            return self._mounting
-        turn, position = self._data.xmat[self._carrier].reshape(3, 3), self._data.xpos[self._carrier]
-        return rigid_transform(turn, position) @ self._mounting
-
-
-def look_at(view: ViewParams) -> Vector:
-    """Return the optical frame (x right, y down, z ahead) of cameras at `view`, shape (4, 4).
-
-    They are upright unless they look along the vertical.
-    """
-    position, target = np.array(view.position), np.array(view.target)
-    ahead = (target - position) / np.linalg.norm(target - position)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    if np.linalg.norm(right) < 1e-9:
-        right = np.array([1.0, 0.0, 0.0])
-    right /= np.linalg.norm(right)
-    return rigid_transform(np.column_stack([right, np.cross(ahead, right), ahead]), position)
-
-
-def _overview_camera(model: mujoco.MjModel) -> ViewParams:
-    """Return the camera with which MuJoCo's viewer starts."""
-    camera = mujoco.MjvCamera()
-    mujoco.mjv_defaultFreeCamera(model, camera)
-    azimuth, elevation = np.radians([camera.azimuth, camera.elevation])
-    ahead = np.array(
-        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
-    )
-    x, y, z = camera.lookat - camera.distance * ahead
-    return ViewParams(position=(x, y, z), target=tuple(camera.lookat))
 
 
 def add_sky(scene: mujoco.MjSpec) -> None:

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures.camera_mount import look_at
 from engines.mujoco.pictures.endoscope_params import ViewParams
-from engines.mujoco.pictures.endoscope_scene import add_sky, look_at
+from engines.mujoco.pictures.endoscope_scene import add_sky
 from engines.mujoco.pictures.stereo import StereoRenderer
 from robots.dvrk.endoscope import StereoCamera
 from schemas.errors import TrocarError

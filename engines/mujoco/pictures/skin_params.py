@@ -71,16 +71,17 @@ class SkinParams(Params):
         """Return red, green and blue, each from 0 to 1, of the body `name`."""
         if isinstance(self.colour, tuple):
             return self.colour
-        return _COLOURS[self.colour or _tissue(name)]
+        return _COLOURS[self.tissue(name)]
 
     def recipe(self, name: str) -> Recipe:
         """Return the recipe of the textures of the body `name`."""
         if isinstance(self.colour, tuple):
             return tinted(TISSUES["tissue"], self.colour)
-        tissue = self.colour or _tissue(name)
+        tissue = self.tissue(name)
         return TISSUES[tissue] if tissue in TISSUES else tinted(TISSUES["tissue"], _COLOURS[tissue])
 
-
-def _tissue(name: str) -> str:
-    """Return the tissue of a body by its name."""
-    return next(filter(name.endswith, _COLOURS), "tissue")
+    def tissue(self, name: str) -> str:
+        """Return the tissue of the body `name`: as stated, else by the end of the name."""
+        if isinstance(self.colour, str):
+            return self.colour
+        return next(filter(name.endswith, _COLOURS), "tissue")

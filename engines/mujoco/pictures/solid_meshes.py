@@ -27,23 +27,30 @@ class Triangles(NamedTuple):
     """Shape (f, 3), counter-clockwise from outside."""
 
 
-def solid_mesh(kind: mujoco.mjtGeom, size: Vector) -> Triangles:
-    """Return the mesh of a geometry; `size`, shape (3,), m, as MuJoCo means it. Others are empty."""
+def solid_mesh(kind: mujoco.mjtGeom, size: Vector, around: int = _AROUND, rings: int = _RINGS) -> Triangles:
+    """Return the mesh of a geometry; of other kinds an empty one.
+
+    Args:
+        kind: of the geometry.
+        size: shape (3,), m, as MuJoCo means it.
+        around: corners around a round solid.
+        rings: rings from pole to pole.
+    """
     geom, (a, b, c) = mujoco.mjtGeom, size.tolist()
     if kind == geom.mjGEOM_BOX:
         return _revolve_profile([(a, -c), (a, c)], corners=4, flat=(a, b))
     if kind == geom.mjGEOM_PLANE:
         return _rectangle(a or _PLANE_M, b or _PLANE_M)
     if kind == geom.mjGEOM_CYLINDER:
-        return _revolve_profile([(0.0, -b), (a, -b), (a, b), (0.0, b)])
-    angles = np.linspace(-np.pi / 2, np.pi / 2, _RINGS + 1)
+        return _revolve_profile([(0.0, -b), (a, -b), (a, b), (0.0, b)], around)
+    angles = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)
     profile: list[tuple[float, float]] = np.column_stack([np.cos(angles), np.sin(angles)]).tolist()
     if kind == geom.mjGEOM_CAPSULE:
-        return _revolve_profile([(a * r, a * z + (b if z > 0.0 else -b)) for r, z in profile])
+        return _revolve_profile([(a * r, a * z + (b if z > 0.0 else -b)) for r, z in profile], around)
     if kind == geom.mjGEOM_SPHERE:
-        return _revolve_profile([(a * r, a * z) for r, z in profile])
+        return _revolve_profile([(a * r, a * z) for r, z in profile], around)
     if kind == geom.mjGEOM_ELLIPSOID:
-        round_ = _revolve_profile(profile)
+        round_ = _revolve_profile(profile, around)
         return Triangles(round_.vertices * size, round_.faces)
     return Triangles(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
 

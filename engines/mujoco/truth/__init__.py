@@ -1,0 +1,1 @@
+"""Truth beside pictures: depth, segmentation, normals, flow and keypoints, from the geometry of a scene."""
