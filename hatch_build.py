@@ -31,7 +31,7 @@ _EXTENSIONS = (
             f"engines/fem/_{part}.c"
             for part in (
                 *("solid", "step", "elements", "contact", "rigid", "topology", "cut", "blade", "ties"),
-                *("together", "touch", "pairs"),
+                *("together", "touch", "pairs", "attach"),
             )
         ],
         depends=[

@@ -56,7 +56,7 @@ static PyObject *advance(Solid *self, PyObject *args)
     if (read_way(self, args, &way, &course))
         return NULL;
     Py_BEGIN_ALLOW_THREADS;
-    opened = advance_bodies(&way, 1, &course, NULL);
+    opened = advance_bodies(&way, 1, &course, NULL, NULL);
     Py_END_ALLOW_THREADS;
     release_way(&way);
     return opened < 0 ? PyErr_NoMemory() : PyLong_FromLong(opened);

@@ -50,7 +50,7 @@ typedef struct {
     double *support;             /* (boxes, 3): mean force of the body on each in a step, N */
 } Body;
 
-enum { FIXED = 1, PLACED = 2 }; /* anchored; moved onto a cut */
+enum { FIXED = 1, PLACED = 2, TIED = 4 }; /* anchored; moved onto a cut; tied to another body */
 
 typedef struct {
     int count;
@@ -102,6 +102,7 @@ typedef struct {
 } Solid;
 
 typedef struct Touch Touch; /* of bodies among each other */
+typedef struct Attach Attach;
 
 /* Elements around some nodes: those of nodes[k] are element[start[k]] to element[start[k + 1] - 1], ascending. */
 typedef struct {
@@ -130,7 +131,7 @@ int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_step
 int find_beside(const Body *body, double seconds, int32_t *beside);
 void rest_on(const Body *body, const int32_t *beside, int count, double seconds);
 
-int advance_bodies(Way *ways, int count, const Course *course, Touch *touch);
+int advance_bodies(Way *ways, int count, const Course *course, Touch *touch, Attach *attach);
 int read_way(Solid *self, PyObject *args, Way *way, Course *course);
 void release_way(Way *way);
 
@@ -140,6 +141,12 @@ void free_touch(Touch *touch);
 void forget_pairs(Touch *touch);
 void begin_touch(Touch *touch);
 int part_bodies(Touch *touch, double seconds, double share);
+
+Attach *new_attach(int count, Body *const *body, const double *middle, const int32_t *place, const double *rest,
+                   const double *law, double *widest, double *force);
+void free_attach(Attach *attach);
+void begin_attach(Attach *attach, int bodies);
+void hold_together(Attach *attach, double seconds, double share);
 
 int find_stars(const Body *body, int32_t *place, Stars *stars);
 void free_stars(Stars *stars);

@@ -45,4 +45,13 @@ class Together:
         /,
     ) -> None: ...
     def advance(self, arguments: tuple[tuple[Any, ...], ...], /) -> int: ...
+    def attach(
+        self,
+        place: NDArray[np.int32],
+        rest: NDArray[np.float64],
+        law: NDArray[np.float64],
+        widest: NDArray[np.float64],
+        force: NDArray[np.float64],
+        /,
+    ) -> None: ...
     def forget(self) -> None: ...

@@ -108,18 +108,23 @@ static int finish_way(Way *way, int sub_steps)
     return swept ? cut_along(body, way->triangles, swept) : 0;
 }
 
-/* Advance bodies, which touch each other with `touch`; return how many faces have been opened, or -1 without memory. */
-int advance_bodies(Way *ways, int count, const Course *course, Touch *touch)
+/* Advance bodies, which touch each other with `touch` and hang together by `attach`; return how many faces have been
+opened, or -1 without memory. */
+int advance_bodies(Way *ways, int count, const Course *course, Touch *touch, Attach *attach)
 {
     int failed = 0, opened = 0;
     for (int b = 0; b < count; b++)
         failed |= begin_way(ways + b, course->sub_steps, course->seconds);
     if (touch)
         begin_touch(touch);
+    if (attach)
+        begin_attach(attach, count);
     for (int k = 0; k < course->sub_steps && !failed; k++) {
         for (int b = 0; b < count; b++)
             push(ways + b, course, k);
         failed = touch ? part_bodies(touch, (double)course->seconds, 1.0 / course->sub_steps) : 0;
+        if (attach)
+            hold_together(attach, (double)course->seconds, 1.0 / course->sub_steps);
         for (int b = 0; b < count; b++) {
             rest_on(ways[b].body, ways[b].beside, ways[b].besides, (double)course->seconds);
             tie(ways[b].body);

@@ -10,6 +10,9 @@ typedef struct {
     Py_buffer held[3];
     int count, buffers;
     Touch *touch;
+    Attach *attach;
+    Py_buffer ties[5];
+    int tied; /* buffers of ties */
 } Together;
 
 static int initialise(Together *self, PyObject *args, PyObject *Py_UNUSED(named))
@@ -56,7 +59,7 @@ static PyObject *advance(Together *self, PyObject *arguments)
         read++;
     if (read == self->count) {
         Py_BEGIN_ALLOW_THREADS;
-        opened = advance_bodies(self->ways, self->count, &course, self->touch);
+        opened = advance_bodies(self->ways, self->count, &course, self->touch, self->attach);
         Py_END_ALLOW_THREADS;
         if (opened < 0)
             PyErr_NoMemory();
@@ -74,9 +77,31 @@ static PyObject *forget(Together *self, PyObject *Py_UNUSED(none))
     Py_RETURN_NONE;
 }
 
+PyDoc_STRVAR(attach_doc, "attach(place, rest, law, widest, force)\n--\n\nLet ties hold nodes of a body to faces of \
+another; for the arrays see `Attach`.");
+
+static PyObject *attach(Together *self, PyObject *args)
+{
+    PyObject *arrays[5];
+    if (self->tied || !PyArg_ParseTuple(args, "OOOOO", arrays, arrays + 1, arrays + 2, arrays + 3, arrays + 4))
+        return self->tied ? PyErr_Format(PyExc_ValueError, "ties are stated once") : NULL;
+    for (; self->tied < 5; self->tied++)
+        if (PyObject_GetBuffer(arrays[self->tied], self->ties + self->tied, self->tied > 2 ? PyBUF_WRITABLE : PyBUF_SIMPLE))
+            return NULL;
+    const Py_buffer *at = self->ties;
+    self->attach = new_attach((int)(at[3].len / 8), self->body, self->held[0].buf, at[0].buf, at[1].buf, at[2].buf,
+                              at[3].buf, at[4].buf);
+    if (self->attach == NULL)
+        return PyErr_NoMemory();
+    Py_RETURN_NONE;
+}
+
 static void finish(Together *self)
 {
     free_touch(self->touch);
+    free_attach(self->attach);
+    while (self->tied)
+        PyBuffer_Release(self->ties + --self->tied);
     while (self->buffers)
         PyBuffer_Release(self->held + --self->buffers);
     PyMem_RawFree(self->body);
@@ -87,6 +112,7 @@ static void finish(Together *self)
 
 static PyMethodDef methods[] = {
     {"advance", (PyCFunction)advance, METH_O, advance_doc},
+    {"attach", (PyCFunction)attach, METH_VARARGS, attach_doc},
     {"forget", (PyCFunction)forget, METH_NOARGS, forget_doc},
     {NULL, NULL, 0, NULL},
 };

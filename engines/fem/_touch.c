@@ -152,6 +152,15 @@ static double height_behind(const Pairs *pairs, const Near *near)
     return dot(away, near->normal);
 }
 
+/* Whether a vertex and a face of another body belong to whole ties: they hold both together, and apart. */
+static int are_tied(const Pairs *pairs, const Vertex *vertex, const Pair *pair)
+{
+    const Body *other = pairs->body[pair->body];
+    const int32_t *node = other->surface + 3 * pair->slot;
+    return vertex->body != pair->body && pairs->body[vertex->body]->flags[vertex->node] & TIED &&
+           other->flags[node[0]] & other->flags[node[1]] & other->flags[node[2]] & TIED;
+}
+
 /* Fill in whom vertex k meets; return 0 for nobody. */
 static int meet(const Touch *touch, int k, Meeting *meeting)
 {
@@ -167,6 +176,8 @@ static int meet(const Touch *touch, int k, Meeting *meeting)
     if (!found)
         return 0;
     const Near *best = near + least;
+    if (are_tied(pairs, vertex, best->pair))
+        return 0;
     memcpy(direction, best->normal, sizeof direction);
     if (!best->is_inside && !direction_at(near, found, best, direction))
         return 0;

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.fem.attachments.attachments import Attachments, attachment_ports
 from engines.fem.blood.blood import Blood, bleeds, blood_ports
 from engines.fem.boxes import box_rows
 from engines.fem.edges import Scissors
@@ -56,6 +57,7 @@ class FemEngine(Stepped):
         """Outputs of each organ with layers."""
         self._together: Together | None = None
         self._blood: Blood | None = None
+        self._attachments: Attachments | None = None
         self._warn_of_coupling()
 
     @property
@@ -66,6 +68,7 @@ class FemEngine(Stepped):
         changes = (*surface_ports(self.params), *change_ports(self.params.organs))
         surfaces = changes if self.params.changes_surfaces else ()
         layers = layer_ports(self.params.organs, self.params.node_period)
+        layers += attachment_ports(self.params.attachments, self.params.node_period)
         heat, blood = heat_ports(self.params), blood_ports(self.params)
         return *node_ports(self.params), *surfaces, *layers, *grasps, *heat, *blood
 
@@ -97,6 +100,9 @@ class FemEngine(Stepped):
         """Let the organs come to rest, side by side where they touch."""
         if self.params.organ_contact:
             self._together = Together(self._organs)
+            if self.params.attachments:
+                self._attachments = Attachments(self.params.attachments, self._organs, self.params.organs)
+                self._together.attach(self._attachments)
             self._together.settle(self.params.gravity)
         else:
             for organ in self._organs:
@@ -111,6 +117,8 @@ class FemEngine(Stepped):
         forces[:] = 0.0
         for organ in self._organs:
             organ.sharpen(seconds)
+        if self._attachments is not None:
+            self._attachments.begin(seconds)
         if self._together is None:
             for organ in self._organs:
                 forces += organ.advance(seconds, self.params.gravity)
@@ -134,6 +142,8 @@ class FemEngine(Stepped):
         if self._heating is not None:
             self._heating.follow()
             outputs.update(self._heating.step(inputs, t, h))
+        if self._attachments is not None:
+            self._attachments.follow(() if self._heating is None else self._heating.heats)
         if self._blood is not None:
             outputs.update(self._blood.step(inputs, end, h, looked=touch))
             outputs.update(self._blood.pictures(end) if due else {})
@@ -154,7 +164,7 @@ class FemEngine(Stepped):
         for i, layers in enumerate(self._layers):
             if layers is not None:
                 outputs |= layers.outputs(None if self._heating is None else self._heating.heats[i].dead)
-        return outputs
+        return outputs if self._attachments is None else outputs | self._attachments.outputs()
 
     def state_hash(self) -> int:
         """Return 64 bits of the displacements, and of the probes and grasps."""
@@ -162,7 +172,7 @@ class FemEngine(Stepped):
             *(probe.digest for probe in self._probes),
             *(grasp.numbers for grasp, _ in self._grasps),
             *(organ.digest for organ in self._organs),
-            *(array.tobytes() for array in (*self._heat_state, *self._blood_amounts)),
+            *(array.tobytes() for array in (*self._heat_state, *self._blood_amounts, *self._openings)),
         )
 
     def save(self) -> bytes:
@@ -189,6 +199,8 @@ class FemEngine(Stepped):
             organ.restore(parts)
         if self._together is not None:
             self._together.forget()
+        if self._attachments is not None:
+            self._attachments.restore(np.frombuffer(next(parts)))
         if self._heating is not None:
             self._heating.restore(parts)
         if self._blood is not None:
@@ -205,6 +217,7 @@ class FemEngine(Stepped):
         """Yield the parts of a saved state in order."""
         for organ in self._organs:
             yield from organ.parts
+        yield from self._openings
         if self._heating is not None:
             yield from self._heating.state
         yield from self._blood_state
@@ -216,6 +229,10 @@ class FemEngine(Stepped):
         return () if self._heating is None else self._heating.state
 
     @property
+    def _openings(self) -> tuple[NDArray[Any], ...]:
+        return () if self._attachments is None else (self._attachments.widest,)
+
+    @property
     def _blood_amounts(self) -> tuple[NDArray[Any], ...]:
         return () if self._blood is None else self._blood.amounts
 
@@ -225,7 +242,7 @@ class FemEngine(Stepped):
 
     def close(self) -> None:
         """Forget the organs."""
-        self._heating = self._together = self._blood = None
+        self._heating = self._together = self._blood = self._attachments = None
         for kept in (self._organs, self._probes, self._grasps, self._surfaces, self._layers):
             kept.clear()
 
@@ -264,6 +281,8 @@ class FemEngine(Stepped):
                 outputs.update(nothing_held(name))
         for organ in self._organs:
             organ.meet(self._spheres, blades, scissors)
+        if self._attachments is not None:
+            self._attachments.meet(self._spheres, blades, scissors)
         for organ in self._changing:
             outputs |= {f"{organ.name}/events": (), **organ.sums}
         if any(self.params.probes[bond.name].energy for bond in bonds):

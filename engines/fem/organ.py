@@ -21,6 +21,7 @@ from engines.tissue.tissue_surface import SurfaceState, TissueSurface
 from engines.tissue.warn_once import warn_once
 from schemas.errors import SessionError
 from schemas.plain_sum import plain_sum
+from schemas.soft_surface import FaceKind
 from schemas.vectors import Vector
 
 __all__ = ["Organ", "relaxation", "still_way"]
@@ -83,7 +84,7 @@ class Organ:
             divisible=divisible,
             layering=layering,
             boxes=boxes,
-            most_ties=0 if params.lumen is None else params.inner_rings.size,
+            most_ties=0 if params.inner_wall is None else params.inner_wall.rings.size,
         )
         self.layers = params.layer_numbers(self.solid.tetrahedra)
         """Number of the layer of every element, shape (m,)."""
@@ -207,6 +208,13 @@ class Organ:
         burnt = np.flatnonzero((found > 0) & (found != self.surface.kinds))
         if burnt.size:
             self.surface.replace(burnt, self.surface.faces[burnt], found[burnt])
+
+    def expose(self, slots: NDArray[np.integer], kind: FaceKind) -> None:
+        """Show faces of the outside, by slot, as this kind: something has come off them."""
+        is_outside = (self.surface.kinds[slots] == FaceKind.OUTSIDE) & (self.surface.faces[slots, 0] >= 0)
+        found = slots[is_outside]
+        if found.size:
+            self.surface.replace(found, self.surface.faces[found], np.full(len(found), kind, np.uint8))
 
     def _largest_move(self) -> float:
         """Return the largest displacement of a node with mass, m."""

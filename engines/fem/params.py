@@ -7,9 +7,12 @@ from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from engines.fem.attachments.params import AttachmentParams
 from engines.tissue.elasticity.body_yield import MOST_NODES
 from engines.tissue.params import PressedOrgansParams
+from schemas.errors import did_you_mean
 from schemas.quantity import Duration
+from schemas.scenario import Name
 
 __all__ = ["FemParams"]
 
@@ -32,6 +35,27 @@ class FemParams(PressedOrgansParams):
             " frictions counts"
         ),
     )
+
+    attachments: dict[Name, AttachmentParams] = Field(
+        default_factory=dict[Name, AttachmentParams],
+        description=(
+            "connective tissue between organs, with outputs `<attachment>/freed` and `<attachment>/force`"
+        ),
+    )
+
+    @model_validator(mode="after")
+    def _organs_to_attach(self) -> Self:
+        for name, attachment in self.attachments.items():
+            for organ in attachment.organs:
+                if organ not in self.organs:
+                    raise ValueError(
+                        f"attachment '{name}': there is no organ '{organ}'.{did_you_mean(organ, self.organs)}"
+                    )
+            if name in self.organs or name in self.probes:
+                raise ValueError(f"attachment '{name}' has the name of an organ or a probe: take another")
+        if self.attachments and not self.organ_contact:
+            raise ValueError("attachments part, and then the organs touch: leave organ_contact on")
+        return self
 
     @model_validator(mode="after")
     def _something_to_suck(self) -> Self:
@@ -57,6 +81,8 @@ class FemParams(PressedOrgansParams):
 
     @cached_property
     def changes_surfaces(self) -> bool:
-        """Whether an organ may be divided, burnt or clipped."""
+        """Whether an organ may be divided, burnt, clipped or detached."""
+        if self.attachments:
+            return True
         divided = any(organ.cutting or organ.lumen for organ in self.organs.values())
         return divided or any(probe.energy for probe in self.probes.values())

@@ -357,6 +357,15 @@ class Solid:
         room = self._ties[first : first + len(pairs)]
         room[:] = pairs[: len(room)]
 
+    def untie(self) -> None:
+        """Let all tied nodes go."""
+        self._ties[:] = -1
+
+    @property
+    def ties(self) -> NDArray[np.int32]:
+        """Pairs of tied nodes, -1 after the last, shape (p, 2)."""
+        return self._ties
+
     def stand(self) -> None:
         """Stop all nodes; viscous strains stay."""
         self._velocity[:] = 0.0

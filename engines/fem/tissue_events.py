@@ -16,7 +16,7 @@ from schemas.vectors import Vector
 
 __all__ = ["TissueEvents", "change_ports"]
 
-_UNITS = {"cut": "m^2", "torn": "m^2", "burnt": "m^3"}
+_UNITS = {"cut": "m^2", "torn": "m^2", "burnt": "m^3", "detached": "m^2"}
 """Unit of the size by kind."""
 _KINDS = tuple(_UNITS)
 _PAUSE_NS = 100_000_000
@@ -29,7 +29,10 @@ _NONE = -1
 
 def change_ports(organs: Mapping[str, OrganParams]) -> tuple[Port, ...]:
     """Return the ports of the events of organs, and of sums of cuts."""
-    happened, since = "tissue that was cut, torn or burnt, that bleeds or is clipped", "by edges since time 0"
+    happened, since = (
+        "tissue that was cut, torn, burnt or detached, that bleeds or is clipped",
+        "by edges since time 0",
+    )
     events = (event_out(f"{organ}/events", TissueEvent, happened, frame="world") for organ in organs)
     cut = (
         port

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from engines.fem.attachments.attachments import Attachments
 from engines.fem.organ import Organ, still_way
 from schemas.vectors import Vector
 
@@ -34,6 +35,12 @@ class Together:
             self.forces,
             _AHEAD * edge,
             _SKIN * edge,
+        )
+
+    def attach(self, attachments: Attachments) -> None:
+        """Let the organs hang together."""
+        self._compiled.attach(
+            attachments.place, attachments.rest, attachments.law, attachments.widest, attachments.force
         )
 
     def settle(self, gravity: float) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.fem.blood.clips import Clips
 from engines.fem.blood.film import BILE, BLOOD, QUANTUM, Film
 from engines.fem.blood.lumen import Lumen
 from engines.fem.heat.tissue import tissue_of
@@ -40,9 +41,12 @@ class Bleeding:
         self._clotting = None if params.bleeding is None else params.bleeding.clotting
         liquid = BILE if params.lumen is not None and params.lumen.liquid == "bile" else BLOOD
         self.film = Film(liquid, len(organ.nodes), gravity)
-        self.lumen = None if params.lumen is None else Lumen(params.lumen, liquid, organ, params.inner_rings)
-        self.diameter = 0.0 if params.tube is None else params.tube.diameter
-        """Outer diameter of a tube at rest, m."""
+        self.lumen: Lumen | None = None
+        self.clips: Clips | None = None
+        """Clips on a tube."""
+        if params.lumen is not None and (wall := params.inner_wall) is not None:
+            self.lumen = Lumen(params.lumen, liquid, organ, wall)
+            self.clips = Clips(organ, self.lumen, wall.rings.size)
         self._opened: NDArray[np.int64] = np.full(len(organ.surface.faces), _CLOSED)
         """Time at which each face began to bleed, ns, or -1, shape (f,)."""
         self._book: NDArray[np.int64] = np.zeros(3, np.int64)
@@ -81,6 +85,8 @@ class Bleeding:
     def step(self, t: int, seconds: float) -> None:
         """Bleed and run for `seconds` until `t` ns."""
         self._follow()
+        for lost in () if self.clips is None else self.clips.watch():
+            self.organ.events.say("clip pulled off", "", lost.place, lost.force, "N")
         faces, nodes = self.organ.surface.faces, self.organ.nodes
         bleeds = self.organ.surface.kinds == FaceKind.CUT
         if not bleeds.any() and not self._book[_EMITTED]:
@@ -119,11 +125,6 @@ class Bleeding:
         self._book[_SUCKED] += taken
         return taken
 
-    def clip(self, ring: int, closing: Vector, width: float) -> None:
-        """Shut a tube with a lumen at a ring of nodes and beside it over a width (m), along `closing`."""
-        if self.lumen is not None:
-            self.organ.solid.tie(self.lumen.shut_rings(ring, closing, width))
-
     def picture(self, t: int) -> SurfaceFilm:
         """Return the message of the film at `t` ns; the same object as long as nothing has bled."""
         if not self._book[_EMITTED]:
@@ -149,16 +150,16 @@ class Bleeding:
     @property
     def state(self) -> tuple[NDArray[Any], ...]:
         """Arrays that the next step depends on."""
-        shut = () if self.lumen is None else (self.lumen.shut,)
-        return self.film.amounts, self._opened, self._book, self._rate, self._source, *shut
+        clips = () if self.clips is None else self.clips.state
+        return self.film.amounts, self._opened, self._book, self._rate, self._source, *clips
 
     def restore(self, parts: Iterator[bytes]) -> None:
         """Go back to a saved `state`; the organ has gone back already."""
-        amounts, opened, book, rate, source, *shut = (
+        amounts, opened, book, rate, source, *clips = (
             np.frombuffer(next(parts), array.dtype) for array in self.state
         )
-        if self.lumen is not None:
-            self.lumen.shut[:] = shut[0]
+        if self.clips is not None:
+            self.clips.restore(*clips)
         self.film.amounts, self._opened = amounts.copy(), opened.copy()
         self._book[:], self._rate[:], self._source[:] = book, rate, source
         self._known = _UNKNOWN

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from engines.fem.blood.bleeding import Bleeding
 from engines.fem.blood.clip import ClipApplier, clip_ports
+from engines.fem.blood.clip_markers import clip_markers
 from engines.fem.blood.suction import Suction, suction_ports
 from engines.fem.organ import Organ
 from engines.fem.probe import Probe
@@ -17,7 +18,7 @@ from engines.tissue.organs.params import OrganParams
 from engines.tissue.params import PressedOrgansParams
 from hub.participant import Inputs, Value, signal_out
 from schemas.ports import Port
-from schemas.trocar_msgs import SurfaceFilm
+from schemas.trocar_msgs import ShownMarkers, SurfaceFilm
 
 __all__ = ["Blood", "bleeds", "blood_ports"]
 
@@ -33,7 +34,13 @@ def blood_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
         *(port for organ in organs for port in _organ_ports(organ, params.node_period)),
         *(port for name in suctions for port in suction_ports(name)),
         *(port for name in clips for port in clip_ports(name)),
+        *((_clip_bodies(params.node_period),) if clips else ()),
     )
+
+
+def _clip_bodies(period_ns: int) -> Port:
+    shown = "closed clips, for the input `markers` of cameras"
+    return signal_out("clips", ShownMarkers, shown, frame="world", period_ns=period_ns)
 
 
 def _organ_ports(organ: str, period_ns: int) -> tuple[Port, ...]:
@@ -49,6 +56,9 @@ def _organ_ports(organ: str, period_ns: int) -> tuple[Port, ...]:
 def bleeds(organ: OrganParams) -> bool:
     """Return whether liquid may come out of an organ."""
     return organ.bleeding is not None or organ.lumen is not None
+
+
+_NO_CLIPS = clip_markers((), 0)
 
 
 class Blood:
@@ -97,8 +107,15 @@ class Blood:
         return self.outputs
 
     def pictures(self, t: int) -> dict[str, Value]:
-        """Return the films at `t` ns."""
-        return {f"{one.organ.name}/film": one.picture(t) for one in self.bleedings}
+        """Return the films, and the clips, at `t` ns."""
+        films: dict[str, Value] = {f"{one.organ.name}/film": one.picture(t) for one in self.bleedings}
+        return films | {"clips": self._clip_bodies(t)} if self._appliers else films
+
+    def _clip_bodies(self, t: int) -> ShownMarkers:
+        """Return the clips on all tubes; the same object as long as there is none."""
+        tubes = [(one.organ.name, one.clips) for one in self.bleedings if one.clips is not None]
+        bodies = [(name, body) for name, clips in tubes for body in clips.bodies]
+        return clip_markers(bodies, t) if bodies else _NO_CLIPS
 
     def restore(self, parts: Iterator[bytes]) -> None:
         """Go back to a saved `state`; the organs have gone back already."""

@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 
 from engines.fem.blood.bleeding import Bleeding
+from engines.fem.blood.clips import MOST_CLIPS
 from engines.fem.probe import Probe
 from engines.tissue.probes.clip import ClipParams
 from engines.tissue.warn_once import warn_once
@@ -44,17 +45,22 @@ class ClipApplier:
         if not tubes:
             return self._warn("there is no tube to be clipped")
         bleeding, ring, offset = min(tubes, key=lambda tube: float(np.linalg.norm(tube[2])))
-        problem = self._misfit(bleeding, jaws, offset)
-        if problem:
-            bleeding.organ.events.say(SLIPPED, self._probe.name, middle, bleeding.diameter, "m")
-            return self._warn(problem)
-        bleeding.clip(ring, jaws[1] - jaws[0], self._params.width)
-        bleeding.organ.events.say(CLIPPED, self._probe.name, middle, self._params.width, "m")
-        return None
+        problem = self._misfit(bleeding, ring, jaws, offset)
+        if not problem and bleeding.clips is not None:
+            if bleeding.clips.put(ring, jaws[1] - jaws[0], self._params):
+                bleeding.organ.events.say(CLIPPED, self._probe.name, middle, self._params.width, "m")
+                return None
+            problem = f"organ '{bleeding.organ.name}' has {MOST_CLIPS} clips already"
+        bleeding.organ.events.say(SLIPPED, self._probe.name, middle, self._diameter(bleeding, ring), "m")
+        return self._warn(problem)
 
-    def _misfit(self, bleeding: Bleeding, jaws: Vector, offset: Vector) -> str:
-        """Return why a clip does not hold; empty: it holds. `offset`: from its middle to the tube, m."""
-        diameter, (least, most) = bleeding.diameter, self._params.diameters
+    def _diameter(self, bleeding: Bleeding, ring: int) -> float:
+        """Return the outer diameter of a tube at a ring, m."""
+        return 0.0 if bleeding.lumen is None else float(bleeding.lumen.diameters[ring])
+
+    def _misfit(self, bleeding: Bleeding, ring: int, jaws: Vector, offset: Vector) -> str:
+        """Return why a clip does not hold at a ring; empty: it holds. `offset`: to the tube, m."""
+        diameter, (least, most) = self._diameter(bleeding, ring), self._params.diameters
         spread = float(np.linalg.norm(jaws[1] - jaws[0]))
         name = bleeding.organ.name
         if float(np.linalg.norm(offset)) > 0.5 * (diameter + spread):

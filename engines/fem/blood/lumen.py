@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from engines.fem.blood.film import Liquid
 from engines.fem.organ import Organ
-from engines.tissue.meshing.tet_mesh import Indices
+from engines.tissue.organs.inner_wall import InnerWall
 from engines.tissue.organs.lumen import LumenParams
+from robots.vector3 import cross
 from schemas.soft_surface import FaceKind
 from schemas.vectors import Vector
 
@@ -25,6 +26,8 @@ _CONTRACTION = 0.6
 """Discharge coefficient of a sharp-edged orifice."""
 _LEAST_AREA = 1e-10
 """A lumen narrower than 0.01 mm is shut, m^2."""
+_BESIDE = 3
+"""Rings on each side of a clip between which its tube has a direction."""
 _EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
@@ -53,24 +56,19 @@ class _Opening:
 class Lumen:
     """The inner wall as rings of nodes, from the left end to the right."""
 
-    def __init__(self, params: LumenParams, liquid: Liquid, organ: Organ, rings: Indices) -> None:
-        """`rings`: nodes of the inner wall of the uncut mesh, shape (r, a)."""
-        self._params, self._liquid, self._organ, self._rings = params, liquid, organ, rings
-        n = len(organ.mesh.nodes)
-        self._ring_of: NDArray[np.int64] = np.full(n, -1)
-        self._sector_of: NDArray[np.int64] = np.full(n, -1)
-        r, a = np.indices(rings.shape)
-        self._ring_of[rings], self._sector_of[rings] = r, a
-        self._station: Vector = (organ.mesh.nodes * self._axis()).sum(axis=1)
-        self.shut: NDArray[np.bool_] = np.zeros(len(rings), np.bool_)
+    def __init__(self, params: LumenParams, liquid: Liquid, organ: Organ, wall: InnerWall) -> None:
+        """`wall`: the inner wall of the uncut mesh."""
+        self._params, self._liquid, self._organ = params, liquid, organ
+        self._rings, self._ring_of, self._sector_of = wall.rings, wall.ring_of, wall.sector_of
+        self._station, self.diameters = wall.stations, wall.diameters
+        self.shut: NDArray[np.bool_] = np.zeros(len(self._rings), np.bool_)
         """Rings that a clip has shut, shape (r,)."""
+        points = organ.mesh.nodes[self._rings]
+        arms = np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=2)
+        self.walls: Vector = 0.5 * self.diameters - arms.mean(axis=1)
+        """Thickness of the wall at each ring, m, shape (r,)."""
         self._area = float(self.areas(organ.mesh.nodes).mean())
         self._openings: list[_Opening] = []
-
-    def _axis(self) -> Vector:
-        middles = self._organ.mesh.nodes[self._rings].mean(axis=1)
-        way: Vector = middles[-1] - middles[0]
-        return way / np.linalg.norm(way)
 
     def areas(self, nodes: Vector) -> Vector:
         """Return the cross-section at every ring as of a round tube through its nodes, m^2, shape (r,)."""
@@ -82,29 +80,47 @@ class Lumen:
 
     def nearest(self, point: Vector) -> tuple[int, Vector]:
         """Return the ring nearest to a point (m, in `world`), and the way from the point to its middle, m."""
-        ways = self._organ.nodes[self._rings].mean(axis=1) - point
+        ways = self.middles - point
         ring = int(np.linalg.norm(ways, axis=1).argmin())
         return ring, ways[ring]
 
-    def shut_rings(self, ring: int, closing: Vector, width: float) -> NDArray[np.int32]:
-        """Shut the rings within half a width (m) of a ring.
+    def rings_near(self, ring: int, reach: float) -> tuple[int, int]:
+        """Return the first and the last ring whose middles are within `reach` (m) of that of a ring."""
+        middles = self.middles
+        near = np.flatnonzero(np.linalg.norm(middles - middles[ring], axis=1) <= reach)
+        return int(near[0]), int(near[-1])
 
-        Return the pairs of nodes of opposite walls, shape (p, 2), which meet along the direction `closing`.
-        """
-        points = self._organ.nodes[self._rings]
-        middles = points.mean(axis=1)
-        shut = np.flatnonzero(np.linalg.norm(middles - middles[ring], axis=1) <= 0.5 * width)
-        shut = shut[~self.shut[shut]]
-        self.shut[shut] = True
-        half = len(self._rings[0]) // 2
+    def sector_towards(self, ring: int, direction: Vector) -> int:
+        """Return the sector of a ring that lies farthest along a direction."""
+        points = self._organ.nodes[self._rings[ring]]
+        return int(((points - points.mean(axis=0)) * direction).sum(axis=1).argmax())
+
+    def opposite(self, ring: int, sector: int) -> NDArray[np.int32]:
+        """Return pairs of nodes of opposite walls that meet where a sector is pressed, shape (p, 2)."""
+        half = self._rings.shape[1] // 2
         most = (half - 1) // 2
         above = np.array(range(-most, most + 1), np.int64)
-        pairs = [np.zeros((0, 2), np.int64)]
-        for here in shut.tolist():
-            first = int(((points[here] - middles[here]) * closing).sum(axis=1).argmax())
-            sectors = np.stack([first + above, first + half - above], axis=1) % (2 * half)
-            pairs.append(self._rings[here][sectors])
-        return np.concatenate(pairs).astype(np.int32)
+        sectors = np.stack([sector + above, sector + half - above], axis=1) % (2 * half)
+        pairs = self._rings[ring][sectors]
+        return pairs[pairs[:, 0] != pairs[:, 1]].astype(np.int32)
+
+    @property
+    def middles(self) -> Vector:
+        """Middle of every ring now, m, in `world`, shape (r, 3)."""
+        return self._organ.nodes[self._rings].mean(axis=1)
+
+    def frame_at(self, ring: int, sector: int) -> Vector:
+        """Return the axes of a flattened ring: across the tube, along the tube, and where its walls meet.
+
+        `sector`: the pressed one. Shape (3, 3), a column each.
+        """
+        middles, quarter = self.middles, self._rings.shape[1] // 4
+        along: Vector = middles[min(ring + _BESIDE, len(middles) - 1)] - middles[max(ring - _BESIDE, 0)]
+        one, other = self._organ.nodes[self._rings[ring, [sector - quarter, sector - 3 * quarter]]]
+        along /= max(float(np.linalg.norm(along)), 1e-12)
+        across: Vector = one - other - float((along * (one - other)).sum()) * along
+        across /= max(float(np.linalg.norm(across)), 1e-12)
+        return np.column_stack([across, along, cross(across, along)])
 
     def find_openings(self) -> None:
         """Find where the inner wall is open, in a mesh that has been cut."""
@@ -112,10 +128,12 @@ class Lumen:
         slots = np.flatnonzero((surface.kinds != FaceKind.OUTSIDE) & (surface.faces[:, 0] >= 0))
         slots = slots[slots >= len(self._organ.mesh.triangles)]
         origins = solid.origin[surface.faces[slots]]
-        ring, sector = self._opened_edges(origins)
+        ring, sector, width = self._opened_edges(origins)
         crosses, is_open = sector >= 0, ring >= 0
         opened = np.zeros(self._rings.shape, np.bool_)
-        opened[ring[crosses], sector[crosses]] = True
+        for step in range(int(width.max(initial=0))):  # an edge may pass over sectors
+            passes = crosses & (width > step)
+            opened[ring[passes], (sector[passes] + step) % self._rings.shape[1]] = True
         marks = np.zeros(len(self._rings), np.bool_)
         marks[ring[is_open]] = True
         elements = self._station[solid.origin[solid.tetrahedra[solid.owners[slots]]]].mean(axis=1)
@@ -127,8 +145,10 @@ class Lumen:
             share = max(1, sectors) / self._rings.shape[1]
             self._openings.append(_Opening(first, last, share, slots[here], is_left[here]))
 
-    def _opened_edges(self, origins: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return lower ring and sector of each edge of faces, shapes (k, 3).
+    def _opened_edges(
+        self, origins: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Return lower ring, first sector and number of sectors of each edge of faces, shapes (k, 3).
 
         The ring is -1 for an edge that is not open on the inner wall, the sector for an edge along the tube
         too. An edge is open if one of its nodes has parted: else the crack ends there. `origins`: nodes of
@@ -139,10 +159,14 @@ class Lumen:
         parted = np.bincount(self._organ.solid.origin, minlength=len(self._ring_of)) > 1
         is_open = (rings >= 0).all(axis=2) & (np.abs(rings[..., 0] - rings[..., 1]) <= 1)
         is_open &= parted[edges].any(axis=2)
+        around = self._rings.shape[1]
         apart = np.abs(sectors[..., 0] - sectors[..., 1])
-        sector: NDArray[np.int64] = sectors.min(axis=2)
-        sector[apart > 1] = len(self._rings[0]) - 1
-        return np.where(is_open, rings.min(axis=2), -1), np.where(is_open & (apart > 0), sector, -1)
+        wraps = apart > around // 2
+        highest, lowest = sectors.max(axis=2), sectors.min(axis=2)
+        sector = np.asarray(np.where(wraps, highest, lowest), np.int64)
+        width = np.where(wraps, around - apart, apart)
+        ring = np.where(is_open, rings.min(axis=2), -1)
+        return ring, np.where(is_open & (apart > 0), sector, -1), width
 
     def velocity(self, nodes: Vector) -> Vector:
         """Return the flow per area out of each face of the surface, m/s, shape (f,)."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from itertools import pairwise
+from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from engines.tissue.organs.picks import Point
 from schemas.quantity import Pressure, VolumeFlow
 
 __all__ = ["LumenParams"]
@@ -18,6 +20,14 @@ class LumenParams(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    line: tuple[Point, ...] = Field(
+        default=(),
+        max_length=200,
+        description=(
+            "points of the centre line of a hollow mesh, in the organ's own frame, from its left end to its"
+            " right; that of a `tube` is known"
+        ),
+    )
     liquid: Literal["blood", "bile"] = "blood"
     pressure: Pressure = Field(
         default=78.0 * _MMHG,
@@ -36,3 +46,9 @@ class LumenParams(BaseModel):
         gt=0,
         description="most that comes through an end, as of the artery before; default: any",
     )
+
+    @model_validator(mode="after")
+    def _a_line(self) -> Self:
+        if len(self.line) == 1 or any(one == other for one, other in pairwise(self.line)):
+            raise ValueError("the line of a lumen has two points at least, each apart from the one before")
+        return self

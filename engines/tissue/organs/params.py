@@ -22,6 +22,7 @@ from engines.tissue.organs.anchors import AnchorParams, Edges
 from engines.tissue.organs.bleeding import BleedingParams
 from engines.tissue.organs.catalogue import SHAPES, block_shape
 from engines.tissue.organs.cutting import CuttingParams
+from engines.tissue.organs.inner_wall import InnerWall, wall_around, wall_of_rings
 from engines.tissue.organs.layers import LayerParams
 from engines.tissue.organs.lumen import LumenParams
 from engines.tissue.organs.material_file import MaterialFile
@@ -150,8 +151,10 @@ class OrganParams(BaseModel):
                 f"an organ has a size (a block), a shape ({', '.join(SHAPES)}), a mesh (a file) or a tube,"
                 " one of them"
             )
-        if self.lumen is not None and self.tube is None:
-            raise ValueError("a lumen is that of a tube: state `tube`, or leave it out")
+        if self.lumen is not None and (self.tube is None) != bool(self.lumen.line):
+            raise ValueError(
+                "a lumen is that of a `tube`, or of a hollow mesh around the `line` of its lumen: state one"
+            )
         if self.size is not None and not SMALLEST_M <= max(self.size) <= LARGEST_M:
             raise ValueError(
                 f"the longest edge of a block is {SMALLEST_M:g} to {LARGEST_M:g} m, not {max(self.size):g} m"
@@ -177,7 +180,7 @@ class OrganParams(BaseModel):
             raise ValueError("poisson_ratio and density go with young_modulus; a material has its own")
         if sum(part is not None for part in (self.material, self.material_file, self.young_modulus)) > 1:
             raise ValueError("an organ has a material, a material_file or a young_modulus, one of them")
-        _ = self.elastic, self.local, self.anchored_nodes
+        _ = self.elastic, self.local, self.anchored_nodes, self.inner_wall
         return self
 
     def _check_layers(self) -> None:
@@ -277,10 +280,14 @@ class OrganParams(BaseModel):
             return _from_file(self.mesh, _UNITS[self.unit or "m"], self.nodes or _NODES)
         return SHAPES[self.shape or ""]
 
-    @property
-    def inner_rings(self) -> NDArray[np.int64]:
-        """Nodes of the inner wall of a tube, ring by ring from its left end, shape (r, a); else none."""
-        return np.zeros((0, 0), np.int64) if self.tube is None else self.tube.rings(self.nodes or _NODES)
+    @cached_property
+    def inner_wall(self) -> InnerWall | None:
+        """The inner wall of a tube with a lumen. Raises ValueError for a mesh that is not hollow."""
+        if self.lumen is None:
+            return None
+        if self.tube is not None:
+            return wall_of_rings(self.local, self.tube.rings(self.nodes or _NODES), self.tube.diameter)
+        return wall_around(self.local, np.array(self.lumen.line))
 
     @cached_property
     def local(self) -> TetMesh:

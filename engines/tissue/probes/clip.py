@@ -6,7 +6,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from schemas.quantity import Length
+from schemas.quantity import Force, Length
 
 __all__ = ["ClipParams"]
 
@@ -29,6 +29,20 @@ class ClipParams(BaseModel):
             "least and largest outer diameter of tubes that it holds; default: a titanium clip of size"
             " medium-large (tested on arteries by Schenk et al., Innov. Surg. Sci. 1, 2016)"
         ),
+    )
+
+    hold_along: Force = Field(
+        default=4.4,
+        gt=0,
+        description=(
+            "pull along the tube at which a clip comes off; default: middle of 4.08 to 4.78 N of metal"
+            " clips on silicone tubes (Nelson et al., Arch. Surg. 127, 1992)"
+        ),
+    )
+    hold_across: Force = Field(
+        default=2.2,
+        gt=0,
+        description="the same across the tube; default: middle of 1.81 to 2.68 N (as above)",
     )
 
     @model_validator(mode="after")

@@ -1,6 +1,7 @@
 """A tube under pressure: what an opening lets out, and what clips hold back."""
 
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ import pytest
 from engines.fem.blood.film import BLOOD
 from engines.fem.blood.lumen import opening_flow
 from engines.fem.params import FemParams
+from engines.tissue.meshing.tet_mesh import TetMesh
 from hub.participant import Inputs
+from robots import rotation
+from schemas.files import Files
 from schemas.ros import EmptyMessage
 from tests.engines.fem.rig import FemRig
 
@@ -30,7 +34,8 @@ def given(clip=None, **changes):
             "organs": {"block": tube},
             "probes": {"probe": {"spheres": 2, "radius": "1 mm", "clip": clip or {}}},
             "gravity": 0.0,
-        }
+        },
+        context=Files(Path("/")).context,
     )
 
 
@@ -156,6 +161,109 @@ def test_one_clip_leaves_the_other_end_open():
         assert rig.rate == pytest.approx(0.5 * both, rel=0.1)
         rig.clip(6e-3)
         assert rig.rate == 0.0
+
+
+def foreign_tube(folder):
+    """Write a tube as another program would leave it: nodes in any order; return its organ."""
+    tube = FemParams.model_validate({"organs": {"block": TUBE}}).organs["block"].local
+    order = np.random.default_rng(2).permutation(len(tube.nodes))
+    shuffled = TetMesh(tube.nodes[order], np.argsort(order)[tube.tetrahedra])
+    shuffled.write_vtk(folder / "duct.vtk")
+    line = [["-20 mm", 0.0, 0.0], ["20 mm", 0.0, 0.0]]
+    ends = [{"surface": "left"}, {"surface": "right"}]
+    lumen = {"pressure": "78 mmHg", "line": line}
+    return {"tube": None, "nodes": None, "mesh": folder / "duct.vtk", "anchors": ends, "lumen": lumen}
+
+
+def test_an_imported_tube_bleeds_and_is_clipped_as_a_generated_one(tmp_path):
+    with TubeRig() as known, TubeRig(**foreign_tube(tmp_path)) as rig:
+        known.open(0.0)
+        known.hold(0.016)
+        event = rig.clip(-12e-3)[0]
+        assert (event.kind, rig.lumen.shut.any()) == ("clipped", True)
+        rig.open(0.0)
+        rig.hold(0.016)
+        assert rig.rate == pytest.approx(0.5 * known.rate, rel=0.1)
+        rig.clip(12e-3)
+        assert rig.rate == 0.0
+
+
+def test_a_lumen_of_a_solid_mesh_is_refused(tmp_path):
+    organ = foreign_tube(tmp_path)
+    organ["lumen"] = organ["lumen"] | {"line": [["-20 mm", "9 mm", 0.0], ["20 mm", "9 mm", 0.0]]}
+    with pytest.raises(ValueError, match="the mesh has no inner wall around the line of its lumen"):
+        given(**organ)
+    with pytest.raises(ValueError, match="or of a hollow mesh around the `line`"):
+        given(**(organ | {"lumen": {}}))
+
+
+def pull_at_clip(rig, way, most):
+    """Let sphere 0 hold what is under a clip and go along `way`; return event and largest pull."""
+    rig.clip(0.0)
+    clips = rig.engine._blood.bleedings[0].clips
+    nodes = np.unique(rig.organ.solid.ties[clips._clip_of == clips._clip_of.max()])
+    rig.at[:] = FAR
+    rig.hold(0.002)
+    for node in nodes.tolist():
+        rig.organ.anchor(node, 0)
+    largest = 0.0
+    for _ in range(round(most / 0.0125e-3)):
+        rig.move(rig.at + 0.0125e-3 * np.array(way), 0.001)
+        found = [one for one in rig.outputs["block/events"] if one.kind == "clip pulled off"]
+        if found:
+            return found[0], largest
+        pull = rig.organ.solid.force[nodes, :3].astype(float).sum(axis=0)
+        largest = max(largest, float(np.linalg.norm(pull)))
+    return None, largest
+
+
+@pytest.mark.parametrize(
+    ("way", "limits", "expected"),
+    [
+        ((1.0, 0.0, 0.0), {"hold_along": "0.3 N"}, 0.3),
+        ((0.0, 1.0, 0.0), {"hold_across": "0.05 N"}, 0.05),
+    ],
+)
+def test_a_clip_that_is_pulled_too_hard_comes_off_and_the_tube_opens(way, limits, expected):
+    with TubeRig(limits) as rig:
+        event, largest = pull_at_clip(rig, way, 8e-3)
+        assert event is not None
+        assert event.size == pytest.approx(expected, rel=0.15)
+        assert largest < 1.1 * expected
+        assert not rig.lumen.shut.any()
+        assert (rig.organ.solid.ties < 0).all()
+        rig.organ.solid.let_go(0)
+        rig.open(0.0)
+        rig.hold(0.05)
+        assert rig.rate > 0.0
+
+
+def test_a_clip_that_comes_off_leaves_the_others():
+    with TubeRig({"hold_across": "0.05 N"}) as rig:
+        rig.clip(-12e-3)
+        shut = rig.lumen.shut.copy()
+        clips = rig.engine._blood.bleedings[0].clips
+        before = np.sort(rig.organ.solid.ties[clips._clip_of == 0], axis=0)
+        event, _ = pull_at_clip(rig, (0.0, 1.0, 0.0), 8e-3)
+        assert event is not None
+        assert np.array_equal(rig.lumen.shut, shut)
+        assert np.array_equal(np.sort(rig.organ.solid.ties[clips._clip_of == 0], axis=0), before)
+
+
+def test_a_clip_has_a_body_where_it_sits():
+    with TubeRig() as rig:
+        rig.hold(0.02)
+        assert rig.outputs["clips"].types.size == 0
+        rig.clip(5e-3)
+        shown = rig.outputs["clips"]
+        poses, scales = shown.poses.reshape(-1, 7), shown.scales_m.reshape(-1, 3)
+        assert shown.namespaces == ["block/clips"] * 3
+        assert np.abs(poses[:2, 0] - 5e-3).max() < 1.1e-3
+        assert poses[0, 2] - poses[1, 2] == pytest.approx(2.7e-3, rel=0.1)  # two walls of 1 mm, two half legs
+        assert scales[0] == pytest.approx([11e-3, 1.2e-3, 0.7e-3])
+        legs = [rotation.matrix(pose[3:]) for pose in poses[:2]]
+        assert np.abs(legs[0][:, 0]) == pytest.approx([0.0, 1.0, 0.0], abs=0.1)
+        assert np.abs(legs[0][:, 1]) == pytest.approx([1.0, 0.0, 0.0], abs=0.1)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,193 @@
+"""Two organs that hang together: forces, work of separation, cuts, burns, and the same bits."""
+
+import numpy as np
+import pytest
+
+from engines.fem.engine import FemEngine
+from engines.fem.params import FemParams
+from hub.participant import Inputs
+from hub.testing import check_engine
+from schemas.errors import ScenarioError
+from tests.engines.fem.rig import MS, FemRig
+
+BED = {"size": ["24 mm", "20 mm", "8 mm"], "young_modulus": "20 kPa", "nodes": 300}
+FLAP = {
+    "size": ["12 mm", "10 mm", "4 mm"],
+    "position": ["1 mm", "0.7 mm", "4.3 mm"],
+    "young_modulus": "20 kPa",
+    "nodes": 150,
+    "anchors": [],
+}
+AREA, STRENGTH, TOUGHNESS = 120e-6, 2e3, 4.0
+PLATE = {"organs": ["flap", "bed"], "within": "0.6 mm", "strength": STRENGTH, "toughness": TOUGHNESS}
+UP, ASLANT = np.array([0.0, 0.0, 0.06e-3]), np.array([0.1e-3, 0.0, 0.1e-3])
+
+
+def given(plate=PLATE, probe=None, **changes):
+    organs = {"bed": BED | changes.pop("bed", {}), "flap": FLAP | changes.pop("flap", {})}
+    return FemParams.model_validate(
+        {"organs": organs, "attachments": {"plate": plate}, "probes": {"probe": probe or {}}} | changes
+    )
+
+
+class PlateRig(FemRig):
+    """A flap on a bed, and an instrument."""
+
+    def __init__(self, probe=None, start=(0.0, 0.0, 0.05), **changes):
+        super().__init__(given(probe=probe, **changes), start)
+        self.watts, self.said = np.zeros(1), []
+        self.inputs = Inputs(
+            {f"probe/{name}": self.pose for name in ("pose", "position")}
+            | {f"probe/{name}": self.twist for name in ("twist", "velocity")}
+            | {"probe/energy": self.watts}
+        )
+
+    def follow(self, motion, seconds):
+        for k in range(round(seconds * 1e9 / self.period)):
+            super().follow(lambda t, begun=k * self.period * 1e-9: motion(begun + t), self.period * 1e-9)
+            self.said += self.outputs["flap/events"]
+        return self.wrenches
+
+    @property
+    def flap(self):
+        return self.engine._organs[1]
+
+    @property
+    def ties(self):
+        return self.engine._attachments
+
+    @property
+    def freed(self):
+        return float(self.outputs["plate/freed"][0])
+
+    @property
+    def pulled(self):
+        """Force on the flap, N."""
+        return self.outputs["plate/force"]
+
+    def take(self):
+        """Let sphere 0 hold the top of the flap."""
+        top = self.flap.mesh.nodes[:, 2] > self.flap.mesh.nodes[:, 2].max() - 1e-6
+        for node in np.flatnonzero(top).tolist():
+            self.flap.anchor(node, 0)
+
+
+def test_the_tied_area_is_that_of_the_surfaces_which_face_each_other():
+    with PlateRig() as rig:
+        assert rig.ties._area.sum() == pytest.approx(AREA, rel=1e-6)
+        assert rig.freed == 0.0
+
+
+def test_an_attached_organ_hangs_by_its_weight():
+    hanging = {"orientation": [1.0, 0.0, 0.0, 0.0]}
+    below = {"position": ["1 mm", "0.7 mm", "-0.3 mm"]}
+    bed = hanging | {"anchors": [{"surface": "bottom"}]}
+    with PlateRig(bed=bed, flap=below) as rig:
+        weight = float(rig.flap.solid.mass.sum()) * 9.80665
+        rig.hold(0.2)
+        assert rig.pulled[2] == pytest.approx(weight, rel=0.03)
+        assert rig.freed == 0.0
+
+
+def test_a_pulled_organ_comes_off_at_the_strength_and_with_the_work_of_the_attachment():
+    with PlateRig(gravity=0.0) as rig:
+        rig.take()
+        felt = []
+        for _ in range(100):
+            rig.move(rig.at + UP, 0.008)
+            felt.append(rig.pulled[2])
+        assert rig.freed == pytest.approx(AREA, rel=1e-6)
+        assert -min(felt) == pytest.approx(STRENGTH * AREA, rel=0.1)
+        assert sum(rig.power) * 1e-3 == pytest.approx(TOUGHNESS * AREA, rel=0.05)
+        assert {(one.kind, one.instrument) for one in rig.said} == {("detached", "probe")}
+
+
+def test_a_light_pull_opens_nothing_and_is_borne():
+    with PlateRig(gravity=0.0) as rig:
+        rig.take()
+        rig.move(rig.at + ASLANT, 0.1)
+        rig.hold(0.2)
+        assert rig.freed == 0.0
+        assert rig.ties.widest.max() < 0.3e-3
+        assert rig.pulled[2] < -0.02
+        rig.move(rig.at - ASLANT, 0.1)
+        rig.hold(0.2)
+        assert abs(rig.pulled[2]) < 0.005
+
+
+def test_a_flap_that_has_come_off_lies_on_the_bed_again():
+    with PlateRig() as rig:
+        rig.ties.widest[:] = np.inf
+        rig.hold(0.5)
+        gap = rig.flap.nodes[:, 2].min() - 0.0
+        assert -0.2e-3 < gap < 0.2e-3
+        assert rig.freed == pytest.approx(AREA, rel=1e-6)
+
+
+def test_a_blade_between_the_organs_cuts_the_ties_that_it_passes():
+    blade = {"spheres": 2, "radius": "0.5 mm", "blades": [[0, 1]]}
+    start = np.array([[-12e-3, -9e-3, 0.15e-3], [-12e-3, 10e-3, 0.15e-3]])
+    cutting = {"cutting": {}}
+    with PlateRig(blade, start, gravity=0.0, bed=cutting, flap=cutting) as rig:
+        rig.move(start + np.array([13e-3, 0.0, 0.0]), 0.2)
+        rig.hold(0.6)
+        assert rig.freed == pytest.approx(AREA / 2, rel=0.25)
+        assert ("detached", "probe") in {(one.kind, one.instrument) for one in rig.said}
+
+
+def test_heat_parts_the_ties_around_it():
+    hook = {"radius": "1 mm", "energy": {"power": "40 W", "efficiency": 1.0}}
+    with PlateRig(hook, (-5.5e-3, 0.7e-3, 0.5e-3), gravity=0.0) as rig:
+        rig.watts[:] = 40.0
+        rig.hold(1.0)
+        assert 0.0 < rig.freed < AREA / 2
+        parted = np.isinf(rig.ties.widest)
+        places = rig.flap.mesh.nodes[rig.flap.solid.tetrahedra[rig.ties._element, rig.ties._corner]]
+        assert places[parted][:, 0].max() < places[~parted][:, 0].max()
+
+
+def test_saved_in_the_middle_of_parting_it_goes_on_with_the_same_bits():
+    def go(rig):
+        for _ in range(10):
+            rig.move(rig.at + UP, 0.008)
+
+    with PlateRig(gravity=0.0) as rig:
+        rig.take()
+        for _ in range(4):
+            go(rig)
+        assert rig.ties.widest.max() > 0.0
+        saved, at, t = rig.engine.save(), rig.at.copy(), rig.t
+        go(rig)
+        after = rig.hashes[-1]
+        rig.engine.restore(saved)
+        rig.at[:], rig.t = at, t
+        go(rig)
+        assert rig.hashes[-1] == after
+
+
+def test_attachments_keep_the_contract_of_engines():
+    inputs = {"probe/pose": [0, 0, 0.01, 0, 0, 0, 1], "probe/twist": [0.0, 0, -0.02, 0, 0, 0]}
+    check_engine(lambda: FemEngine("tissue", given()), period_ns=4 * MS, inputs=inputs)
+
+
+@pytest.mark.parametrize(
+    ("plate", "problem"),
+    [
+        ({"organs": ["flap", "bad"]}, "there is no organ 'bad'. Did you mean 'bed'"),
+        ({"organs": ["bed", "bed"]}, "'bed' cannot be attached to itself"),
+        ({"strength": 0.0}, "greater than 0"),
+    ],
+)
+def test_attachments_that_cannot_be_are_refused(plate, problem):
+    with pytest.raises(ValueError, match=problem):
+        given(PLATE | plate)
+
+
+def test_organs_that_are_far_apart_cannot_be_attached():
+    with pytest.raises(ScenarioError, match="attachment 'plate': no face of 'flap' that looks at 'bed' is"):
+        PlateRig(flap={"position": ["1 mm", "0.7 mm", "14.3 mm"]})
+
+
+def test_attachments_need_contact_of_organs():
+    with pytest.raises(ValueError, match="leave organ_contact on"):
+        given(organ_contact=False)
