@@ -7,12 +7,12 @@
     joints.time, joints["position"]     # (n,) s of simulated time, (n, 6) rad and m
 
 What is in `__all__` here, in `trocar.messages` (ROS 2 messages), in `trocar.quantities` (parameters with
-units), in `trocar.programs` (programs that lead arms), in `trocar.records` (state with named fields), in
-`trocar.tasks` (training tasks), in `trocar.haptics` (haptic devices), in `trocar.testing` (a driver of one
-participant) and in `trocar.environments` (environments for Gymnasium; the former name `learning.environments`
-works in this release) is public. All other modules of the distribution (`schemas`, `robots`, `hub`,
-`engines`, `controllers`, `devices`, `tasks`, `learning`, `configs`) are private, and may change in any
-release.
+units), in `trocar.programs` (programs that lead arms), in `trocar.policies` (policies that lead arms), in
+`trocar.records` (state with named fields), in `trocar.tasks` (training tasks), in `trocar.haptics` (haptic
+devices), in `trocar.testing` (a driver of one participant) and in `trocar.environments` (environments for
+Gymnasium; the former name `learning.environments` works in this release) is public. All other modules of the
+distribution (`schemas`, `robots`, `hub`, `engines`, `controllers`, `devices`, `tasks`, `learning`, `configs`)
+are private, and may change in any release.
 `python -m trocar` is the command line.
 
 Sessions          `run`, `verify`, `fork`, `load_scenario`, `run_in_process`, `SteppedSession`

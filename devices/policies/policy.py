@@ -1,6 +1,6 @@
 """The protocol of a policy's backend: observation in, rows of actions out.
 
-    policy = open_policy("python:pick.py:Pick", terms, timeout_s=10.0)
+    policy = open_policy("openpi://localhost:8000", terms, timeout_s=10.0)
     policy.reset(0)
     rows = policy.act(observation)     # (rows, width), as the contract states
 
@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, cast
+from urllib.parse import urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ from schemas.vectors import Vector
 __all__ = ["BACKENDS", "Observation", "Policy", "check_actions", "check_backend", "open_policy"]
 
 BACKENDS = {
+    "openpi": "openpi://HOST:PORT, a websocket server of openpi",
+    "groot": "groot://HOST:PORT, a ZeroMQ server of GR00T",
     "python": "python:FILE.py:NAME or python:MODULE:NAME, a function or a class in a process of its own",
 }
 """Prefixes of a backend's address, and the form of each."""
@@ -75,9 +78,18 @@ def check_backend(backend: str) -> str:
         known = "; ".join(BACKENDS.values())
         raise ValueError(f"'{backend}' names no backend.{did_you_mean(prefix, BACKENDS)} Backends: {known}")
     rest = backend.removeprefix(f"{prefix}:")
-    if not all(rest.rpartition(":")[::2]):
+    is_address = prefix in ("openpi", "groot")
+    if not (_is_address(backend) if is_address else all(rest.rpartition(":")[::2])):
         raise ValueError(f"'{backend}' is incomplete, expected {BACKENDS[prefix]}")
     return backend
+
+
+def _is_address(backend: str) -> bool:
+    try:
+        parts = urlsplit(backend)
+        return bool(parts.hostname and parts.port)
+    except ValueError:  # a port that is no number
+        return False
 
 
 def open_policy(
@@ -104,6 +116,15 @@ def open_policy(
         check_backend(backend)
     except ValueError as error:
         raise DeviceError(str(error)) from error
+    prefix = backend.partition(":")[0]
+    if prefix == "openpi":
+        from devices.policies.openpi import OpenPiPolicy
+
+        return OpenPiPolicy(backend, terms, timeout_s)
+    if prefix == "groot":
+        from devices.policies.groot import GrootPolicy
+
+        return GrootPolicy(backend, terms, timeout_s)
     from devices.policies.child import ChildPolicy
 
     return ChildPolicy(backend, terms, timeout_s, directory or Path.cwd(), python)
