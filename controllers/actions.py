@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from controllers.motion.frames import base_in_world
+from controllers.motion.joint_errors import JointErrors
 from controllers.motion.params import Arms, PsmParams, SetupJoints
 from hub.participant import (
     Controller,
@@ -88,6 +89,9 @@ class ActionsParams(Params):
     workspace: tuple[_Point, _Point] = Field(
         description="two opposite corners, in the world, between which the goals of the tips stay"
     )
+    joint_errors: JointErrors = Field(
+        default=JointErrors(), description="of the arms' encoders, unknown to whoever acts"
+    )
 
     @model_validator(mode="after")
     def _has_its_hands(self) -> Self:
@@ -126,6 +130,10 @@ class _Hand:
         now.start[:] = now.end[:] = now.command[:] = held.start
         now.goal[:] = matrix_to_pose(self.base @ self.chain.frames(now.start)[-1])
         now.jaw[0] = now.jaw_start = now.jaw_end = held.jaw
+        self.offsets = params.joint_errors.of(arm, len(held.chain.joints))
+        """True minus measured joint positions, rad and m."""
+        # without offsets the command itself is the output, to the bit
+        self.servo = now.command + self.offsets if self.offsets.any() else now.command
 
     def act(self, action: Vector) -> None:
         """Begin to go where an action, shape (5,), of -1 to 1, leads."""
@@ -183,7 +191,7 @@ class Actions(Controller):
         self.keep(self._progress, *(hand.state for hand in self._hands), *powers)
         self._outputs: dict[str, Any] = {}
         for hand in self._hands:
-            self._outputs[f"{hand.arm}/servo_jp"] = hand.state.command
+            self._outputs[f"{hand.arm}/servo_jp"] = hand.servo
             if hand.power.size:
                 self._outputs[f"{hand.arm}/energy"] = hand.power
             else:
@@ -219,7 +227,7 @@ class Actions(Controller):
         periods = self._progress.periods - self._wait
         self._progress.periods += 1
         if periods < 0:
-            return self._outputs
+            return self._through_encoders()
         part = periods % self._count
         if part == 0:
             action = np.clip(inputs["action"], -1.0, 1.0).reshape(-1, _NUMBERS)
@@ -227,7 +235,24 @@ class Actions(Controller):
                 hand.act(own)
         for hand in self._hands:
             hand.go((part + 1) / self._count)
+        return self._through_encoders()
+
+    def _through_encoders(self) -> Outputs:
+        for hand in self._hands:
+            if hand.servo is not hand.state.command:
+                np.add(hand.state.command, hand.offsets, out=hand.servo)
         return self._outputs
+
+    @property
+    def has_joint_errors(self) -> bool:
+        """Whether the encoders of a hand have offsets."""
+        return any(hand.offsets.any() for hand in self._hands)
+
+    def measured_tip(self, arm: str, q: Vector) -> Vector:
+        """Return the pose of the tip of `arm` in the world, shape (7,), as encoders tell at true `q`."""
+        hand = next(hand for hand in self._hands if hand.arm == arm)
+        frames = hand.chain.frames(q - hand.offsets)
+        return matrix_to_pose(hand.base @ frames[-1])
 
 
 def _ports(hand: _Hand) -> tuple[Port, ...]:

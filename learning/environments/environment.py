@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -51,6 +52,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         record: A directory in which each episode is recorded, `episode-00000` and so on.
         terminate_on_success: End an episode when its goal is reached, instead of going on to hold it.
         step: Simulated time of a step, s.
+        delay: Age of observations, s, as of a slow camera or link; reward and success are of now.
         settings: Values of the scenario, as `trocar.load_scenario` takes them.
     """
 
@@ -68,6 +70,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         record: str | Path | None = None,
         terminate_on_success: bool = False,
         step: float = 0.2,
+        delay: float = 0.0,
         settings: Mapping[str, Any] | None = None,
     ) -> None:
         if reward not in ("sparse", "shaped"):
@@ -91,12 +94,13 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._session = trocar.SteppedSession(
             trocar.load_scenario(str(scene), set={**own, **(settings or {})})
         )
-        self._count, rest = divmod(round(step * 1e9), self._session.plan.step_ns)
-        if rest or not self._count:
+        self._count = self._count_steps("step", step)
+        if not self._count:
             self._session.close()
-            raise ValueError(
-                f"step {step:g} s is no multiple of the scenario's {self._session.plan.step_ns / 1e9:g} s"
-            )
+            raise ValueError(f"step {step:g} s: an environment's step takes time")
+        late, self._lag = divmod(self._count_steps("delay", delay), self._count)
+        self._past: deque[Observation] = deque(maxlen=late + 1)
+        """Observations on their way, the oldest first."""
         self._settling = -(-settling_ns // self._session.plan.step_ns)
         self.exercise = exercise(cast("Task", self._session.participant("task")))
         self._view = self._new_view()
@@ -104,6 +108,18 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._closed = False
         self._episode, self._seen, self._harm = 0, set[str](), 0.0
         self._goal = np.zeros(exercise.goal_size)
+        self.events: tuple[TaskEvent, ...] = ()
+        """Events of the task in the last step."""
+
+    def _count_steps(self, name: str, duration: float) -> int:
+        """Return the scenario's steps in a duration, s. Raises ValueError for another than a multiple."""
+        count, rest = divmod(round(duration * 1e9), self._session.plan.step_ns)
+        if rest or count < 0:
+            self._session.close()
+            raise ValueError(
+                f"{name} {duration:g} s is no multiple of the scenario's {self._session.plan.step_ns / 1e9:g} s"
+            )
+        return count
 
     def _new_view(self) -> EnvironmentView:
         return EnvironmentView(self._session, self.exercise.task, self.exercise.hands)
@@ -141,22 +157,24 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode; the `seed` decides the starting places and the goal.
 
-        `options`: none are known. Objects are put and seen before the first action is due, after 20 ms;
-        without any, the first action is due at once.
+        Objects are put and seen before the first action is due, after 20 ms; without any, the first action is
+        due at once. The option `record` names a new directory for the recording of this episode.
         """
         self._require_open()
         super().reset(seed=seed)
-        if options:
-            raise ValueError(f"options {sorted(options)}: there are none")
+        if unknown := sorted(set(options or {}) - {"record"}):
+            raise ValueError(f"options {unknown}: there is only 'record'")
         starts, self._goal = self.exercise.draw(self.np_random)
-        self._session.restart(self._next_recording())
+        named = (options or {}).get("record")
+        self._session.restart(Path(named) if named else self._next_recording())
         self._view = self._new_view() if not self._session.restores else self._view
         self._seen.clear()
         self._harm = 0.0
         inputs = {f"robot.{thing}/place": (_stamp_pose(pose),) for thing, pose in starts.items()}
         self._session.advance(self._settling, inputs)
-        observation = self._observe()
-        return observation, self._info(observation, 0.0)
+        self._past.clear()
+        self._past.extend([self._observe()] * (self._past.maxlen or 1))
+        return self._past[0], self._info(self._achieved(), 0.0)
 
     def _next_recording(self) -> Path | None:
         if self._record is None:
@@ -172,16 +190,20 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         """
         self._require_open()
         given = self._numbers(action)
-        self._session.advance(self._count, {"actions.action": np.clip(given, -1.0, 1.0)})
-        observation = self._observe()
-        events = cast("tuple[TaskEvent, ...]", self._session["task.events"])
+        self._session.advance(self._count - self._lag, {"actions.action": np.clip(given, -1.0, 1.0)})
+        self._past.append(self._observe())
+        if self._lag:
+            self._session.advance(self._lag)
+            self._view.read()
+        self.events = cast("tuple[TaskEvent, ...]", self._session["task.events"])
         harm, before = self.exercise.harm(self._view), self._harm
         self._harm = harm
-        extra = event_bonus([event.event for event in events], self._seen) + before - harm
-        info = self._info(observation, extra)
-        worth = float(self.compute_reward(observation["achieved_goal"], observation["desired_goal"], info))
+        extra = event_bonus([event.event for event in self.events], self._seen) + before - harm
+        achieved = self._achieved()
+        info = self._info(achieved, extra)
+        worth = float(self.compute_reward(achieved, self._clip(self._goal), info))
         terminated = self.exercise.has_lost_object(self._view) or (self._terminates and info["is_success"])
-        return observation, worth, terminated, False, info
+        return self._past[0], worth, terminated, False, info
 
     def _numbers(self, action: Any) -> Vector:
         """Return an action as numbers, shape of the action space. Raises ActionError."""
@@ -213,22 +235,24 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _observe(self) -> Observation:
         self._view.read()
-        parts = {
-            "observation": self._view.vector(),
-            "achieved_goal": self.exercise.achieved_goal(self._view),
-            "desired_goal": self._goal,
-        }
         found: Observation = {
-            name: np.clip(value, -_FAR, _FAR).astype(np.float32) for name, value in parts.items()
+            "observation": self._clip(self._view.vector()),
+            "achieved_goal": self._achieved(),
+            "desired_goal": self._clip(self._goal),
         }
         if self.images:
             found |= self._pictures()
         return found
 
-    def _info(self, observation: Observation, extra: float) -> dict[str, Any]:
-        reached = self.exercise.tolerance.is_reached(
-            observation["achieved_goal"], observation["desired_goal"]
-        )
+    def _achieved(self) -> NDArray[np.float32]:
+        return self._clip(self.exercise.achieved_goal(self._view))
+
+    @staticmethod
+    def _clip(values: Vector) -> NDArray[np.float32]:
+        return np.clip(values, -_FAR, _FAR).astype(np.float32)
+
+    def _info(self, achieved: NDArray[np.float32], extra: float) -> dict[str, Any]:
+        reached = self.exercise.tolerance.is_reached(achieved, self._clip(self._goal))
         return {"is_success": bool(reached), "bonus": extra}
 
     def _pictures(self) -> dict[str, NDArray[np.uint8]]:

@@ -6,10 +6,12 @@ Metres and radians; quaternions (x, y, z, w).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
 import trocar
+from controllers.actions import Actions
 from robots import rotation
 from schemas.vectors import Vector
 from tasks.instant import base_pose
@@ -46,6 +48,9 @@ class EnvironmentView:
         """Poses of the tips, shape (m, 7), and openings of the jaws, rad, shape (m,); of an electrode 1 with
         power, else 0.
         """
+        self._actions = cast("Actions", session.participant("actions"))
+        self.measured_tips = np.zeros((m, 7)) if self._actions.has_joint_errors else self.tips
+        """Poses of the tips as measured: encoders with offsets do not tell the truth."""
         self.poses, self.held = np.zeros((n, 7)), np.zeros((n, m))
         """Poses of the things, shape (n, 7), and whether each hand holds each, shape (n, m)."""
         self.tissue = dict.fromkeys(self._tissue, 0.0)
@@ -58,6 +63,9 @@ class EnvironmentView:
             tip, base = session.read(f"robot.{arm}/measured_cp"), self._bases[i]
             self.tips[i, :3] = base[:3, :3] @ tip["position"] + base[:3, 3]
             self.tips[i, 3:] = rotation.product(self._turns[i], tip["orientation"])
+            if self.measured_tips is not self.tips:
+                q = session[f"robot.{arm}/measured_js"]
+                self.measured_tips[i] = self._actions.measured_tip(arm, q[: len(q) // 3])
             if arm in self._powers:
                 self.jaws[i] = session[self._powers[arm]][0] > 0.0
             else:
@@ -82,6 +90,6 @@ class EnvironmentView:
 
     def vector(self) -> Vector:
         """Return all values in a row, shape (size,), in the order of `names`."""
-        hands = np.column_stack([self.tips, self.jaws])
+        hands = np.column_stack([self.measured_tips, self.jaws])
         things = np.column_stack([self.poses, self.held])
         return np.concatenate([hands.ravel(), things.ravel(), [*self.tissue.values()]])
