@@ -47,6 +47,10 @@ def view(
     read_only: Annotated[
         bool, typer.Option("--read-only", help="The link is that of a viewer, who steers and leads nothing.")
     ] = False,
+    at: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", min=0.0, help="Begin at this instant of the recording."),
+    ] = None,
     trust: Annotated[
         bool, typer.Option("--trust", help="Read files other than those of the recording, to draw its scene.")
     ] = False,
@@ -67,6 +71,8 @@ def view(
         raise ScenarioError(
             f"--foxglove is for a running session; Foxglove opens the file of '{recording}' itself"
         )
+    if at is not None and recording is None:
+        raise ScenarioError("--at is for a recording; a running session is shown as it runs")
     for package in ("foxglove", "cryptography") if foxglove else ():
         if find_spec(package) is None:
             raise MissingExtraError("trocar view --foxglove", "foxglove", package)
@@ -83,6 +89,7 @@ def view(
         listen=listen,
         certificates=certs,
         browse=open_,
+        at=at,
         foxglove=foxglove,
         role="viewer" if read_only else "operator",
         one_session=one_session,

@@ -43,6 +43,7 @@ def serve(
     listen: str | None = None,
     certificates: Path | None = None,
     browse: bool = True,
+    at: float | None = None,
     foxglove: bool = False,
     role: Role = "operator",
     one_session: bool = False,
@@ -59,6 +60,7 @@ def serve(
         listen: Where to listen to further machines, such as tls/0.0.0.0:8470; None: on loopback alone.
         certificates: The hub's certificate for `listen`, or the directory; None: the directory of this user.
         browse: Open the page in a browser.
+        at: Instant of the recording to begin at, s; None: its start.
         foxglove: Let Foxglove look too, by a separate link.
         role: Role of the holder of the printed link.
         one_session: Show the first session only, then its recording until the last page has gone.
@@ -82,7 +84,7 @@ def serve(
         console = Console(source, Pilots())
         afterlife = Afterlife(console, stack) if one_session else None
         library = Library(home_of(recording), console, stack)
-        _serve(console, listening, library, role, afterlife, browse=browse, foxglove=foxglove)
+        _serve(console, listening, library, role, afterlife, browse=browse, at=at, foxglove=foxglove)
 
 
 def _terminate(_number: int, _frame: FrameType | None) -> None:
@@ -97,13 +99,14 @@ def _serve(
     afterlife: Afterlife | None,
     *,
     browse: bool,
+    at: float | None,
     foxglove: bool,
 ) -> None:
     source = console.source
     face = _foxglove_door(console) if foxglove else None
     others = {} if face is None else {_FOXGLOVE: face.relay}
     server = Server(console, listening, others, afterlife, library)
-    link = f"{listening.origins[0]}{server.gate.invite(role)}"
+    link = f"{listening.origins[0]}{server.gate.invite(role)}" + (f"#t={at:.3f}" if at is not None else "")
     hosted = HostedDevices(console.pilots)
     if isinstance(source, Live):
 

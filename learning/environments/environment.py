@@ -117,7 +117,8 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         if rest or count < 0:
             self._session.close()
             raise ValueError(
-                f"{name} {duration:g} s is no multiple of the scenario's {self._session.plan.step_ns / 1e9:g} s"
+                f"{name} {duration:g} s is no multiple of the scenario's"
+                f" {self._session.plan.step_ns / 1e9:g} s"
             )
         return count
 
@@ -146,6 +147,21 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
             layout[name] = slice(at, at + size)
             at += size
         return layout
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since reset, s."""
+        return self._session.time_ns / 1e9
+
+    @property
+    def goals(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """The achieved and the desired goal now, however old the observations are."""
+        return self._achieved(), self._clip(self._goal)
+
+    @property
+    def has_lost_object(self) -> bool:
+        """Whether an object has fallen out of the scene."""
+        return self.exercise.has_lost_object(self._view)
 
     @property
     def state_hash(self) -> str:
@@ -202,7 +218,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         achieved = self._achieved()
         info = self._info(achieved, extra)
         worth = float(self.compute_reward(achieved, self._clip(self._goal), info))
-        terminated = self.exercise.has_lost_object(self._view) or (self._terminates and info["is_success"])
+        terminated = self.has_lost_object or (self._terminates and info["is_success"])
         return self._past[0], worth, terminated, False, info
 
     def _numbers(self, action: Any) -> Vector:

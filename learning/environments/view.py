@@ -6,12 +6,11 @@ Metres and radians; quaternions (x, y, z, w).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from typing import Protocol, cast
 
 import numpy as np
 
 import trocar
-from controllers.actions import Actions
 from robots import rotation
 from schemas.vectors import Vector
 from tasks.instant import base_pose
@@ -27,6 +26,15 @@ _TISSUE = {
     "tissue/dead": "flap/base/dead",
 }
 """Ports of a scene's tissue by name in an observation."""
+
+
+class _Hands(Protocol):
+    """The scene's `actions`: arms with encoders."""
+
+    @property
+    def has_joint_errors(self) -> bool: ...
+
+    def measured_tip(self, arm: str, q: Vector) -> Vector: ...
 
 
 class EnvironmentView:
@@ -48,7 +56,7 @@ class EnvironmentView:
         """Poses of the tips, shape (m, 7), and openings of the jaws, rad, shape (m,); of an electrode 1 with
         power, else 0.
         """
-        self._actions = cast("Actions", session.participant("actions"))
+        self._actions = cast("_Hands", session.participant("actions"))
         self.measured_tips = np.zeros((m, 7)) if self._actions.has_joint_errors else self.tips
         """Poses of the tips as measured: encoders with offsets do not tell the truth."""
         self.poses, self.held = np.zeros((n, 7)), np.zeros((n, m))

@@ -24,7 +24,8 @@ import trocar
 from learning.own_directory import MARKER, whole_file
 from learning.sweeps.trial import Trial, plan_trials, run_trial
 from learning.sweeps.variation import Variation
-from schemas.errors import ConnectError, ScenarioError, SessionError
+from learning.workers import run_calls
+from schemas.errors import ScenarioError
 
 __all__ = ["Sweep"]
 
@@ -126,7 +127,8 @@ class Sweep:
         ConnectError if there is no cluster, and SessionError if the cluster fails.
         """
         pending = self.pending()
-        made = _on_ray(ray, self._calls(pending)) if ray else _run_here(jobs, self._calls(pending))
+        # threads: a trial is a process already, and one that dies takes no worker with it
+        made = run_calls(run_trial, self._calls(pending), jobs, ray=ray, workers="threading")
         for number, found in made:
             row = {"scenario_hash": self.scenario_hash} | found
             _write(self._row(pending[number]), json.dumps(row, indent=2) + "\n")
@@ -164,44 +166,6 @@ class Sweep:
 
     def _row(self, trial: Trial) -> Path:
         return self.directory / "trials" / f"{trial.name}.json"
-
-
-def _run_here(jobs: int, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str, Any]]]:
-    from joblib import Parallel, delayed
-
-    # threads: a trial is a process already, and one that dies takes no worker with it
-    parallel = Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered", batch_size=1)
-    yield from parallel(delayed(_call_numbered)(number, call) for number, call in enumerate(calls))
-
-
-def _on_ray(address: str, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str, Any]]]:
-    import ray
-    from ray.exceptions import RayError
-
-    # joblib's own backend for Ray gives results only when all are there, which an interruption would lose
-    try:
-        ray.init(address=address, log_to_driver=False)
-    except (OSError, RuntimeError, ValueError) as error:
-        raise ConnectError(
-            f"no Ray cluster at '{address}': {error}. Run the command on a node of the cluster, with auto or"
-            " the HOST:PORT of `ray status`"
-        ) from error
-    try:
-        run = ray.remote(num_cpus=1)(_call_numbered)
-        pending = [run.remote(number, call) for number, call in enumerate(calls)]
-        while pending:
-            done, pending = ray.wait(pending)
-            yield ray.get(done[0])
-    except RayError as error:
-        raise SessionError(
-            f"the Ray cluster at '{address}' has failed: {error}. The same command continues the sweep"
-        ) from error
-    finally:
-        ray.shutdown()
-
-
-def _call_numbered(number: int, call: _Call) -> tuple[int, dict[str, Any]]:
-    return number, run_trial(*call)
 
 
 def _setting_texts(settings: Mapping[str, Any]) -> dict[str, str]:
