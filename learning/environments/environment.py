@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, ClassVar, Literal, cast
@@ -189,7 +190,8 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         inputs = {f"robot.{thing}/place": (_stamp_pose(pose),) for thing, pose in starts.items()}
         self._session.advance(self._settling, inputs)
         self._past.clear()
-        self._past.extend([self._observe()] * (self._past.maxlen or 1))
+        first = self._observe()
+        self._past.extend(deepcopy(first) for _ in range(self._past.maxlen or 1))  # each is given away once
         return self._past[0], self._info(self._achieved(), 0.0)
 
     def _next_recording(self) -> Path | None:

@@ -49,7 +49,7 @@ def _result(exercise: str, difficulty: str, rows: Sequence[Row]) -> Result:
         success_rate(len(successes), len(rows)),
         median(row["time_s"] for row in successes) if successes else None,
         median(sum(_metrics(row, "path_length")) for row in successes) if successes else None,
-        max(forces, default=None),
+        max(forces, default=0.0) or None,  # of lean arms, forces are not measured and 0
         sum(row["counts"].get("dropped", 0) for row in rows),
         dict(Counter(kind for row in rows for kind in row["first"]).most_common()),
         dict(Counter(row["failure"] for row in rows if row["failure"]).most_common()),

@@ -295,3 +295,57 @@ def test_gymnasium_records_a_film(tmp_path):
     env.close()
     with av.open(str(tmp_path / "films/rl-video-episode-0.mp4")) as film:
         assert len(list(film.decode(video=0))) == STEPS + 1
+
+
+@pytest.mark.parametrize("steps", [1, 1.5, 2])
+def test_old_observations_are_those_of_the_past(steps):
+    now = gymnasium.make("trocar/Reach-v0")
+    late = gymnasium.make("trocar/Reach-v0", delay=0.2 * steps)
+    (first, _), (old, _) = now.reset(seed=3), late.reset(seed=3)
+    seen = [first, first, first]
+    for action in actions(3, 5):
+        new, reward, *_ = now.step(action)
+        old, same, *_ = late.step(action)
+        seen.append(new)
+        assert same == reward  # of now
+        past = seen[-1 - int(steps)]["observation"]
+        if steps != 1.5 or len(seen) == 4:  # nothing is older than the first observation
+            np.testing.assert_array_equal(old["observation"], past)
+        else:
+            before = seen[-3]["observation"]
+            assert not np.array_equal(old["observation"], past)
+            assert not np.array_equal(old["observation"], before)
+            assert np.linalg.norm((old["observation"] - past)[:3]) < 0.01
+    assert late.unwrapped.state_hash == now.unwrapped.state_hash
+    now.close()
+    late.close()
+
+
+def test_a_delay_is_a_multiple_of_the_scenarios_step():
+    with pytest.raises(ValueError, match=r"delay 0\.001 s is no multiple of the scenario's 0\.02 s"):
+        gymnasium.make("trocar/Reach-v0", delay=0.001)
+
+
+def test_encoders_with_offsets_lie_to_the_policy():
+    errors = {"participants.actions.joint_errors": {"PSM1": ["2 deg", "0 deg", "0 mm"]}}
+    env = gymnasium.make("trocar/Reach-v0", settings=errors)
+    true = gymnasium.make("trocar/Reach-v0")
+    (told, _), (truth, _) = env.reset(seed=3), true.reset(seed=3)
+    for _ in range(3):
+        told, *_ = env.step(np.zeros(5))
+        truth, *_ = true.step(np.zeros(5))
+    # the servo follows the encoder: the arm stands elsewhere, and the encoder says where it was sent
+    np.testing.assert_allclose(told["observation"][:3], truth["observation"][:3], atol=2e-4)
+    off = np.linalg.norm(told["achieved_goal"] - truth["achieved_goal"])
+    assert off == pytest.approx(np.radians(2.0) * 0.15, rel=0.2)
+    env.close()
+    true.close()
+
+
+def test_an_episode_is_recorded_where_reset_says(needle, tmp_path):
+    needle.reset(seed=1, options={"record": tmp_path / "mine"})
+    needle.step(np.zeros(5))
+    needle.reset(seed=2)
+    assert trocar.verify(tmp_path / "mine").same
+    with pytest.raises(ValueError, match="there is only 'record'"):
+        needle.reset(options={"recrod": tmp_path})
