@@ -8,13 +8,17 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hub.devices.network_link_control import NetworkLinkRequest
+from hub.participant.appearance import RestBody
 from hub.recording.bond_trace import Contact
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.codec import decode
 from schemas.errors import MessageError, ScenarioError
 from schemas.soft_surface import SoftSurface
 from schemas.trocar_msgs import ScoreCard, SoftBodyState
+from webconsole.appearance import PageAppearance, find_appearance
 from webconsole.changes import wrong_fields
 from webconsole.commands import Control, Fork, Network, Pick, Say, Start, Tune
 from webconsole.fork import fork_arguments, fork_modules
@@ -61,6 +65,9 @@ class Console:
         self._made: dict[str, tuple[Value, Section]] = {}
         self._firsts: dict[str, SoftSurface] = {}
         """Surfaces at time 0, by outlet of the nodes."""
+        self._appearance: tuple[int, dict[str, bool], PageAppearance | None] | None = None
+        """Generation, whether each soft body was known, and the appearance."""
+        self._dressing = asyncio.Lock()
 
     async def stage(self) -> Stage | None:
         """Return the stage of the present session; None without a session."""
@@ -107,6 +114,32 @@ class Console:
                 return None
             self._firsts[name] = SoftSurface.of_first(state)
         return self._firsts.get(name)
+
+    async def appearance(self) -> PageAppearance | None:
+        """Return the appearance of the present session, with the soft bodies known by now; None: none."""
+        stage, scenario = await self.stage(), self.source.scenario
+        if stage is None or scenario is None:
+            return None
+        async with self._dressing:
+            rests = {name: await asyncio.to_thread(self._rest, name) for name in stage.surfaces}
+            known = {name: rest is not None for name, rest in rests.items()}
+            if self._appearance is None or self._appearance[:2] != (self._generation, known):
+                found = await asyncio.to_thread(find_appearance, scenario, self.source.params, rests)
+                self._appearance = self._generation, known, found
+            return self._appearance[2]
+
+    def _rest(self, name: str) -> RestBody | None:
+        """Return a soft body at time 0; None if unknown. Raises MessageError if invalid."""
+        first, surface = self.source.first(name), self.first_surface(name)
+        if first is None or surface is None:
+            return None
+        nodes = decode(SoftBodyState, first.payload).nodes_m.reshape(-1, 3)
+        return RestBody(nodes, surface.faces.astype(np.uint32))
+
+    def texture(self, name: str) -> bytes | None:
+        """Return a texture of the present appearance by its hash; None: there is no such texture."""
+        found = self._appearance and self._appearance[2]
+        return found.textures.get(name) if found else None
 
     def change(self, stage: Stage, name: str, first: SoftSurface, value: Value) -> Section:
         """Return the section with the changes of a surface, made once for all pages."""

@@ -35,10 +35,10 @@ __all__ = [
 ]
 
 MAGIC = b"TRCF"
-VERSION = 2
+VERSION = 3
 _HEAD = struct.Struct("<4sHHqII")
 _SECTION = struct.Struct("<HHI")
-_ACK = struct.Struct("<I")
+_ACK = _COUNT = struct.Struct("<I")
 _ALIGN = 8
 
 
@@ -65,6 +65,8 @@ class SectionKind(IntEnum):
     """Difference of a soft surface from its triangles: `change_content`."""
     FILM = 10
     """Liquid on a soft surface: `film_content`."""
+    SMOKE = 11
+    """f32: smoke of a soft surface, g/s."""
 
 
 class Section(NamedTuple):
@@ -103,12 +105,17 @@ def node_content(nodes: NDArray[np.float32]) -> bytes:
 
 
 def change_content(change: SurfaceChange) -> bytes:
-    """Return slots, u32 (k,), their faces as node indices, i32 (k, 3), and the kinds of the faces, u8 (k,).
+    """Return the content of a change; empty without changed faces.
 
-    A face of three times -1 is gone.
+    It is their number k, u32, their slots, u32 (k,), the faces as node indices, i32 (k, 3), the first node at
+    the resting place of each appended node, u32 (m,), and the kinds of the faces, u8 (k,). A face of three
+    times -1 is gone.
     """
+    if not change.slots.size:
+        return b""
     slots, faces = change.slots.astype("<u4"), change.faces.astype("<i4")
-    return slots.tobytes() + faces.tobytes() + change.kinds.tobytes()
+    numbers = _COUNT.pack(len(slots)) + slots.tobytes() + faces.tobytes()
+    return numbers + change.origins.astype("<u4").tobytes() + change.kinds.tobytes()
 
 
 def film_content(film: SurfaceFilm) -> bytes:

@@ -101,6 +101,9 @@ class NewSections:
             if before is None or self._console.film(stage, name, before) != section:
                 yield section
         yield from self._changed_section(stage, name)
+        smoke = self._newest(stage.smokes[name]) if name in stage.smokes else None
+        if smoke is not None and self._are_new({stage.smokes[name]: smoke}, "smoke "):
+            yield stage.smoke(name, smoke)
 
     def _force_arrows(self, stage: Stage, bond: BondArrows) -> Iterator[Section]:
         place, force = self._newest(bond.place), self._newest(bond.force)

@@ -46,6 +46,8 @@ _MOST_BUCKETS = 4000
 _MOST_CONTACTS, _MOST_POINTS = 6, 300
 """Contacts of a bond on a page, and points of each."""
 _BINARY = "application/octet-stream"
+_FOR_EVER = "private, max-age=31536000, immutable"
+"""Cache-Control of content named by its hash."""
 
 
 class _WebSocket(WebSocketsSansIOProtocol):
@@ -85,6 +87,8 @@ class Server:
                 Route("/", asset),
                 Route("/web/{name:path}", asset),
                 Route("/scene", self._scene),
+                Route("/appearance", self._appearance),
+                Route("/texture/{name}", self._texture),
                 Route("/series", self._series),
                 Route("/contacts", self._contacts),
                 Route("/events", self._events),
@@ -200,6 +204,24 @@ class Server:
         if stage is None:
             return PlainTextResponse("no session\n", status_code=404)
         return gzip_response(stage.packed_geometry, _BINARY)
+
+    async def _appearance(self, request: Request) -> Response:
+        """Answer with the appearance of the scene; 204: the session has none."""
+        try:
+            found = await (await self._console_for(request)).appearance()
+        except TrocarError as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)
+        return Response(status_code=204) if found is None else gzip_response(found.packed, _BINARY)
+
+    async def _texture(self, request: Request) -> Response:
+        """Answer with a texture by its hash: a browser asks once, whatever the session."""
+        try:
+            picture = (await self._console_for(request)).texture(request.path_params["name"])
+        except TrocarError as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)
+        if picture is None:
+            return PlainTextResponse("no such texture\n", status_code=404)
+        return Response(picture, media_type="image/jpeg", headers={"Cache-Control": _FOR_EVER})
 
     async def _series(self, request: Request) -> Response:
         """Answer with the rows of a numeric port of a recording, f64; their columns are in a header."""

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import gzip
-import json
 import logging
-import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib.metadata import entry_points
@@ -32,6 +30,7 @@ from webconsole.followers import find_followers
 from webconsole.frame import Section, SectionKind, change_content, film_content, node_content
 from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
+from webconsole.packing import pack
 from webconsole.source import Outlet, Value
 
 __all__ = ["GROUP", "Stage"]
@@ -40,7 +39,6 @@ log = logging.getLogger(__name__)
 
 GROUP = "trocar.scenes"
 """Entry-point group: kind of participant -> function from parameters to a scene."""
-_LENGTH = struct.Struct("<I")
 _FLESH: Rgb = (0.8, 0.38, 0.33)
 """Colour of a surface without a scene."""
 _NOTE = 1000
@@ -85,6 +83,12 @@ class Stage:
         self.pictures = _of_type(outlets, CompressedImage)
         self.numbers = {one.name: VectorCodec(one.port) for one in signals if has_vector(one.port.type)}
         """The numeric outlets."""
+        self.smokes = {
+            name: smoke
+            for name in self.surfaces
+            if (smoke := f"{name.removesuffix('nodes')}smoke") in self.numbers
+        }
+        """Outlet of the smoke of the surface, by the outlet of the nodes."""
         self.gauges = {one.name: GAUGES[one.port.type] for one in signals if one.port.type in GAUGES}
         """The plottable outlets of the hub."""
         drawn = {name for participant in self.scenes for name in self.inputs(participant)}
@@ -107,6 +111,7 @@ class Stage:
                 *self.surfaces,
                 *self.changes.values(),
                 *self.films.values(),
+                *self.smokes.values(),
                 *self.markers,
                 *of_arrows,
                 *of_hands,
@@ -185,6 +190,11 @@ class Stage:
         film_steps(film, _MOST_NODES)
         return Section(SectionKind.FILM, [*self.surfaces].index(name), film_content(film))
 
+    def smoke(self, name: str, value: Value) -> Section:
+        """Return the smoke of a soft surface, g/s; raises MessageError if it is not valid."""
+        rate = self.numbers[self.smokes[name]].decode(value.payload)[:1]
+        return Section(SectionKind.SMOKE, [*self.surfaces].index(name), rate.astype("<f4").tobytes())
+
     def is_numeric(self, name: str) -> bool:
         """Return whether an outlet can be plotted."""
         return name in self.numbers or name in self.gauges
@@ -260,7 +270,7 @@ class Stage:
 
     @cached_property
     def geometry(self) -> bytes:
-        """The scenes as loaded once by a page: length of the text (u32), JSON, zeros to 4, then numbers.
+        """The scenes as loaded once by a page (`pack`).
 
         In the JSON, `at` is where in the numbers, in bytes, and `count` how many.
         """
@@ -286,9 +296,7 @@ class Stage:
                     ],
                 }
             )
-        text = json.dumps(described, separators=(",", ":")).encode()
-        text += b" " * (-(len(text) + _LENGTH.size) % 4)
-        return _LENGTH.pack(len(text)) + text + bytes(blob)
+        return pack(described, blob)
 
 
 def _dragged_tips(
@@ -318,7 +326,7 @@ def _of_type(outlets: Iterable[Outlet], message: type[Message]) -> tuple[str, ..
 
 def _parts(scene: Scene, blob: bytearray) -> Iterator[dict[str, Any]]:
     for part in scene.parts:
-        row: dict[str, Any] = {"body": part.body, "colour": list(part.colour)}
+        row: dict[str, Any] = {"body": part.body, "colour": list(part.colour), "coat": part.coat}
         vertices = np.round(part.vertices / _GRID_M) * _GRID_M
         for key, array in (("vertices", vertices.astype("<f4")), ("faces", part.faces.astype("<u4"))):
             row[key] = {"at": len(blob), "count": array.size}

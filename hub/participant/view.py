@@ -67,6 +67,8 @@ class Part(NamedTuple):
     """Shape (n, 3), m, in the frame of the body."""
     faces: NDArray[np.uint32]
     """Vertex indices, shape (f, 3), counter-clockwise from outside."""
+    coat: str = ""
+    """Name of the material, such as `steel`."""
 
 
 class Frame(NamedTuple):

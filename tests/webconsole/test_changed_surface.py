@@ -67,7 +67,8 @@ def test_a_page_gets_the_change_once_and_again_after_a_seek(cut_recording):
         assert kinds(sections.make(stage, show, STEP_NS)) == []
         late = sections.make(stage, show, 20 * STEP_NS)
         (change,) = [one for one in late if one.kind == SectionKind.CHANGE]
-        assert len(change.content) == 17 * len(block.surface.change("block", 0).slots)
+        full = block.surface.change("block", 0)
+        assert len(change.content) == 4 + 17 * len(full.slots) + 4 * len(full.origins)
         assert kinds(sections.make(stage, show, 21 * STEP_NS)) == []
         (back,) = [one for one in sections.make(stage, show, 0) if one.kind == SectionKind.CHANGE]
         assert back.content == b""

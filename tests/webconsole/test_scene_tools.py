@@ -209,7 +209,7 @@ def test_a_slider_changes_gravity_and_says_so(browser, session):
     one.page.get_by_role("button", name="robot.gravity: back").click()
     one.page.locator("#lines").get_by_text("gravity: 3 to 9.81 m/s^2").wait_for()
     one.page.get_by_role("slider", name="Light of the scene").fill("2")
-    one.sees("trocar.scene.lamp.intensity === 4")
+    one.sees("trocar.scene.lights.brightness === 2")
     viewer = Person(browser, invite("viewer"))
     viewer.sees("Boolean(trocar.session)")
     viewer.page.get_by_text("Parameters that may change now").click()

@@ -1,15 +1,18 @@
 // Bodies and soft surfaces of a session: made from what /scene answers, moved by what frames have.
 
 import * as THREE from "./vendor/three.module.js"
-import { creased, gathered, smooth } from "./mesh.js"
+import { Film } from "./film.js"
+import { boxSides, creased, gathered, onSide, smooth, splitByChart } from "./mesh.js"
 
+const BURNT = 2 // and above: kinds of burnt faces
 const WET = 1 // the kind of face inside a cut: webconsole/stage.py has the colours by kind
 const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
+const TILED = 2 ** 16 // charts from here on are the sides of a box, for each kind of face
 
 export class Contents {
   // `material`: makes that of a colour (red, green, blue, opacity), for faces seen from a side.
   constructor(world, material = opaque) {
-    Object.assign(this, { world, material })
+    Object.assign(this, { world, material, level: "plain" }) // looks.js, `LEVELS`
     this.clear()
   }
 
@@ -18,6 +21,7 @@ export class Contents {
       this.world.remove(old)
       old.traverse((one) => { one.geometry?.dispose(); for (const each of [one.material ?? []].flat()) each.dispose() })
     }
+    for (const { film } of this.surfaces ?? []) film?.dispose()
     this.owned = []
     this.bodies = [] // by scene: a group for each body
     this.surfaces = []
@@ -30,7 +34,8 @@ export class Contents {
     const size = new DataView(buffer).getUint32(0, true)
     const scenes = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)))
     for (const scene of scenes) this.add(scene, buffer, 4 + size)
-    this.surfaces = surfaces.map(({ colours }) => ({ colours, mesh: null, triangles: null, changed: null, film: null, stale: false }))
+    this.surfaces = surfaces.map(({ colours }) => ({ colours, mesh: null, triangles: null, changed: null, liquid: null,
+      film: null, skin: null, stale: false }))
     return scenes
   }
 
@@ -38,12 +43,14 @@ export class Contents {
     const groups = bodies.map(() => new THREE.Group())
     const materials = new Map()
     for (const group of groups) { group.visible = false; this.own(group) }
-    for (const { body, colour, vertices, faces } of parts) {
+    for (const { body, colour, coat, vertices, faces } of parts) {
       const key = colour.join()
       if (!materials.has(key)) materials.set(key, this.material(colour, THREE.FrontSide))
-      const positions = new Float32Array(buffer, start + vertices.at, vertices.count)
-      const made = geometry(positions, new Uint32Array(buffer, start + faces.at, faces.count))
-      groups[body].add(new THREE.Mesh(made, materials.get(key)))
+      const source = [new Float32Array(buffer, start + vertices.at, vertices.count),
+        new Uint32Array(buffer, start + faces.at, faces.count)]
+      const mesh = new THREE.Mesh(geometry(...source), materials.get(key))
+      Object.assign(mesh.userData, { coat, colour, source, looks: { plain: mesh.material } })
+      groups[body].add(mesh)
     }
     this.bodies.push(groups)
   }
@@ -51,6 +58,26 @@ export class Contents {
   own(object) {
     this.owned.push(object)
     this.world.add(object)
+  }
+
+  // The meshes of all bodies.
+  get rigid() { return this.bodies.flat().flatMap((group) => group.children.filter(({ userData }) => userData.source)) }
+
+  // `appearance`: appearance.js, `loadAppearance`: the geometry gets texture coordinates.
+  unfold({ skins, coats, kinds }) {
+    for (const mesh of this.rigid) {
+      const tile = coats[mesh.userData.coat]?.tile
+      if (!tile) continue
+      mesh.geometry.dispose()
+      mesh.geometry = geometry(...mesh.userData.source, tile)
+    }
+    this.surfaces.forEach((surface, index) => {
+      if (!skins[index]) return
+      surface.skin = { ...skins[index], tiles: Object.fromEntries(Object.entries(kinds).map(([kind, { tile }]) => [kind, tile])) }
+      if (!surface.mesh) return
+      surface.stale = true
+      this.nodes(index, surface.positions)
+    })
   }
 
   // In a buffer: positions (f32), then quaternions (i16, 32767 is 1).
@@ -69,23 +96,32 @@ export class Contents {
 
   surface(index, triangles) {
     const surface = this.surfaces[index]
-    if (surface) Object.assign(surface, { triangles, changed: null, film: null, stale: true })
+    if (surface) Object.assign(surface, { triangles, changed: null, liquid: null, stale: true })
   }
 
   // `film`: liquid on the surface; link.js, `filmOf`.
   film(index, film) {
     const surface = this.surfaces[index]
-    if (!surface || (!surface.film && !film.nodes.length)) return
-    surface.film = film
-    if (surface.mesh && !surface.stale) wet(surface)
+    if (!surface || (!surface.liquid && !film.nodes.length)) return
+    surface.liquid = film
+    if (surface.mesh && !surface.stale) this.wet(surface)
+  }
+
+  wet(surface) {
+    surface.film ??= new Film(surface.mesh)
+    surface.film.show(surface.liquid, surface.origin, surface.count)
+    surface.film.level(this.level)
   }
 
   // `changed`: slots, faces and kinds that differ from the triangles; link.js, `changeOf`.
   change(index, changed) {
     const surface = this.surfaces[index]
     if (!surface) return
+    const before = surface.changed
     Object.assign(surface, { changed, stale: true })
-    if (surface.mesh) this.nodes(index, surface.positions)
+    if (!surface.mesh) return
+    surface.burnt = burntSince(before, surface) ?? surface.burnt
+    this.nodes(index, surface.positions)
   }
 
   // Returns whether the surface is drawn from now on.
@@ -96,74 +132,84 @@ export class Contents {
     if (surface.stale) this.renew(surface, positions)
     surface.positions = positions
     if (surface.stale || positions.length < 3 * surface.count) return false // the nodes of its faces are still to come
-    const { position, normal } = surface.mesh.geometry.attributes
-    gathered(positions, surface.origin, position.array)
-    smooth(position.array, surface.mesh.geometry.index.array, normal.array)
+    const { position, normal } = surface.mesh.geometry.attributes, { base, from } = surface
+    gathered(positions, base.origin, base.position)
+    smooth(base.position, base.index, base.normal)
+    gathered(base.position, from, position.array)
+    gathered(base.normal, from, normal.array)
     position.needsUpdate = normal.needsUpdate = true
     return first
   }
 
   // Make the geometry of a surface that has changed, if all nodes of its faces are there.
   renew(surface, positions) {
-    const { faces, kinds } = changedFaces(surface), count = faces.reduce((most, node) => Math.max(most, node + 1), 0)
+    const { faces, kinds, slots } = changedFaces(surface), count = faces.reduce((most, node) => Math.max(most, node + 1), 0)
     if (positions.length < 3 * count) return
-    const split = creased(positions, faces, SOFT, kinds), made = new THREE.BufferGeometry()
-    made.setAttribute("position", attribute(3 * split.origin.length))
-    made.setAttribute("normal", attribute(3 * split.origin.length))
-    made.setIndex(new THREE.BufferAttribute(split.index, 1))
-    for (let from = 0, to = 0; from < kinds.length; from = to) {
-      while (to < kinds.length && kinds[to] === kinds[from]) to++
-      made.addGroup(3 * from, 3 * (to - from), kinds[from])
+    const base = creased(positions, faces, SOFT, kinds)
+    base.position = new Float32Array(3 * base.origin.length)
+    base.normal = new Float32Array(3 * base.origin.length)
+    const charts = surface.skin ? chartsOf(surface, faces, kinds, slots) : new Uint32Array(kinds.length)
+    const { index, from } = splitByChart(base.index, charts), made = new THREE.BufferGeometry()
+    made.setAttribute("position", attribute(3 * from.length))
+    made.setAttribute("normal", attribute(3 * from.length))
+    made.setIndex(new THREE.BufferAttribute(index, 1))
+    if (surface.skin) made.setAttribute("uv", new THREE.BufferAttribute(coordinates(surface, faces, slots, charts, index, from.length), 2))
+    for (let begin = 0, end = 0; begin < kinds.length; begin = end) {
+      while (end < kinds.length && kinds[end] === kinds[begin]) end++
+      made.addGroup(3 * begin, 3 * (end - begin), kinds[begin])
     }
-    Object.assign(surface, { count, origin: split.origin, stale: false })
+    Object.assign(surface, { count, base, from, origin: from.map((vertex) => base.origin[vertex]), stale: false })
     if (surface.mesh) {
       surface.mesh.geometry.dispose()
       surface.mesh.geometry = made
-      if (surface.film) wet(surface)
+      if (surface.liquid) this.wet(surface)
       return
     }
     const materials = surface.colours.map((colour, kind) => this.material([...colour, 1], THREE.DoubleSide, kind === WET))
     surface.mesh = new THREE.Mesh(made, materials)
+    surface.mesh.userData.looks = { plain: materials }
     surface.mesh.frustumCulled = false
     this.own(surface.mesh)
-    if (surface.film) wet(surface)
+    if (surface.liquid) this.wet(surface)
   }
 }
 
-// Give each vertex the colour of its tissue under the liquid there, over the colour of the tissue.
-function wet({ mesh, film, origin, count }) {
-  const { geometry, material } = mesh
-  if (!geometry.attributes.color) geometry.setAttribute("color", attribute(3 * origin.length))
-  for (const each of material) if (!each.vertexColors) Object.assign(each, { vertexColors: true, needsUpdate: true })
-  const steps = new Uint8Array(count), colours = geometry.attributes.color.array, index = geometry.index.array
-  film.nodes.forEach((node, i) => { if (node < count) steps[node] = film.thickness[i] })
-  const tables = material.map(({ color }) => wetColours(color, film.tint))
-  for (const { start, count: corners, materialIndex } of geometry.groups)
-    for (let corner = start; corner < start + corners; corner++) {
-      const vertex = index[corner], from = 3 * steps[origin[vertex]]
-      for (let c = 0; c < 3; c++) colours[3 * vertex + c] = tables[materialIndex][from + c]
+
+// The chart of each face: of the outside that of its skin, of other kinds the side of a box at rest.
+function chartsOf(surface, faces, kinds, slots) {
+  const { skin } = surface, rest = faces.map((node) => restNode(surface, node)), sides = boxSides(skin.rest, rest)
+  return Uint32Array.from(kinds, (kind, face) =>
+    kind || slots[face] >= skin.charts.length ? TILED + 8 * kind + sides[face] : skin.charts[slots[face]])
+}
+
+// The node at time 0 at the resting place of a node.
+function restNode({ skin, changed }, node) {
+  const count = skin.rest.length / 3
+  return node < count ? node : changed.origins[node - count]
+}
+
+// Texture coordinates of each vertex of a surface.
+function coordinates(surface, faces, slots, charts, index, count) {
+  const { skin } = surface, uv = new Float32Array(2 * count)
+  charts.forEach((chart, face) => {
+    const side = (chart - TILED) % 8, tile = skin.tiles[Math.floor((chart - TILED) / 8)] ?? 1
+    for (let corner = 0; corner < 3; corner++) {
+      const at = 2 * index[3 * face + corner], slot = 6 * slots[face] + 2 * corner
+      const [u, v] = chart < TILED ? skin.uv.subarray(slot, slot + 2)
+        : onSide(skin.rest, restNode(surface, faces[3 * face + corner]), side).map((metres) => metres / tile)
+      uv[at] = u
+      uv[at + 1] = v
     }
-  geometry.attributes.color.needsUpdate = true
+  })
+  return uv
 }
 
-// The colour of tissue under films of 0 to 255 steps of 10 um, over its own; hub/participant/view.py, `wet_colours`.
-function wetColours(own, tint) {
-  const table = new Float32Array(3 * 256), dry = own.clone().convertLinearToSRGB(), mixed = new THREE.Color()
-  for (let step = 0; step < 256; step++) {
-    const parts = [dry.r, dry.g, dry.b].map((part, c) => {
-      const through = Math.exp(-1e-5 * step / tint[3 + c])
-      return through * part + (1 - through) * tint[c]
-    })
-    mixed.setRGB(...parts, THREE.SRGBColorSpace)
-    const over = [mixed.r / own.r, mixed.g / own.g, mixed.b / own.b]
-    over.forEach((part, c) => { table[3 * step + c] = Number.isFinite(part) ? part : 1 })
-  }
-  return table
-}
-
-// The faces of a surface without those that are gone, by kind.
+// The faces of a surface without those that are gone, by kind, and the slot of each.
 function changedFaces({ triangles, changed }) {
-  if (!changed?.slots.length) return { faces: triangles, kinds: new Uint8Array(triangles.length / 3) }
+  if (!changed?.slots.length) {
+    const kinds = new Uint8Array(triangles.length / 3)
+    return { faces: triangles, kinds, slots: Uint32Array.from(kinds.keys()) }
+  }
   const last = changed.slots.at(-1) + 1, count = Math.max(triangles.length / 3, last)
   const nodes = new Int32Array(3 * count), every = new Uint8Array(count)
   nodes.set(triangles)
@@ -174,7 +220,23 @@ function changedFaces({ triangles, changed }) {
   const kept = Array.from(every.keys()).filter((slot) => nodes[3 * slot] >= 0).sort((a, b) => every[a] - every[b])
   const faces = new Uint32Array(3 * kept.length)
   kept.forEach((slot, i) => faces.set(nodes.subarray(3 * slot, 3 * slot + 3), 3 * i))
-  return { faces, kinds: Uint8Array.from(kept, (slot) => every[slot]) }
+  return { faces, kinds: Uint8Array.from(kept, (slot) => every[slot]), slots: Uint32Array.from(kept) }
+}
+
+// The middle of the faces that have been burnt, or have gone, since a change of before; null: none has.
+function burntSince(before, { changed, triangles, positions }) {
+  const known = new Map(Array.from(before?.slots ?? [], (slot, i) => [slot, `${before.kinds[i]} ${before.faces[3 * i] < 0}`]))
+  const middle = new THREE.Vector3(), node = new THREE.Vector3()
+  let count = 0
+  changed.slots.forEach((slot, i) => {
+    const gone = changed.faces[3 * i] < 0
+    if (!(gone || changed.kinds[i] >= BURNT) || known.get(slot) === `${changed.kinds[i]} ${gone}`) return
+    const face = gone ? triangles.subarray(3 * slot, 3 * slot + 3) : changed.faces.subarray(3 * i, 3 * i + 3)
+    if (face.length < 3 || 3 * Math.max(...face) >= positions.length) return
+    for (const one of face) middle.add(node.fromArray(positions, 3 * one))
+    count += 3
+  })
+  return count ? middle.divideScalar(count) : null
 }
 
 // `wet`: it has highlights.
@@ -184,15 +246,24 @@ function opaque([red, green, blue, opacity], side, wet = false) {
   return new THREE.MeshLambertMaterial({ color: colour, side, transparent: opacity < 1, opacity })
 }
 
-function geometry(positions, faces) {
-  const { index, origin } = creased(positions, faces, SHARP)
-  const made = new THREE.BufferGeometry()
-  const position = attribute(3 * origin.length), normal = attribute(3 * origin.length)
-  gathered(positions, origin, position.array)
-  smooth(position.array, index, normal.array)
-  made.setAttribute("position", position)
-  made.setAttribute("normal", normal)
+// `tile`: side of a tile of its texture, m; 0: it has none.
+function geometry(positions, faces, tile = 0) {
+  const base = creased(positions, faces, SHARP), made = new THREE.BufferGeometry(), count = 3 * base.origin.length
+  const sides = tile ? boxSides(positions, faces) : new Uint32Array(faces.length / 3)
+  const { index, from } = splitByChart(base.index, sides), places = new Float32Array(count), normals = new Float32Array(count)
+  gathered(positions, base.origin, places)
+  smooth(places, base.index, normals)
+  for (const [name, values] of [["position", places], ["normal", normals]]) {
+    made.setAttribute(name, attribute(3 * from.length))
+    gathered(values, from, made.attributes[name].array)
+  }
   made.setIndex(new THREE.BufferAttribute(index, 1))
+  if (!tile) return made
+  const uv = new Float32Array(2 * from.length)
+  index.forEach((vertex, corner) => {
+    uv.set(onSide(positions, faces[corner], sides[Math.floor(corner / 3)]).map((metres) => metres / tile), 2 * vertex)
+  })
+  made.setAttribute("uv", new THREE.BufferAttribute(uv, 2))
   return made
 }
 

@@ -5,11 +5,11 @@ import { pathTo } from "./address.js"
 
 const MAGIC = 0x46435254 // "TRCF", little-endian
 const HEAD = 24
-export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7, FELT = 8, CHANGE = 9, FILM = 10
+export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7, FELT = 8, CHANGE = 9, FILM = 10, SMOKE = 11
 
 export function parseFrame(buffer) {
   const view = new DataView(buffer)
-  if (buffer.byteLength < HEAD || view.getUint32(0, true) !== MAGIC || view.getUint16(4, true) !== 2) return null
+  if (buffer.byteLength < HEAD || view.getUint32(0, true) !== MAGIC || view.getUint16(4, true) !== 3) return null
   const sections = []
   let at = HEAD
   for (let left = view.getUint16(6, true); left > 0; left--) {
@@ -31,11 +31,13 @@ export function nodesOf(buffer, at, size) {
   return nodes
 }
 
-// Changed faces of a surface: their slots (u32), their nodes (i32, 3 each; -1: gone) and their kinds (u8).
+// Changed faces of a surface: their slots (u32), their nodes (i32, 3 each; -1: gone), the first node at the resting
+// place of each appended node (u32), and the kinds of the faces (u8).
 export function changeOf(buffer, at, size) {
-  const count = size / 17
-  return { slots: new Uint32Array(buffer, at, count), faces: new Int32Array(buffer, at + 4 * count, 3 * count),
-    kinds: new Uint8Array(buffer, at + 16 * count, count) }
+  const count = size && new Uint32Array(buffer, at, 1)[0], from = at + 4
+  return { slots: new Uint32Array(buffer, from, count), faces: new Int32Array(buffer, from + 4 * count, 3 * count),
+    origins: new Uint32Array(buffer, from + 16 * count, size && (size - 4 - 17 * count) / 4),
+    kinds: new Uint8Array(buffer, at + size - count, count) }
 }
 
 // Liquid on a surface: deep colour and depths (f32, 3 each), wet nodes (u32), thickness at each (u8, 10 um).

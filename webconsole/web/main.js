@@ -1,6 +1,6 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
-import { ARROWS, CHANGE, changeOf, FELT, FILM, filmOf, Link, nodesOf, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { ARROWS, CHANGE, changeOf, FELT, FILM, filmOf, Link, nodesOf, MARKERS, NODES, PICTURE, POSES, SAMPLE, SMOKE, SURFACE } from "./link.js"
 import { compared, pathTo, shown } from "./address.js"
 import { Alerts } from "./alerts.js"
 import { Capture } from "./capture.js"
@@ -163,9 +163,10 @@ async function stage(described) {
   $("no-scene").textContent = empty ? "Nothing in this session has a scene to draw." : ""
   showCameras()
   dirty = true
+  quality.begin(scene).catch((error) => said("scene", `textures: ${error.message}`))
 }
 
-let tree = null
+let tree = null, quality = null
 let refused = false // the browser has no WebGL
 async function makeScene() {
   try {
@@ -173,6 +174,8 @@ async function makeScene() {
     scene = new Scene($("canvas"), () => { dirty = true })
     scene.chosen = showCameras
     capture.begin(scene)
+    const { Quality } = await import("./quality.js")
+    quality = scene.quality = new Quality($("view").querySelector(".tools"), () => { dirty = true })
     scene.brightness = tune.light
     const [{ Gizmo }, { Tree }] = await Promise.all([import("./gizmo.js"), import("./tree.js")])
     tree = new Tree($("bodies"))
@@ -207,6 +210,7 @@ function apply(frame) {
     else if (kind === SURFACE) scene.surface(index, new Uint32Array(frame.buffer, at, size / 4))
     else if (kind === CHANGE) scene.change(index, changeOf(frame.buffer, at, size))
     else if (kind === FILM) scene.film(index, filmOf(frame.buffer, at, size))
+    else if (kind === SMOKE) scene.smokes(index, new Float32Array(frame.buffer, at, 1)[0], frame.time)
     else if (kind === NODES) size && scene.nodes(index, nodesOf(frame.buffer, at, size))
   }
 }

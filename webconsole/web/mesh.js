@@ -67,3 +67,41 @@ export function gathered(positions, origin, target) {
     target[to] = positions[from]; target[to + 1] = positions[from + 1]; target[to + 2] = positions[from + 2]
   }
 }
+
+// Axes u, v and normal of the sides of a box, and the sign of the normal; engines/mujoco/textures/atlas.py, `SIDES`.
+const SIDES = [[1, 2, 0, 1], [2, 1, 0, -1], [2, 0, 1, 1], [0, 2, 1, -1], [0, 1, 2, 1], [1, 0, 2, -1]]
+
+// The side of a box that each face looks at most.
+export function boxSides(positions, faces) {
+  const normals = faceNormals(positions, faces), sides = new Uint32Array(faces.length / 3)
+  for (let face = 0; face < sides.length; face++) {
+    let best = -Infinity
+    SIDES.forEach(([, , axis, sign], side) => {
+      const facing = sign * normals[3 * face + axis]
+      if (facing > best) { best = facing; sides[face] = side }
+    })
+  }
+  return sides
+}
+
+// Texture coordinates of a point on a side, in the unit of the point.
+export function onSide(positions, vertex, side) {
+  const [u, v] = SIDES[side]
+  return [positions[3 * vertex + u], positions[3 * vertex + v]]
+}
+
+// Split vertices where charts of texture coordinates meet: `charts` has one for each face. Returns the index, and the
+// vertex that each split one was.
+export function splitByChart(index, charts) {
+  const known = new Map(), made = new Uint32Array(index.length), from = []
+  for (let corner = 0; corner < index.length; corner++) {
+    const key = index[corner] * 2 ** 20 + charts[Math.floor(corner / 3)]
+    let vertex = known.get(key)
+    if (vertex === undefined) {
+      known.set(key, (vertex = from.length))
+      from.push(index[corner])
+    }
+    made[corner] = vertex
+  }
+  return { index: made, from: Uint32Array.from(from) }
+}

@@ -4,11 +4,15 @@ import * as THREE from "./vendor/three.module.js"
 import { Orbit } from "./orbit.js"
 import { Markers } from "./markers.js"
 import { Contents } from "./contents.js"
+import { loadAppearance } from "./appearance.js"
+import { Lights } from "./lights.js"
+import { Looks } from "./looks.js"
+import { Smoke } from "./smoke.js"
+import { FILMIC } from "./tone.js"
 import { DIRECTIONS, orbitFrom } from "./views.js"
 
 const ASIDE_M = 0.1, ASIDE_RAD = 0.5
 const SLOW_MS = 50, QUICK_MS = 20, SMOOTH = 2
-const SKY = 1.5, LAMP = 2
 const FORCE = 0xf2b705, M_PER_N = 0.05, LONGEST_M = 0.1, LEAST_N = 0.005
 export const FORCES = 3 // layer of what no endoscope sees; 1 and 2 are the eyes of a headset
 const PICTURE = [320, 256] // of an eye that the page draws itself: the field of view of 5:4, as on the page
@@ -37,10 +41,11 @@ export class Scene {
       this.dirty()
     })
     this.world = new THREE.Scene()
-    this.sky = new THREE.HemisphereLight(0xffffff, 0x6f7f8c, SKY)
-    this.lamp = new THREE.DirectionalLight(0xffffff, LAMP)
-    this.world.add(this.sky, this.lamp, this.lamp.target)
+    this.renderer.shadowMap.autoUpdate = false // one for all pictures of an instant
+    this.lights = new Lights(this.world, this.renderer)
     this.contents = new Contents(this.world)
+    this.looks = new Looks(this.world, this.contents)
+    this.smoke = new Smoke(this.world)
     this.clear()
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.ground())
     this.ground()
@@ -71,6 +76,8 @@ export class Scene {
     }
     this.owned = []
     this.contents.clear()
+    this.looks.clear()
+    this.smoke.clear()
     this.axes = []
     this.bonds = [] // arrows of each
     this.cameras = [] // { name, group, pose, fieldOfView }
@@ -83,6 +90,37 @@ export class Scene {
     this.focused = this.touched = false
   }
 
+  // Textures and surroundings: the page is drawn plain until they are there.
+  async dress() {
+    const { loads } = this, appearance = await loadAppearance()
+    if (!appearance || loads !== this.loads) return false
+    this.looks.clear()
+    this.looks.dress(appearance)
+    return true
+  }
+
+  // One of looks.js, `LEVELS`.
+  set level(level) {
+    const { renderer } = this
+    renderer.toneMapping = level === "plain" ? THREE.NoToneMapping : FILMIC
+    renderer.shadowMap.enabled = level === "full"
+    this.looks.show(level)
+    this.lights.show(level, this.looks.appearance?.place ?? "none")
+  }
+
+  get level() { return this.looks.level }
+
+  // Draw one picture of a level, and return how long that took, ms.
+  trial(level) {
+    const { renderer } = this, gl = renderer.getContext()
+    this.level = level
+    renderer.setPixelRatio(this.ratio)
+    const begun = performance.now()
+    this.draw()
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)) // it waits for the picture
+    return performance.now() - begun
+  }
+
   get bodies() { return this.contents.bodies }
   get surfaces() { return this.contents.surfaces }
   get placed() { return this.contents.placed }
@@ -90,6 +128,7 @@ export class Scene {
   // `buffer` is what /scene answers: webconsole/stage.py, `geometry`.
   load(buffer, surfaces) {
     this.clear()
+    this.loads = (this.loads ?? 0) + 1
     this.contents.load(buffer, surfaces).forEach((scene, index) => this.add(scene, this.bodies[index]))
     this.dirty()
   }
@@ -143,8 +182,23 @@ export class Scene {
   film(index, film) { this.contents.film(index, film) }
 
   nodes(index, positions) {
-    // the work is where the organ is, unless somebody looks elsewhere
-    if (this.contents.nodes(index, positions)) this.focused &&= this.touched
+    if (!this.contents.nodes(index, positions)) return
+    this.focused &&= this.touched // the work is where the organ is, unless somebody looks elsewhere
+    this.level = this.level
+  }
+
+  // `rate` of the smoke of a surface, g/s, at a time of the session, s.
+  smokes(index, rate, time) {
+    if (this.smoke.advance(rate, this.burning(index), time)) this.dirty()
+  }
+
+  // Where a surface burns: where it has changed last, else the tip nearest to its middle.
+  burning(index) {
+    const { mesh, burnt } = this.surfaces[index] ?? {}
+    if (burnt || !mesh) return burnt ?? null
+    const middle = mesh.geometry.boundingSphere?.center ?? new THREE.Vector3()
+    const places = this.tips.filter(({ name }) => name !== "ECM").map(({ axes }) => axes.getWorldPosition(new THREE.Vector3()))
+    return places.sort((one, other) => one.distanceTo(middle) - other.distanceTo(middle))[0] ?? null
   }
 
   // `rows`: point (m) and force (N) of each arrow of a bond.
@@ -189,8 +243,7 @@ export class Scene {
 
   // The brightness of the lamp and of the sky, 1 as usual.
   set brightness(value) {
-    this.lamp.intensity = LAMP * value
-    this.sky.intensity = SKY * value
+    this.lights.brightness = value
     this.dirty()
   }
 
@@ -234,6 +287,7 @@ export class Scene {
     const cells = 2 * Math.ceil((2.5 * sphere.radius) / cell)
     this.grid = new THREE.GridHelper(cells * cell, cells, 0xffffff, 0xffffff)
     this.grid.material.color.copy(this.line)
+    this.grid.material.toneMapped = false
     this.grid.rotation.x = Math.PI / 2
     const round = (value) => Math.round(value / cell) * cell
     this.grid.position.set(round(sphere.center.x), round(sphere.center.y), box.min.z - 0.0005)
@@ -287,11 +341,9 @@ export class Scene {
     canvas.getContext("2d").drawImage(own, 0, own.height - size[1], ...size, 0, 0, width, height)
   }
 
-  // The lamp is over the left shoulder of whoever looks: what it does not meet has a shape.
   light() {
-    const way = (x, y, z) => new THREE.Vector3(x, y, z).applyQuaternion(this.camera.quaternion).add(this.camera.position)
-    this.lamp.position.copy(way(-0.7, 0.9, 0))
-    this.lamp.target.position.copy(way(0, 0, -1))
+    const eye = this.cameras[0] ?? null, lens = eye && this.placed ? lensOf(eye) : null
+    this.lights.aim(this.camera, lens, this.workBox().getCenter(new THREE.Vector3()))
   }
 
   draw() {
@@ -307,7 +359,8 @@ export class Scene {
     if (size.x !== width || size.y !== height) this.renderer.setSize(width, height, false)
     this.camera.aspect = width / height
     const endoscope = this.choice === "endoscope" && this.cameras[0]
-    if (this.grid) this.grid.visible = !endoscope
+    if (this.grid) this.grid.visible = !endoscope && !this.looks.surroundings?.visible
+    this.renderer.shadowMap.needsUpdate = true
     if (endoscope) this.stand(endoscope)
     else {
       this.camera.fov = 40
@@ -320,6 +373,7 @@ export class Scene {
 
   // `interval`: ms since the picture before; `coarsest`: the least pixel ratio. Where drawing is slow (no GPU), it is done with fewer pixels.
   pace(interval, coarsest) {
+    if (this.quality?.pace(interval)) this.interval = (SLOW_MS + QUICK_MS) / 2
     this.interval += 0.1 * (Math.min(interval, 500) - this.interval)
     const ratio = this.interval > SLOW_MS ? Math.max(this.ratio / 1.5, coarsest)
       : this.interval < QUICK_MS ? Math.min(this.ratio * 1.5, this.finest) : this.ratio
@@ -331,13 +385,17 @@ export class Scene {
   }
 
   // It moves again: the many pixels of what stood still would delay the first picture.
-  resume(coarsest) { this.renderer.setPixelRatio(Math.max(this.ratio, coarsest)) }
+  resume(coarsest) {
+    if (this.quality && this.level !== this.quality.level) this.level = this.quality.level
+    this.renderer.setPixelRatio(Math.max(this.ratio, coarsest))
+  }
 
   // Nothing moves: draw once with more pixels than there are, so that edges are smooth; `quick`: not of what runs,
   // where somebody's hands would wait for that.
   settle(quick = false) {
-    const ratio = quick ? this.finest : SMOOTH
-    if (this.renderer.getPixelRatio() === ratio) return
+    const ratio = quick ? this.finest : SMOOTH, level = quick ? this.level : (this.quality?.still ?? this.level)
+    if (this.renderer.getPixelRatio() === ratio && this.level === level) return
+    if (this.level !== level) this.level = level
     this.renderer.setPixelRatio(ratio)
     this.draw()
   }
@@ -349,6 +407,13 @@ export class Scene {
     this.camera.quaternion.copy(group.quaternion).multiply(new THREE.Quaternion(...q)).multiply(FLIP)
     this.camera.translateX(aside)
   }
+}
+
+// Position of a camera, and its way ahead.
+function lensOf({ group, pose: [x, y, z, ...q] }) {
+  const turn = group.quaternion.clone().multiply(new THREE.Quaternion(...q))
+  return { position: new THREE.Vector3(x, y, z).applyQuaternion(group.quaternion).add(group.position),
+    ahead: new THREE.Vector3(0, 0, 1).applyQuaternion(turn) }
 }
 
 function placed(parent, numbers) {

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from engines.mujoco import model
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.pictures.solid_meshes import Triangles, solid_mesh
+from engines.mujoco.place.dress import BRIGHT, SHINING
 from hub.participant.view import Camera, Frame, Part, Rgb
 from robots import rotation
 from robots.dvrk.endoscope import BASELINE, FIELD_OF_VIEW, optical_in_roll
@@ -41,12 +42,15 @@ class ViewScene:
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
-        """The visible meshes, those of one body and one colour as one."""
-        pieces: dict[tuple[int, tuple[float, ...]], list[Triangles]] = {}
+        """The visible meshes, merged per body, colour and coat."""
+        pieces: dict[tuple[int, tuple[float, ...], str], list[Triangles]] = {}
         for geom in self._visible_geoms():
             body = int(self._model.geom_bodyid[geom])
-            pieces.setdefault((body, self._colour(geom)), []).append(self._triangles(geom))
-        return tuple(_merge_triangles(body, colour, found) for (body, colour), found in pieces.items())
+            pieces.setdefault((body, self._colour(geom), self._coat(geom)), []).append(self._triangles(geom))
+        return tuple(
+            _merge_triangles(body, colour, found)._replace(coat=coat)
+            for (body, colour, coat), found in pieces.items()
+        )
 
     @property
     def frames(self) -> tuple[Frame, ...]:
@@ -94,6 +98,14 @@ class ViewScene:
         rgba = self._model.geom_rgba[geom] if material < 0 else self._model.mat_rgba[material]
         red, green, blue, opacity = (round(float(value), 4) for value in rgba)
         return red, green, blue, opacity
+
+    def _coat(self, geom: int) -> str:
+        """Return the name of a geometry's material; '': without a name, or of plastic."""
+        material = int(self._model.geom_matid[geom])
+        if material >= 0:
+            return self._model.material(material).name
+        body = self._model.body(int(self._model.geom_bodyid[geom])).name
+        return BRIGHT if body.startswith(SHINING) else ""
 
     def _triangles(self, geom: int) -> Triangles:
         """Return the triangles of a geometry in the frame of its body."""

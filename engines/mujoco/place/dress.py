@@ -6,14 +6,15 @@ from collections.abc import Mapping
 
 import mujoco
 
-__all__ = ["dress_scene"]
+__all__ = ["BRIGHT", "SHINING", "dress_scene"]
 
 _METALS: Mapping[str, float] = {"steel": 0.27}
 """Roughness of metals of the robot, by material."""
 _ROUGHNESS: Mapping[str, float] = {"black": 0.42, "blue": 0.4, "dark": 0.5, "ivory": 0.35}
 """Roughness of coats and plastics of the robot, by material; black: the matt coat of a shaft."""
-_PLASTIC, _METAL = "plastic", "bright metal"
-_SHINING = ("needle",)
+_PLASTIC, BRIGHT = "plastic", "bright metal"
+"""Materials of geoms without a material."""
+SHINING = ("needle",)
 """Objects of metal, by the beginning of their bodies' names."""
 
 
@@ -31,10 +32,10 @@ def dress_scene(scene: mujoco.MjSpec, exposure: float, tone: str) -> None:
         material.metallic = 1.0 if material.name in _METALS else 0.0
         material.roughness = _METALS.get(material.name, _ROUGHNESS.get(material.name, 0.45))
     scene.add_material(name=_PLASTIC, metallic=0.0, roughness=0.4)
-    scene.add_material(name=_METAL, metallic=1.0, roughness=0.22)
+    scene.add_material(name=BRIGHT, metallic=1.0, roughness=0.22)
     for geom in scene.geoms:
         if not geom.material:
-            geom.material = _METAL if geom.parent.name.startswith(_SHINING) else _PLASTIC
+            geom.material = BRIGHT if geom.parent.name.startswith(SHINING) else _PLASTIC
     for option, value in {"ao.enabled": 0.0, "cg.exposure": exposure}.items():
         scene.add_numeric(name=f"filament.{option}", data=[value], size=1)
     for option, text in {"shadows.type": "pcf", "cg.tone_mapping": tone}.items():

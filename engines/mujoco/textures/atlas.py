@@ -27,6 +27,8 @@ SIDES: NDArray[np.float64] = np.array(
     [[_Y, _Z, _X], [_Z, _Y, -_X], [_Z, _X, _Y], [_X, _Z, -_Y], [_X, _Y, _Z], [_Y, _X, -_Z]]
 )
 """Axes u, v and outward normal of the sides of a box, shape (6, 3, 3), each right-handed."""
+_PIXELS = 1024
+"""Side of the picture of the outside: 0.1 to 0.4 mm a texel on an organ."""
 _MARGIN = 5
 """Texels around a chart, filled with the colours of its edge: smaller pictures of the texture mix them."""
 _FULL, _SHRINK = 0.8, 0.94
@@ -43,7 +45,7 @@ def facing_side(normals: Vector) -> Indices:
 class Atlas:
     """Charts of a surface."""
 
-    def __init__(self, rest: Vector, triangles: Indices, pixels: int) -> None:
+    def __init__(self, rest: Vector, triangles: Indices, pixels: int = _PIXELS) -> None:
         """Unfold triangles, node indices of shape (f, 3), of `rest`, shape (n, 3), m, into `pixels`^2."""
         self._rest, self._triangles, self._pixels = rest, triangles, pixels
         corners = rest[triangles]

@@ -6,7 +6,6 @@ burnt tissue have tiles, laid in the rest shape too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,23 +20,13 @@ from engines.mujoco.pictures.skin_mesh import SkinMesh
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.textures.atlas import SIDES, Atlas, Indices, facing_side
 from engines.mujoco.textures.burns import Burns
+from engines.mujoco.textures.coats import KINDS, TISSUE_TILE
 from engines.mujoco.textures.noise import Noise
-from engines.mujoco.textures.surface import Recipe, make_tile
-from engines.mujoco.textures.tissues import char, coagulum, cut_inside
+from engines.mujoco.textures.surface import Recipe
 from schemas.soft_surface import FaceKind
 from schemas.vectors import Vector
 
 __all__ = ["DrawnBody"]
-
-_PIXELS = 1024
-"""Side of the picture of the outside: 0.1 to 0.4 mm a texel on an organ."""
-_TILE, _TILE_PIXELS = 0.02, 256
-"""Side of the tiles of other kinds, m and pixels."""
-_INNER: Mapping[FaceKind, Recipe] = {
-    FaceKind.CUT: cut_inside,
-    FaceKind.COAGULATED: coagulum,
-    FaceKind.CHARRED: char,
-}
 
 
 class DrawnBody:
@@ -49,7 +38,7 @@ class DrawnBody:
         self._context, self._scene, self._body, self._noise = context, scene, body, noise
         triangles = body.triangles.astype(np.int64)
         self._rest = body.rest.astype(np.float64)
-        self._atlas = Atlas(self._rest, triangles, _PIXELS)
+        self._atlas = Atlas(self._rest, triangles)
         self._charts = {
             tuple(nodes): int(chart)
             for nodes, chart in zip(np.sort(triangles, axis=1).tolist(), self._atlas.chart, strict=True)
@@ -140,8 +129,7 @@ class DrawnBody:
             if first == last:
                 continue
             if kind not in self._textures:
-                tile = make_tile(_INNER[kind], self._noise, _TILE, _TILE_PIXELS)
-                self._textures[kind] = Textures.of_maps(self._context, tile)
+                self._textures[kind] = Textures.of_maps(self._context, KINDS[kind].maps(self._noise))
             renderable = self._context.create_renderable(
                 mjrf.RenderableParams(cast_shadow=True, receive_shadow=True)
             )
@@ -163,7 +151,7 @@ class DrawnBody:
         uv = self._atlas.uv(points, np.minimum(charts, outer - 1))
         inner = charts >= outer
         axes = SIDES[charts[inner] - outer, :2]
-        uv[inner] = np.einsum("nj,nij->ni", points[inner], axes) / _TILE
+        uv[inner] = np.einsum("nj,nij->ni", points[inner], axes) / TISSUE_TILE
         return uv
 
 

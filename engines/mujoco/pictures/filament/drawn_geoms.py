@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
-
 import mujoco
 import numpy as np
 from mujoco import mjrf
@@ -12,22 +9,11 @@ from mujoco import mjrf
 from engines.mujoco.pictures.filament.tangent_frames import TangentFrames
 from engines.mujoco.pictures.filament.upload import Textures, vertex_layout, write_mesh
 from engines.mujoco.textures.atlas import SIDES, facing_side
+from engines.mujoco.textures.coats import COATS
 from engines.mujoco.textures.noise import Noise
-from engines.mujoco.textures.surface import Recipe, make_tile
-from engines.mujoco.textures.things import brushed_steel, shaft_coat
 
 __all__ = ["DrawnGeoms"]
 
-
-class _Coat(NamedTuple):
-    recipe: Recipe
-    metal: float
-    """Share of metal: less than 1 for a fine blasted surface, which scatters light."""
-
-
-_COATS: Mapping[str, _Coat] = {"steel": _Coat(brushed_steel, 0.8), "black": _Coat(shaft_coat, 0.0)}
-"""Coats by the name of a material of the robot."""
-_TILE, _PIXELS = 0.012, 256
 _HIDDEN = 5
 """A group of geoms that MuJoCo does not draw."""
 
@@ -41,18 +27,16 @@ class DrawnGeoms:
         for geom in range(model.ngeom):
             material, mesh = int(model.geom_matid[geom]), int(model.geom_dataid[geom])
             name = model.material(material).name if material >= 0 else ""
-            if name not in _COATS or mesh < 0 or model.geom_group[geom] >= 3:
+            if name not in COATS or mesh < 0 or model.geom_group[geom] >= 3:
                 continue
             if name not in self._textures:
-                coat = _COATS[name]
-                tile = make_tile(coat.recipe, noise, _TILE, _PIXELS, metal=coat.metal > 0.0)
-                self._textures[name] = Textures.of_maps(context, tile)
+                self._textures[name] = Textures.of_maps(context, COATS[name].maps(noise))
             renderable = context.create_renderable(
                 mjrf.RenderableParams(cast_shadow=True, receive_shadow=True)
             )
-            drawn = _upload(context, model, mesh)
+            drawn = _upload(context, model, mesh, COATS[name].tile)
             renderable.set_mesh(drawn, 0, 3 * int(model.mesh_facenum[mesh]))
-            renderable.set_material(self._textures[name].material(metallic=_COATS[name].metal))
+            renderable.set_material(self._textures[name].material(metallic=COATS[name].metal))
             scene.add_renderable(renderable)
             model.geom_group[geom] = _HIDDEN
             self._drawn.append((geom, drawn, renderable))
@@ -64,8 +48,8 @@ class DrawnGeoms:
             renderable.set_pose(positions[geom], turns[geom])
 
 
-def _upload(context: mjrf.Context, model: mujoco.MjModel, mesh: int) -> mjrf.Mesh:
-    """Return a mesh of the model with texture coordinates: projected onto the sides of a box."""
+def _upload(context: mjrf.Context, model: mujoco.MjModel, mesh: int, tile: float) -> mjrf.Mesh:
+    """Return a mesh of the model with texture coordinates in tiles, m: projected onto the sides of a box."""
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     start, faces_count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     vertices = model.mesh_vert[first : first + count].astype(np.float64)
@@ -73,7 +57,7 @@ def _upload(context: mjrf.Context, model: mujoco.MjModel, mesh: int) -> mjrf.Mes
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     frames = TangentFrames(faces, facing_side(np.cross(b - a, c - a)))
     axes = SIDES[frames.chart, :2]
-    frames.set_uv((np.einsum("nj,nij->ni", vertices[frames.source], axes) / _TILE).astype(np.float32))
+    frames.set_uv((np.einsum("nj,nij->ni", vertices[frames.source], axes) / tile).astype(np.float32))
     layout = vertex_layout(len(frames.source), frames.faces.size)
     drawn = context.create_mesh(layout)
     write_mesh(drawn, layout, frames.vertices(vertices), frames.faces.astype(np.uint32))
