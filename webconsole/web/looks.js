@@ -8,6 +8,7 @@ export const LEVELS = ["full", "simple", "plain"]
 const COAT = 0.6, COAT_ROUGHNESS = 0.16 // the film on tissue
 const BUMPS = 0.8
 const PLASTIC = 0.4 // roughness
+const DIMMER = 0.75 // share of metal: a page has little for it to reflect
 const MESH = { side: THREE.FrontSide }, TISSUE = { side: THREE.DoubleSide }
 
 export class Looks {
@@ -46,9 +47,11 @@ export class Looks {
       film?.level(level)
     })
     if (!this.surroundings) return
-    this.surroundings.visible = level !== "plain"
     for (const mesh of this.surroundings.children) this.put(mesh)
   }
+
+  // `near`: whoever looks is among them.
+  surround(near) { if (this.surroundings) this.surroundings.visible = near && this.level !== "plain" }
 
   put(mesh, make) {
     const { looks } = mesh.userData
@@ -64,7 +67,7 @@ export class Looks {
     const coat = this.appearance.coats[name], [red, green, blue, opacity] = colour
     const shown = coat ? { map: coat.texture.map }
       : { color: new THREE.Color().setRGB(red, green, blue, THREE.SRGBColorSpace), transparent: opacity < 1, opacity }
-    const full = coat ? { ...bumpy(coat.texture), metalness: coat.metal } : { ...shown, roughness: PLASTIC }
+    const full = coat ? { ...bumpy(coat.texture), metalness: DIMMER * coat.metal } : { ...shown, roughness: PLASTIC }
     const made = { simple: this.keep(new THREE.MeshLambertMaterial({ ...MESH, ...shown })),
       full: this.keep(new THREE.MeshStandardMaterial({ ...MESH, ...full })) }
     this.known.set(key, made)

@@ -13,6 +13,7 @@ import { DIRECTIONS, orbitFrom } from "./views.js"
 
 const ASIDE_M = 0.1, ASIDE_RAD = 0.5
 const SLOW_MS = 50, QUICK_MS = 20, SMOOTH = 2
+const FAR_M = 0.6 // from the work: surroundings are seen from inside
 const FORCE = 0xf2b705, M_PER_N = 0.05, LONGEST_M = 0.1, LEAST_N = 0.005
 export const FORCES = 3 // layer of what no endoscope sees; 1 and 2 are the eyes of a headset
 const PICTURE = [320, 256] // of an eye that the page draws itself: the field of view of 5:4, as on the page
@@ -342,8 +343,11 @@ export class Scene {
   }
 
   light() {
-    const eye = this.cameras[0] ?? null, lens = eye && this.placed ? lensOf(eye) : null
-    this.lights.aim(this.camera, lens, this.workBox().getCenter(new THREE.Vector3()))
+    const work = this.workBox().getCenter(new THREE.Vector3()), [eye] = this.cameras
+    const near = this.camera.position.distanceTo(work) < FAR_M // from farther away, the robot is what is looked at
+    this.looks.surround(near)
+    if (this.grid) this.grid.visible &&= !this.looks.surroundings?.visible
+    this.lights.aim(this.camera, near && eye && this.placed ? lensOf(eye) : null, work)
   }
 
   draw() {
@@ -359,7 +363,6 @@ export class Scene {
     if (size.x !== width || size.y !== height) this.renderer.setSize(width, height, false)
     this.camera.aspect = width / height
     const endoscope = this.choice === "endoscope" && this.cameras[0]
-    if (this.grid) this.grid.visible = !endoscope && !this.looks.surroundings?.visible
     this.renderer.shadowMap.needsUpdate = true
     if (endoscope) this.stand(endoscope)
     else {
@@ -367,6 +370,7 @@ export class Scene {
       this.orbit.place(this.camera)
     }
     this.camera.updateProjectionMatrix()
+    if (this.grid) this.grid.visible = !endoscope
     this.light()
     this.renderer.render(this.world, this.camera)
   }
