@@ -3,6 +3,7 @@
     python -m bench.environments                                  # all, one core
     python -m bench.environments NeedlePick PegTransfer --seeds 20
     python -m bench.environments NeedlePick --frontier            # what longer sub-steps cost in holding
+    python -m bench.environments NeedlePick --vector              # eight in threads beside two in processes
 
 *Bare* are the same sub-steps by `mj_step` alone, of the same model from the same state. Both run in turns in
 this process; the least processor time of the rounds is taken of each, as others may use the machine.
@@ -15,7 +16,9 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from time import process_time
+from functools import partial
+from pathlib import Path
+from time import perf_counter, process_time
 from typing import Any
 
 from trocar.environments import ENVIRONMENTS, oracle  # isort: skip  (before numpy)
@@ -23,6 +26,7 @@ from trocar.environments import ENVIRONMENTS, oracle  # isort: skip  (before num
 import gymnasium
 import mujoco
 import numpy as np
+from gymnasium.vector import AsyncVectorEnv
 
 SUB_STEPS = ("0.5 ms", "1 ms", "2 ms", "2.5 ms", "4 ms")
 
@@ -72,6 +76,41 @@ def cost(name: str, rounds: int) -> dict[str, Any]:
     }
 
 
+def vector_rates(name: str, rounds: int) -> dict[str, Any]:
+    """Return steps/s, and core-milliseconds a step, of 8 environments in threads and of 2 in 2 processes.
+
+    Both run in turns on the same cores; the best of the rounds counts.
+    """
+    make = partial(gymnasium.make, f"trocar.environments:trocar/{name}-v0")
+    processes = AsyncVectorEnv([make, make], context="spawn")
+    threads: Any = gymnasium.make_vec(f"trocar/{name}-v0", num_envs=8)
+    own = os.getpid()
+    sides = {
+        "processes": (processes, 2, [own, *(process.pid for process in processes.processes)]),
+        "threads": (threads, 8, [own]),
+    }
+    found: dict[str, Any] = {"environment": name, "load": os.getloadavg()[0]}
+    for _ in range(rounds):
+        for side, (envs, count, pids) in sides.items():
+            rng = np.random.default_rng(0)
+            envs.reset(seed=0)
+            begun, busy = perf_counter(), _processor_time(pids)
+            for _ in range(400 // count):
+                envs.step(0.3 * rng.uniform(-1.0, 1.0, envs.action_space.shape))
+            rate, cost = 400 / (perf_counter() - begun), (_processor_time(pids) - busy) / 400 * 1e3
+            found[f"{side}_steps_per_s"] = round(max(rate, found.get(f"{side}_steps_per_s", 0.0)), 1)
+            found[f"{side}_core_ms"] = round(min(cost, found.get(f"{side}_core_ms", 1e9)), 3)
+    processes.close()
+    threads.close()
+    return found
+
+
+def _processor_time(pids: Sequence[int]) -> float:
+    """Return the processor time of processes so far, s."""
+    files = (Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split() for pid in pids)
+    return sum(int(file[11]) + int(file[12]) for file in files) / os.sysconf("SC_CLK_TCK")
+
+
 def success(name: str, seeds: Sequence[int], settings: dict[str, Any] | None = None) -> dict[str, Any]:
     """Return how often the oracle succeeds, and the waypoints at which it was when it did not."""
     env: Any = gymnasium.make(f"trocar/{name}-v0", settings=settings)
@@ -105,9 +144,13 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=60)
     parser.add_argument("--seeds", type=int, default=0, help="also try the oracle with seeds from 0 on")
     parser.add_argument("--frontier", action="store_true", help="the oracle with other sub-steps as well")
+    parser.add_argument("--vector", action="store_true", help="many at once, in threads and in processes")
     asked = parser.parse_args()
     print(f"load {os.getloadavg()}", file=sys.stderr)
     for name in asked.environments or names:
+        if asked.vector:
+            print(json.dumps(vector_rates(name, asked.rounds)), flush=True)
+            continue
         row = cost(name, asked.rounds)
         if asked.seeds:
             row |= success(name, range(asked.seeds))

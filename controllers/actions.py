@@ -10,6 +10,7 @@ reach is not taken, and counted.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from math import radians
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -164,6 +165,19 @@ class _Hand:
         share = share**3 * (10.0 + share * (6.0 * share - 15.0))
         now.command[:] = now.start + share * (now.end - now.start)
 
+    def series(self, shares: Sequence[float]) -> tuple[Vector, Vector]:
+        """Return joints, shape (n, joints), and jaw, shape (n, 1), at shares of the step's time; end there.
+
+        The bits are those of `go`, share by share.
+        """
+        now = self.state
+        part = np.array(shares)[:, None]
+        curve = np.array([share**3 * (10.0 + share * (6.0 * share - 15.0)) for share in shares])[:, None]
+        jaws = now.jaw_start + part * (now.jaw_end - now.jaw_start)
+        commands = now.start + curve * (now.end - now.start)
+        now.jaw[:], now.command[:] = jaws[-1], commands[-1]
+        return commands, jaws
+
 
 class _Progress(Record):
     periods = integer()
@@ -230,9 +244,7 @@ class Actions(Controller):
             return self._through_encoders()
         part = periods % self._count
         if part == 0:
-            action = np.clip(inputs["action"], -1.0, 1.0).reshape(-1, _NUMBERS)
-            for hand, own in zip(self._hands, action, strict=True):
-                hand.act(own)
+            self._act(inputs)
         for hand in self._hands:
             hand.go((part + 1) / self._count)
         return self._through_encoders()
@@ -253,6 +265,52 @@ class Actions(Controller):
         hand = next(hand for hand in self._hands if hand.arm == arm)
         frames = hand.chain.frames(q - hand.offsets)
         return matrix_to_pose(hand.base @ frames[-1])
+
+    def _act(self, inputs: Inputs) -> None:
+        action = np.clip(inputs["action"], -1.0, 1.0).reshape(-1, _NUMBERS)
+        for hand, own in zip(self._hands, action, strict=True):
+            hand.act(own)
+
+    def leap(
+        self,
+        t: int,
+        h: int,
+        count: int,
+        inputs: Inputs,
+        series: Mapping[str, Vector],  # noqa: ARG002
+    ) -> tuple[Outputs, Mapping[str, Vector]]:
+        """Take several steps; return the commands of each, the goals of the last."""
+        made: list[Mapping[str, Vector]] = []
+        while count:
+            part = (self._progress.periods - self._wait) % self._count
+            waits = self._progress.periods < self._wait
+            run = 1 if waits else min(count, self._count - part)
+            if waits:
+                self.step(t, h, inputs)
+            else:
+                if part == 0:
+                    self._act(inputs)
+                self._progress.periods += run
+            shares = () if waits else [(part + 1 + i) / self._count for i in range(run)]
+            made.append(self._series(shares))
+            count -= run
+        return self._outputs, {name: np.concatenate([one[name] for one in made]) for name in made[0]}
+
+    def _series(self, shares: Sequence[float]) -> dict[str, Vector]:
+        """Return the commands after shares of the step's time; of the present, without any."""
+        made: dict[str, Vector] = {}
+        for hand in self._hands:
+            now = hand.state
+            joints, jaw = hand.series(shares) if shares else (now.command[None].copy(), now.jaw[None].copy())
+            if hand.servo is not now.command:
+                joints = joints + hand.offsets
+                hand.servo[:] = joints[-1]
+            made[f"{hand.arm}/servo_jp"] = joints
+            if hand.power.size:
+                made[f"{hand.arm}/energy"] = np.repeat(hand.power[None], len(joints), axis=0)
+            else:
+                made[f"{hand.arm}/jaw/servo_jp"] = jaw
+        return made
 
 
 def _ports(hand: _Hand) -> tuple[Port, ...]:

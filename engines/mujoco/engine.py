@@ -7,6 +7,7 @@ the same work as `mj_step`, in an order with every output at the end of the step
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
@@ -35,6 +36,7 @@ from schemas.ros import PoseStamped
 from schemas.vectors import Vector
 
 if TYPE_CHECKING:
+    from engines.mujoco.arms.ahead import Ahead
     from engines.mujoco.interaction.contact_spheres_bond import ContactSpheresBond
     from engines.mujoco.interaction.probe_bond import ProbeBond
     from engines.mujoco.interaction.wire_bond import WireBond
@@ -65,6 +67,7 @@ class MujocoEngine(Stepped):
         self._keepers: list[_Keeper] = []
         self._effective_mass: dict[str, float] = {}
         self._outputs: dict[str, Value] = {}
+        self._ahead: Ahead | None = None
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -258,6 +261,10 @@ class MujocoEngine(Stepped):
             self._mujoco.mj_step1(self._model, self._data)
         else:
             self._coupled_sub_steps(h, inputs)
+        return self._finish(t, h, inputs)
+
+    def _finish(self, t: int, h: int, inputs: Inputs) -> Outputs:
+        """Read arms, objects and contacts at the end of the step from `t`."""
         self._readings.update()
         if (t + h) % self.params.publish_period == 0:
             self._readings.refresh()
@@ -268,9 +275,35 @@ class MujocoEngine(Stepped):
             raise SessionError(self._diagnosis(t, inputs))
         return self._outputs
 
+    def leap(
+        self, t: int, h: int, count: int, inputs: Inputs, series: Mapping[str, Vector]
+    ) -> tuple[Outputs, Mapping[str, Vector]]:
+        """Take several steps with a series of commands; read arms and objects at the end.
+
+        Raises SessionError as `step` does, and where bonds, sums of contacts or events ask for single steps.
+        """
+        if self._rigid is not None or self._touching or self.params.grasp != "friction" or not inputs.quiet:
+            raise SessionError(
+                "bonds, contact sums, events, and grasps but by friction go step by step: use `advance`"
+            )
+        controls = self._servos.series(inputs, count, series)
+        if self._ahead is None:
+            from engines.mujoco.arms.ahead import Ahead
+
+            self._ahead = Ahead(self._model, self._data)
+        states, bodies = self._ahead.run(controls, h // self.params.timestep)
+        for i, near in enumerate(self._holding.are_near(bodies, count - 1)):
+            if (t + (i + 1) * h) % self.params.publish_period == 0:
+                if near:
+                    self._ahead.show(states[i])
+                self._holding.watch(near=near)
+        self._ahead.finish(controls[-1])
+        return self._finish(t + (count - 1) * h, h, inputs), {}
+
     def _set_gravity(self, gravity: float) -> None:
         """Let gravity (m/s^2, along -z) act from this step on: the last sub-step has prepared its forces."""
         self._model.opt.gravity[2] = -gravity
+        self._ahead = None
         self._mujoco.mj_step1(self._model, self._data)
 
     def _place(self, inputs: Inputs) -> None:

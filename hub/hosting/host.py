@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from math import isfinite
 from pathlib import Path
 from time import perf_counter_ns
@@ -17,6 +18,7 @@ import numpy as np
 
 from hub.hosting.host_layout import HostLayout, Listeners
 from hub.hosting.hosted_participant import HostedParticipant
+from hub.hosting.leap import Leap, find_leap
 from hub.participant import Outputs, Setup, Stepped
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.planning.session_parameters import Successors
@@ -161,9 +163,7 @@ class Host:
         """
         while self._successors and self._successors[0][0] <= grant.step:
             self._renew_participant(*self._successors.pop(0))
-        for sample in grant.inlets:
-            for one, port, codec in self._inlets.get((sample.participant, sample.port), ()):
-                _enter(one, port, codec, sample)
+        self._enter_samples(grant)
         step_ns = self.plan.step_ns
         end = grant.horizon_ns // step_ns
         for one in self._hosted:
@@ -185,6 +185,38 @@ class Host:
             cell.take_until(
                 min(cell.tag(-(-end // period) * period, fresh=fresh) for period, fresh in readers)
             )
+
+    @cached_property
+    def _leap(self) -> Leap | None:
+        return find_leap(self._hosted, self.plan)
+
+    @property
+    def leaps(self) -> bool:
+        """Whether `leap` is possible: participants and connections allow several steps at once."""
+        return self._leap is not None
+
+    def leap(self, grant: Grant) -> None:
+        """Enter the samples of `grant` and go to the horizon of the grant, by leaps, without state hashes.
+
+        Raises ParticipantError.
+        """
+        if self._leap is None:
+            raise ValueError(f"host '{self.name}' has participants that only go step by step")
+        self._enter_samples(grant)
+        self._note_users()
+        end = grant.horizon_ns // self.plan.step_ns
+        try:
+            self._leap.run(grant.step, end, self._publish, self._step)
+        except ParticipantError:
+            raise
+        except TrocarError as error:
+            raise ParticipantError(self._leap.present, grant.step, str(error)) from error
+        self.step = end - 1
+
+    def _enter_samples(self, grant: Grant) -> None:
+        for sample in grant.inlets:
+            for one, port, codec in self._inlets.get((sample.participant, sample.port), ()):
+                _enter(one, port, codec, sample)
 
     def _renew_participant(self, step: int, one: HostedParticipant, new: Stepped) -> None:
         """Let `new` go on in the place of a participant, with the participant's state."""

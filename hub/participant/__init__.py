@@ -8,7 +8,7 @@ from hub.participant.device import Device, Sample, VectorSample
 from hub.participant.inputs import Inputs
 from hub.participant.ports import SignalFields, event_in, event_out, signal_in, signal_out, tunable_in
 from hub.participant.state import Record, array, choice, flag, integer, number, restore_arrays, state_hash
-from hub.participant.stepped import BondPlan, Correction, Setup, Stepped
+from hub.participant.stepped import BondPlan, Correction, Leaper, Setup, Stepped
 from hub.participant.tunables import Tunables
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Device",
     "ForceSide",
     "Inputs",
+    "Leaper",
     "MotionSide",
     "Outputs",
     "Params",

@@ -6,14 +6,15 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Protocol, runtime_checkable
 
 from hub.participant.base import Outputs, Participant
 from hub.participant.inputs import Inputs
 from schemas.errors import StateError
 from schemas.ports import BondSide
+from schemas.vectors import Vector
 
-__all__ = ["BondPlan", "Correction", "Setup", "Stepped"]
+__all__ = ["BondPlan", "Correction", "Leaper", "Setup", "Stepped"]
 
 
 @dataclass(frozen=True)
@@ -135,3 +136,22 @@ class Stepped(Participant):
     def restore(self, state: bytes) -> None:  # noqa: ARG002
         """Return to a saved state, bit for bit. Raises StateError where the participant cannot."""
         raise StateError(f"participant '{self.name}' ({type(self).__name__}) cannot restore a state")
+
+
+@runtime_checkable
+class Leaper(Protocol):
+    """A participant that can take several steps in one call, with the bits of single steps.
+
+    For environments to learn in, where nothing looks on between two actions.
+    """
+
+    def leap(
+        self, t: int, h: int, count: int, inputs: Inputs, series: Mapping[str, Vector]
+    ) -> tuple[Outputs, Mapping[str, Vector]]:
+        """Take `count` steps of `h` ns from `t`; return the last outputs, and series of the outputs.
+
+        A series has the values of a port in each step, shape (count, size). `series` has the inputs that
+        change from step to step; all other inputs are constant. An output is missing from the returned
+        series if no participant can follow it.
+        """
+        ...

@@ -54,6 +54,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         terminate_on_success: End an episode when its goal is reached, instead of going on to hold it.
         step: Simulated time of a step, s.
         delay: Age of observations, s, as of a slow camera or link; reward and success are of now.
+        hashed: Keep `state_hash`. Without it, and without a recording, a step costs less, with the same bits.
         settings: Values of the scenario, as `trocar.load_scenario` takes them.
     """
 
@@ -72,6 +73,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         terminate_on_success: bool = False,
         step: float = 0.2,
         delay: float = 0.0,
+        hashed: bool = True,
         settings: Mapping[str, Any] | None = None,
     ) -> None:
         if reward not in ("sparse", "shaped"):
@@ -102,6 +104,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         late, self._lag = divmod(self._count_steps("delay", delay), self._count)
         self._past: deque[Observation] = deque(maxlen=late + 1)
         """Observations on their way, the oldest first."""
+        self._advance = self._session.advance if hashed else self._session.leap
         self._settling = -(-settling_ns // self._session.plan.step_ns)
         self.exercise = exercise(cast("Task", self._session.participant("task")))
         self._view = self._new_view()
@@ -208,10 +211,10 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         """
         self._require_open()
         given = self._numbers(action)
-        self._session.advance(self._count - self._lag, {"actions.action": np.clip(given, -1.0, 1.0)})
+        self._advance(self._count - self._lag, {"actions.action": np.clip(given, -1.0, 1.0)})
         self._past.append(self._observe())
         if self._lag:
-            self._session.advance(self._lag)
+            self._advance(self._lag)
             self._view.read()
         self.events = cast("tuple[TaskEvent, ...]", self._session["task.events"])
         harm, before = self.exercise.harm(self._view), self._harm

@@ -49,6 +49,7 @@ def register() -> None:
             registry.register(
                 name,
                 entry_point="learning.environments.registration:make",
+                vector_entry_point="learning.environments.vector:make_vector",
                 max_episode_steps=steps,
                 kwargs={"exercise": exercise},
             )

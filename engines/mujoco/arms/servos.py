@@ -202,6 +202,43 @@ class Servos:
         is_at_rest = self._holding and setpoint.tobytes() == self._previous.tobytes()
         self._at_rest = asked if is_at_rest else b""
 
+    def series(self, inputs: Inputs, count: int, series: Mapping[str, Vector]) -> Vector:
+        """Return `ctrl` of the next `count` steps, shape (count, nu), with the bits of `begin` step by step.
+
+        `series`: commands of ports in each step, shape (count, size). Raises SessionError unless every arm
+        is servoed to positions: else commands depend on the simulation.
+        """
+        rows = [
+            series[port] if port in series else np.repeat(inputs[port][None], count, axis=0)
+            for port in self._ports
+        ]
+        asked, commands = np.split(np.hstack(rows), [self._asked.size], axis=1)
+        if (asked != _POSITION).any() or (self._modes != _POSITION).any():
+            raise SessionError("arms without plain position servo go step by step only: use `advance`")
+        setpoints = self._follow(np.minimum(np.maximum(commands, self._lower), self._upper))
+        inputs_of = np.empty((count, self._inputs.size))
+        made, n = np.empty((count, self._data.ctrl.size)), self.setpoint.size
+        inputs_of[:, :n] = setpoints
+        inputs_of[0, n : 2 * n], inputs_of[1:, n : 2 * n] = self.setpoint, setpoints[:-1]
+        np.multiply(self._springs, setpoints - self._rest, out=inputs_of[:, 2 * n :])
+        for row, ctrl in zip(inputs_of, made, strict=True):
+            self._layout.dot(row, ctrl)
+        self._inputs[:] = inputs_of[-1]
+        self._at_rest = b""
+        return made
+
+    def _follow(self, commands: Vector) -> Vector:
+        """Return the setpoints that follow commands, shape (count, n), no faster than joints may move."""
+        before = np.concatenate([self.setpoint[None], commands[:-1]])
+        if (commands >= before + self._ways[0]).all() and (commands <= before + self._ways[1]).all():
+            return commands
+        setpoints, setpoint = np.empty_like(commands), self.setpoint
+        for row, command in zip(setpoints, commands, strict=True):
+            reach = setpoint + self._ways
+            np.minimum(np.maximum(command, reach[0]), reach[1], out=row)
+            setpoint = row
+        return setpoints
+
     def _let_go(self, inputs: Inputs) -> None:
         """Apply the commanded effort where no position is held, and let the setpoint follow the joint."""
         measured = np.clip(self._measure @ self._data.qpos, self._lower, self._upper)

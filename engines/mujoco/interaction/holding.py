@@ -8,10 +8,12 @@ once.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import acos
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from engines.mujoco.interaction.proximity_rays import ProximityRays
 from engines.mujoco.model.poses import ROS_ORDER
@@ -68,6 +70,7 @@ class Holding:
         self._wrists = [model.body(f"{arm}/wrist_yaw").id for arm in arms]
         shape = (len(things), len(arms))
         self._ends = _ends(model, things, [f"{arm}/{finger}" for arm in arms for finger in FINGERS])
+        self._reach = _reaches(model, self._ends)
         self._contacts = np.zeros((*shape, 2, 4))  # per finger: how many, sum of their positions
         welds = (
             [model.equality(f"{thing}/{arm}/weld").id for thing in things for arm in arms]
@@ -98,9 +101,30 @@ class Holding:
 
     def update(self) -> None:
         """Read the contacts, set welds, and update the outputs."""
-        if not self._bodies:
-            return
-        if self._look() or self._touched.any():  # an object is held no longer than it is touched
+        if self._bodies:
+            self.watch()
+            self.refresh()
+
+    def are_near(self, positions: Vector, count: int) -> Sequence[bool]:
+        """Return whether a finger may touch an object at each of `count` instants.
+
+        `positions`: of all bodies, m, shape (instants, bodies, 3). True where positions are missing.
+        """
+        if not self._bodies or not self._arms:
+            return [False] * count
+        things, fingers, reach = self._reach
+        apart = np.linalg.norm(positions[:, things] - positions[:, fingers], axis=-1)
+        near: list[bool] = (apart < reach).any(axis=-1).tolist()
+        return near + [True] * (count - len(near))
+
+    def watch(self, *, near: bool = True) -> None:
+        """Read the contacts, and set welds; outputs stay as they are.
+
+        `near`: whether a finger may touch an object at all.
+        """
+        if not near:
+            self._contacts.fill(0.0)
+        if (near and self._look()) or self._touched.any():  # an object is held no longer than it is touched
             touch = (self._contacts[..., 0] > 0.0).all(axis=-1)
             self._touched += 1.0
             self._touched *= touch
@@ -110,7 +134,6 @@ class Holding:
                 self._data.eq_active[self._welds[~touch]] = 0
             for i in range(len(self._bodies)):
                 self._choose_holder(i)
-        self.refresh()
 
     def _look(self) -> bool:
         """Count the contacts of every finger with every object, and sum their positions.
@@ -200,6 +223,21 @@ class Holding:
         self._state[:] = state
         if self._welds is not None:
             self._model.eq_data[self._welds.ravel()] = self._weld_data
+
+
+def _reaches(model: mujoco.MjModel, ends: Sequence[int]) -> tuple[NDArray[np.intp], NDArray[np.intp], Vector]:
+    """Return pairs of bodies, an object's and a finger's, and the distance within which a pair may touch."""
+    radius: dict[int, float] = {}
+    owner: dict[int, int] = {}
+    for geom, end in enumerate(ends):
+        if end:
+            body = int(model.geom_bodyid[geom])
+            size = float(np.linalg.norm(model.geom_pos[geom]) + model.geom_rbound[geom])
+            radius[body] = max(radius.get(body, 0.0), size + float(model.geom_margin[geom]))
+            owner[body] = end
+    pairs = [(i, j) for i in owner for j in owner if owner[i] > 0 > owner[j]]
+    things, fingers = np.array(pairs, int).reshape(-1, 2).T
+    return things, fingers, np.array([radius[i] + radius[j] for i, j in pairs])
 
 
 def _ends(model: mujoco.MjModel, things: list[str], fingers: list[str]) -> list[int]:
