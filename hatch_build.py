@@ -30,13 +30,14 @@ _EXTENSIONS = (
         [
             f"engines/fem/_{part}.c"
             for part in (
-                *("solid", "step", "elements", "contact", "rigid", "topology", "cut", "blade", "ties"),
-                *("together", "touch", "pairs", "attach"),
+                *("solid", "step", "elements", "elements_avx", "contact", "rigid", "topology", "cut"),
+                *("blade", "ties", "together", "touch", "pairs", "attach"),
             )
         ],
         depends=[
             "engines/fem/_solid.h",
             "engines/fem/_lanes.h",
+            "engines/fem/_forces.h",
             "engines/fem/_pairs.h",
             "engines/fem/_triangle.h",
             "engines/fem/_vectors.h",

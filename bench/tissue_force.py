@@ -1,12 +1,14 @@
 """The force on a sphere in tissue beside converged finite elements that are not ours, and what a step costs.
 
 python bench/tissue_force.py --picture docs/pictures/force-of-tissue.png
+python bench/tissue_force.py --kind fem --nodes 250 2000 --bodies middle liver kidney
 
 Spheres of 2 to 5 mm, 1 to 6 mm deep, over nodes, edges and faces of meshes of about 250 and 600 nodes: in the
 middle of a block of 80 x 60 x 20 mm and 10 kPa, 8 to 1.5 mm from its side, on a liver and on a kidney. The
 truth is `bench/tissue_truth.json`, which `python bench/tissue_truth.py` makes. Depths are those of the
 instrument: for the block from the unloaded surface, for organs from where they hang. Results:
-docs/decisions/0095-converged-truth.md, near the side 0099-rims-and-held-patches.md.
+docs/decisions/0095-converged-truth.md, near the side 0099-rims-and-held-patches.md, of kind fem
+0125-tissue-of-our-own.md.
 """
 
 from __future__ import annotations
@@ -24,14 +26,18 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' rig
 
-from engines.bullet.organ import Organ
-from engines.bullet.params import BulletParams
+from engines.tissue.organs.body import Body
+from engines.tissue.params import PressedOrgansParams
 from engines.tissue.probes.near_faces import closest_points
 from schemas.vectors import Vector
-from tests.engines.bullet.rig import BLOCK, Rig, params
+from tests.engines.bullet import rig as bullet
+from tests.engines.bullet.rig import BLOCK, Rig
+from tests.engines.fem import rig as fem
 
 TRUTH: dict[str, Any] = json.loads((Path(__file__).parent / "tissue_truth.json").read_text())
 STEPS = {250: "1 ms", 350: "1 ms", 450: "0.5 ms", 600: "0.5 ms"}
+"""Sub-step of Bullet by nodes; kind fem has its own."""
+RIGS: dict[str, Any] = {"bullet": bullet.Rig, "fem": fem.FemRig}
 ORGANS: dict[str, dict[str, Any]] = {
     "middle": BLOCK,
     "side": BLOCK,
@@ -77,7 +83,7 @@ def places(nodes: Vector, faces: Any, point: Vector) -> dict[str, Vector]:
     return {name: these[np.linalg.norm(these - point, axis=1).argmin()] for name, these in found.items()}
 
 
-def hanging(organ: Organ, point: Vector) -> tuple[Vector, Vector]:
+def hanging(organ: Body, point: Vector) -> tuple[Vector, Vector]:
     """Return where a point of the resting surface (m) hangs, and the normal there into the tissue.
 
     The normal is the mean of those of the faces around.
@@ -90,16 +96,21 @@ def hanging(organ: Organ, point: Vector) -> tuple[Vector, Vector]:
     return weights[face] @ organ.nodes[faces[face]], -areas / np.linalg.norm(areas)
 
 
-def model(body: str, nodes: int, radius: float, *, sub_grid: bool) -> BulletParams:
+def model(kind: str, body: str, nodes: int, radius: float, *, sub_grid: bool) -> PressedOrgansParams:
     """Return the organ and the probe."""
-    organ = {**ORGANS[body], "nodes": nodes}
-    return params(organ, {"radius": radius}, sub_grid=sub_grid, timestep=STEPS[nodes])
+    organ, probe = {**ORGANS[body], "nodes": nodes}, {"radius": radius}
+    if kind == "fem":
+        return fem.params(organ, probe, sub_grid=sub_grid)
+    return bullet.params(organ, probe, sub_grid=sub_grid, timestep=STEPS[nodes])
 
 
-def press(body: str, nodes: int, radius: float, place: str, *, sub_grid: bool = True) -> Press:
+def press(
+    body: str, nodes: int, radius: float, place: str, *, kind: str = "bullet", sub_grid: bool = True
+) -> Press:
     """Press 1 to 6 mm deep, and rest at each depth."""
     point = np.array(TRUTH[body]["point_m"])
-    with Rig(model(body, nodes, radius, sub_grid=sub_grid), start=(0.0, 0.0, 0.5)) as rig:
+    rig: Rig
+    with RIGS[kind](model(kind, body, nodes, radius, sub_grid=sub_grid), start=(0.0, 0.0, 0.5)) as rig:
         organ = rig.engine._organs[0]
         if place in PLACES:
             at, inward = places(organ.mesh.nodes, organ.touchable, point)[place], np.array([0.0, 0.0, -1.0])
@@ -118,12 +129,12 @@ def press(body: str, nodes: int, radius: float, place: str, *, sub_grid: bool = 
         return Press(body, nodes, radius, place, forces, (time.process_time() - start) / PAUSE_S)
 
 
-def study(nodes: int, bodies: list[str]) -> Iterator[Press]:
+def study(kind: str, nodes: int, bodies: list[str]) -> Iterator[Press]:
     """Yield all presses on meshes of about so many nodes."""
     for body in bodies:
         for radius in TRUTH[body]["force_n"]:
             for place in PLACES if body == "middle" else ("site",):
-                yield press(body, nodes, float(radius) * 1e-3, place)
+                yield press(body, nodes, float(radius) * 1e-3, place, kind=kind)
 
 
 def picture(path: Path) -> None:
@@ -163,11 +174,12 @@ def main() -> None:
     """Print the table; draw the picture where asked to."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--picture", type=Path)
-    parser.add_argument("--nodes", type=int, nargs="*", default=[250, 600], choices=list(STEPS))
+    parser.add_argument("--kind", default="bullet", choices=list(RIGS))
+    parser.add_argument("--nodes", type=int, nargs="*", default=[250, 600])
     parser.add_argument("--bodies", nargs="*", default=list(TRUTH), choices=list(ORGANS))
     args = parser.parse_args()
     for nodes in args.nodes:
-        for row in study(nodes, args.bodies):
+        for row in study(args.kind, nodes, args.bodies):
             errors = " ".join(f"{100 * error:+6.1f}" for error in row.errors)
             where = f"{row.body:7} {row.nodes:4} nodes {row.radius_m * 1e3:.0f} mm {row.place:5}"
             print(f"{where} error, %: {errors:42} {1.0 / row.cost:.2f} times real time", flush=True)

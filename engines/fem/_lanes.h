@@ -1,34 +1,65 @@
-/* Four numbers of single precision side by side: one of each of four elements.
+/* Numbers of single precision side by side: one of each element of BLOCKS blocks of four.
 
-Every operation is one of IEEE 754 on each lane, so all processors and compilers give the same bits.
+Every operation is one of IEEE 754 on each lane, so all processors and compilers give the same bits. A `Row` has the
+four numbers of one node.
 */
 
 #if (defined(__SSE2__) || defined(_M_X64)) && !defined(TROCAR_PLAIN_LANES)
 #include <emmintrin.h>
 
+typedef __m128 Row;
+#define LOAD_ROW(p) _mm_load_ps(p)
+#define STORE_ROW(p, a) _mm_store_ps(p, a)
+#define ADD_ROWS(a, b) _mm_add_ps(a, b)
+
+#ifdef TWO_BLOCKS
+#define BLOCKS 2
+typedef __m256 Lanes;
+#define ROWS(p, q) _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps(p)), _mm_load_ps(q), 1)
+#define ROW_OF(a, block) ((block) ? _mm256_extractf128_ps(a, 1) : _mm256_castps256_ps128(a))
+#define ALL(x) _mm256_set1_ps(x)
+#define ADD(a, b) _mm256_add_ps(a, b)
+#define SUB(a, b) _mm256_sub_ps(a, b)
+#define MUL(a, b) _mm256_mul_ps(a, b)
+#define DIV(a, b) _mm256_div_ps(a, b)
+#define TRANSPOSE(a, b, c, d)                                                                                          \
+    do {                                                                                                               \
+        Lanes e_ = _mm256_unpacklo_ps(a, b), f_ = _mm256_unpackhi_ps(a, b);                                            \
+        Lanes g_ = _mm256_unpacklo_ps(c, d), h_ = _mm256_unpackhi_ps(c, d);                                            \
+        (a) = _mm256_shuffle_ps(e_, g_, 0x44), (b) = _mm256_shuffle_ps(e_, g_, 0xee);                                  \
+        (c) = _mm256_shuffle_ps(f_, h_, 0x44), (d) = _mm256_shuffle_ps(f_, h_, 0xee);                                  \
+    } while (0)
+
+#else
+
+#define BLOCKS 1
 typedef __m128 Lanes;
-#define LOAD(p) _mm_load_ps(p)
-#define STORE(p, a) _mm_store_ps(p, a)
+#define ROWS(p, q) _mm_load_ps(p)
+#define ROW_OF(a, block) (a)
 #define ALL(x) _mm_set1_ps(x)
 #define ADD(a, b) _mm_add_ps(a, b)
 #define SUB(a, b) _mm_sub_ps(a, b)
 #define MUL(a, b) _mm_mul_ps(a, b)
 #define DIV(a, b) _mm_div_ps(a, b)
 #define TRANSPOSE(a, b, c, d) _MM_TRANSPOSE4_PS(a, b, c, d)
+#endif
 
 #else
 
 typedef struct {
     float at[4];
 } Lanes;
+typedef Lanes Row;
 
-static inline Lanes LOAD(const float *p)
+#define BLOCKS 1
+
+static inline Lanes LOAD_ROW(const float *p)
 {
     Lanes r = {{p[0], p[1], p[2], p[3]}};
     return r;
 }
 
-static inline void STORE(float *p, Lanes a)
+static inline void STORE_ROW(float *p, Lanes a)
 {
     for (int i = 0; i < 4; i++)
         p[i] = a.at[i];
@@ -51,6 +82,9 @@ LANEWISE(ADD, +)
 LANEWISE(SUB, -)
 LANEWISE(MUL, *)
 LANEWISE(DIV, /)
+#define ROWS(p, q) LOAD_ROW(p)
+#define ROW_OF(a, block) (a)
+#define ADD_ROWS(a, b) ADD(a, b)
 
 #define TRANSPOSE(a, b, c, d)                                                                                          \
     do {                                                                                                               \
@@ -63,6 +97,20 @@ LANEWISE(DIV, /)
         }                                                                                                              \
     } while (0)
 #endif
+
+/* Load number `k` of every element of the blocks from `b` on, which have `size` numbers each. */
+static inline Lanes load(const float *values, int b, int size, int k)
+{
+    const float *p = values + 4 * ((size_t)size * (size_t)b + (size_t)k);
+    return ROWS(p, p + 4 * size);
+}
+
+static inline void store(float *values, int b, int size, int k, Lanes a)
+{
+    float *p = values + 4 * ((size_t)size * (size_t)b + (size_t)k);
+    for (int block = 0; block < BLOCKS; block++)
+        STORE_ROW(p + 4 * size * block, ROW_OF(a, block));
+}
 
 /* a b - c d */
 static inline Lanes minor(Lanes a, Lanes b, Lanes c, Lanes d)

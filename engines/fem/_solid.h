@@ -124,7 +124,14 @@ static inline int is_gone(const Body *body, int element)
 
 void tie(const Body *body);
 
+#if defined(__GNUC__) && defined(__x86_64__) && !defined(TROCAR_PLAIN_LANES) && !defined(TROCAR_NARROW_LANES)
+#define HAS_AVX /* in the compiler; the processor is asked */
+#endif
 void elastic_forces(const Body *body, float seconds);
+void add_volumes(const Body *body, int first, int last);
+void add_volumes_avx(const Body *body, int first, int last);
+void add_forces(const Body *body, float seconds, int first, int last);
+void add_forces_avx(const Body *body, float seconds, int first, int last);
 void press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count);
 int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_steps, int *near, int most);
 

@@ -4,6 +4,7 @@ Velocities, then displacements advance by each sub-step, with forces of the disp
 */
 
 #include "_solid.h"
+#include "_lanes.h"
 
 #define MOST_NEAR 16384 /* faces near one sphere: all of the largest mesh */
 #define LARGEST_MOVE 0.25f
@@ -30,26 +31,28 @@ static void carry(const Body *body, const Spheres *spheres, int sub_step, float 
 /* Move the nodes; of a body that may be cut by no more in a sub-step than a part of the least height of an element. */
 static void move(const Body *body, float seconds)
 {
-    float sharpness = body->limits[1], fastest = sharpness > 0.0f ? LARGEST_MOVE / (sqrtf(sharpness) * seconds) : INFINITY;
-    for (int i = 0; i < body->nodes; i++)
-        for (int k = 0; k < 3; k++) {
-            float *v = body->velocity + 4 * i + k;
-            *v = *v > fastest ? fastest : *v < -fastest ? -fastest : *v;
-            body->displacement[4 * i + k] += seconds * *v;
-        }
+    float sharpness = body->limits[1], fastest = LARGEST_MOVE / (sqrtf(sharpness) * seconds);
+    for (int k = 0; k < 4 * body->nodes && sharpness > 0.0f; k++) {
+        float v = body->velocity[k];
+        body->velocity[k] = v > fastest ? fastest : v < -fastest ? -fastest : v;
+    }
+    for (int k = 0; k < 4 * body->nodes; k += 4) {
+        float *x = body->displacement + k;
+        STORE_ROW(x, ADD(LOAD_ROW(x), MUL(ALL(seconds), LOAD_ROW(body->velocity + k))));
+    }
 }
 
 static void accelerate(const Body *body, float seconds, float gravity, float drag)
 {
-    float kept = 1.0f - drag * seconds;
+    const float falls[4] = {0.0f, 0.0f, seconds * gravity, 0.0f};
+    Lanes kept = ALL(1.0f - drag * seconds), fall;
+    memcpy(&fall, falls, sizeof falls);
     for (int i = 0; i < body->nodes; i++) {
         if (body->inverse_mass[i] == 0.0f)
             continue;
-        float share = seconds * body->inverse_mass[i], *v = body->velocity + 4 * i;
-        const float *f = body->force + 4 * i;
-        v[0] = kept * v[0] + share * f[0];
-        v[1] = kept * v[1] + share * f[1];
-        v[2] = kept * v[2] + share * f[2] - seconds * gravity;
+        float *v = body->velocity + 4 * i;
+        Lanes push = MUL(ALL(seconds * body->inverse_mass[i]), LOAD_ROW(body->force + 4 * i));
+        STORE_ROW(v, SUB(ADD(MUL(kept, LOAD_ROW(v)), push), fall));
     }
 }
 

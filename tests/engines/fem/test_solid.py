@@ -162,11 +162,11 @@ def test_a_jaw_feels_what_presses_on_the_tissue_that_it_holds():
     assert felt.sum(axis=0) == pytest.approx(np.zeros(3), abs=0.01 * felt[0, 2])
 
 
-def plain_lanes(folder):
-    """Return the compiled body without SIMD."""
+def compiled_with(folder, flag):
+    """Return the body, compiled with a flag for other lanes than the usual ones."""
     library = folder / f"_solid{sysconfig.get_config_var('EXT_SUFFIX')}"
     room = Path(compiled.__file__).parent
-    command = ["cc", "-O2", "-ffp-contract=off", "-DTROCAR_PLAIN_LANES", "-shared", "-fPIC"]
+    command = ["cc", "-O2", "-ffp-contract=off", flag, "-shared", "-fPIC"]
     command += [f"-I{sysconfig.get_path('include')}", "-o", str(library)]
     subprocess.run([*command, *map(str, sorted(room.glob("*.c"))), "-lm"], check=True)
     spec = importlib.util.spec_from_file_location("engines.fem._solid", library)
@@ -176,10 +176,11 @@ def plain_lanes(folder):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="calls cc")
-def test_plain_c_has_the_bits_of_simd(tmp_path, monkeypatch):
+@pytest.mark.parametrize("flag", ["-DTROCAR_PLAIN_LANES", "-DTROCAR_NARROW_LANES"])
+def test_plain_c_and_four_lanes_have_the_bits_of_eight(flag, tmp_path, monkeypatch):
     usual = slab(120)
     sphere_press(usual, (1e-3, 2e-3, 0.0), 4e-3, 2e-3, friction=0.3, aside=1e-3, seconds=0.05)
-    monkeypatch.setitem(sys.modules, "engines.fem._solid", plain_lanes(tmp_path))
+    monkeypatch.setitem(sys.modules, "engines.fem._solid", compiled_with(tmp_path, flag))
     plain = slab(120)
     assert type(plain.compiled) is not type(usual.compiled)
     sphere_press(plain, (1e-3, 2e-3, 0.0), 4e-3, 2e-3, friction=0.3, aside=1e-3, seconds=0.05)
