@@ -27,6 +27,8 @@ __all__ = ["BACKENDS", "Observation", "Policy", "check_actions", "check_backend"
 BACKENDS = {
     "openpi": "openpi://HOST:PORT, a websocket server of openpi",
     "groot": "groot://HOST:PORT, a ZeroMQ server of GR00T",
+    "onnx": "onnx:FILE.onnx, a model in a process of its own",
+    "lerobot": "lerobot:DIRECTORY, a checkpoint of LeRobot in a process of its own",
     "python": "python:FILE.py:NAME or python:MODULE:NAME, a function or a class in a process of its own",
 }
 """Prefixes of a backend's address, and the form of each."""
@@ -78,8 +80,12 @@ def check_backend(backend: str) -> str:
         known = "; ".join(BACKENDS.values())
         raise ValueError(f"'{backend}' names no backend.{did_you_mean(prefix, BACKENDS)} Backends: {known}")
     rest = backend.removeprefix(f"{prefix}:")
-    is_address = prefix in ("openpi", "groot")
-    if not (_is_address(backend) if is_address else all(rest.rpartition(":")[::2])):
+    is_complete = {
+        "openpi": _is_address(backend),
+        "groot": _is_address(backend),
+        "python": all(rest.rpartition(":")[::2]),
+    }
+    if not is_complete.get(prefix, bool(rest)):
         raise ValueError(f"'{backend}' is incomplete, expected {BACKENDS[prefix]}")
     return backend
 

@@ -105,16 +105,10 @@ def _read(file: BinaryIO, count: int) -> bytes:
     return data
 
 
-class _Callable:
-    """A user's function `f(observation)`, or an object with `act(observation)` and `reset(episode)`."""
+class _Served:
+    """A function `f(observation)`, or an object with `act(observation)` and `reset(episode)`."""
 
-    def __init__(self, place: str, contract: Any) -> None:
-        module, _, name = place.rpartition(":")
-        found: Any = _import(module)
-        for part in name.split("."):
-            found = getattr(found, part)
-        if inspect.isclass(found):
-            found = _make(cast("Callable[..., Any]", found), contract)
+    def __init__(self, found: Any) -> None:
         self._act: Callable[..., Any] = getattr(found, "act", found)
         self._reset: Callable[..., Any] | None = getattr(found, "reset", None)
         self.metadata: Any = getattr(found, "metadata", {})
@@ -127,15 +121,28 @@ class _Callable:
         return np.asarray(self._act(observation))
 
 
+def _find(prefix: str, place: str, contract: Any) -> Any:
+    """Return the policy behind an address."""
+    if prefix in _OWN:
+        file, name = _OWN[prefix]
+        return getattr(_load(Path(__file__).resolve().with_name(file)), name)(place, contract)
+    module, _, name = place.rpartition(":")
+    if module.endswith(".py"):
+        path = Path(module).resolve()
+        sys.path.insert(0, str(path.parent))
+        found: Any = _load(path)
+    else:
+        found = importlib.import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part)
+    return _make(cast("Callable[..., Any]", found), contract) if inspect.isclass(found) else found
+
+
 def _make(make: Callable[..., Any], contract: Any) -> Any:
     return make(contract) if inspect.signature(make).parameters else make()
 
 
-def _import(module: str) -> Any:
-    if not module.endswith(".py"):
-        return importlib.import_module(module)
-    path = Path(module).resolve()
-    sys.path.insert(0, str(path.parent))
+def _load(path: Path) -> Any:
     spec = importlib.util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None:
         raise ImportError(f"no Python file '{path}'")
@@ -145,7 +152,8 @@ def _import(module: str) -> Any:
     return found
 
 
-_POLICIES: dict[str, Callable[[str, Any], Any]] = {"python": _Callable}
+_OWN = {"onnx": ("onnx_model.py", "OnnxModel"), "lerobot": ("lerobot_checkpoint.py", "LeRobotCheckpoint")}
+"""File and class of the policies that are files themselves, by prefix."""
 
 
 def main() -> None:
@@ -158,7 +166,7 @@ def main() -> None:
     os.chdir(first["directory"])
     try:
         prefix, _, place = first["backend"].partition(":")
-        policy = _POLICIES[prefix](place, first["contract"])
+        policy = _Served(_find(prefix, place, first["contract"]))
         write_frame(answers, {"metadata": policy.metadata})
     except Exception as error:  # noqa: BLE001  # it is sent to the session, which names it
         traceback.print_exc()
