@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from engines.mujoco.truth.modality import Modality, parse_modalities
 from schemas.errors import MissingExtraError
 
 if TYPE_CHECKING:
@@ -56,9 +57,24 @@ def render(
     *,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Picture to write, .png or .jpg; default: beside the recording."),
+        typer.Option(
+            "--output",
+            "-o",
+            help="Picture to write, .png or .jpg, or with --modalities a directory; default: beside the"
+            " recording.",
+        ),
     ] = None,
     time: Annotated[float, typer.Option(min=0.0, metavar="S", help="Simulated time, in seconds.")] = 0.0,
+    modalities: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Truth beside the picture: depth,segmentation,normals,flow,keypoints, or some of these.",
+        ),
+    ] = None,
+    step: Annotated[
+        float, typer.Option(min=1e-4, metavar="S", help="Time until the picture to which the flow leads.")
+    ] = 0.04,
     camera: CameraName = "overview",
     position: Position = None,
     target: Target = None,
@@ -71,20 +87,20 @@ def render(
     """Draw the scene of a recording at one moment, with its soft bodies and markers."""
     from hub.recording.bag import default_output
 
-    output = output or default_output(recording, ".png")
-    if output.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+    output = output or default_output(recording, ".png" if modalities is None else ".truth")
+    if modalities is None and output.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"'{output}' is not a picture: .png or .jpg", param_hint="--output")
+    chosen = None if modalities is None else _parse_modalities(modalities)
     scene = _open_scene("render", recording, robot, looks, trust=trust)
-    from PIL import Image
+    view = camera, (width, height), _parse_point(position, "--from"), _parse_point(target, "--at")
+    if chosen is None:
+        from PIL import Image
 
-    picture = scene.picture(
-        round(time * 1e9),
-        camera,
-        (width, height),
-        _parse_point(position, "--from"),
-        _parse_point(target, "--at"),
-    )
-    Image.fromarray(picture).save(output)
+        Image.fromarray(scene.picture(round(time * 1e9), *view)).save(output)
+    else:
+        from engines.mujoco.truth.recorded_picture import write_truth
+
+        write_truth(scene, output, chosen, round(time * 1e9), round(step * 1e9), *view)
     typer.echo(output)
 
 
@@ -167,6 +183,13 @@ def _open_scene(
     from hub.recording.recording import Recording
 
     return RecordedScene(Recording(recording), robot, looks=looks, trust=trust)
+
+
+def _parse_modalities(text: str) -> frozenset[Modality]:
+    try:
+        return parse_modalities(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--modalities") from None
 
 
 def _parse_point(text: str | None, option: str) -> tuple[float, float, float] | None:

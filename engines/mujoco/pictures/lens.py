@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from robots.dvrk.endoscope import StereoCamera
 from schemas.vectors import Vector
 
-__all__ = ["NO_DISTORTION", "Distortion", "Lens", "check_distortion"]
+__all__ = [
+    "NO_DISTORTION",
+    "Distortion",
+    "Lens",
+    "check_distortion",
+    "distort_points",
+    "undistort_points",
+]
 
 Distortion = tuple[float, float, float, float, float]
 """Coefficients k1, k2, p1, p2, k3."""
@@ -38,7 +45,7 @@ class Lens:
         width, height, focal = camera.width, camera.height, camera.focal_length
         middle = 0.5 * np.array([width - 1, height - 1])
         pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
-        rays = _undistort_points((pixels - middle) / focal, distortion)
+        rays = undistort_points((pixels - middle) / focal, distortion)
         outside = np.abs(rays).max(axis=0) * focal - middle
         margin = np.array([max(0, ceil(one - 1e-9)) for one in outside])
         across, down = (2 * margin + [width, height]).tolist()
@@ -71,10 +78,10 @@ def check_distortion(camera: StereoCamera, distortion: Distortion) -> None:
     edges = np.concatenate(
         [np.stack(edge, axis=1) for edge in ((side, one), (side, -one), (one, side), (-one, side))]
     )
-    _undistort_points(edges * [x, x * camera.height / camera.width], distortion)
+    undistort_points(edges * [x, x * camera.height / camera.width], distortion)
 
 
-def _distort_points(points: Vector, distortion: Distortion) -> Vector:
+def distort_points(points: Vector, distortion: Distortion) -> Vector:
     """Return where rays through `points` of the plane z = 1, shape (n, 2), seem to come from."""
     k1, k2, p1, p2, k3 = distortion
     x, y = points.T
@@ -89,14 +96,14 @@ def _distort_points(points: Vector, distortion: Distortion) -> Vector:
     )
 
 
-def _undistort_points(points: Vector, distortion: Distortion) -> Vector:
+def undistort_points(points: Vector, distortion: Distortion) -> Vector:
     """Return the points of the plane z = 1 that seem to be at `points`, shape (n, 2).
 
     Raises ValueError if there are none, or if they are too far from the axis to be drawn.
     """
     found = points.copy()
     for _ in range(_TURNS):
-        miss = points - _distort_points(found, distortion)
+        miss = points - distort_points(found, distortion)
         found = np.clip(found + miss, -2.0 * _WIDEST, 2.0 * _WIDEST)
         if np.abs(miss).max() < _CLOSE:
             break

@@ -22,7 +22,7 @@ from hub.recording.trust import trusted_parameters
 from schemas.errors import RecordingError, ScenarioError, TrocarError
 from schemas.scenario import ParticipantSpec
 
-__all__ = ["Camera", "RecordedScene"]
+__all__ = ["Camera", "Point", "RecordedScene"]
 
 _log = logging.getLogger(__name__)
 

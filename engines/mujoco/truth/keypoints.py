@@ -60,7 +60,7 @@ class Instrument:
         local = view.to_camera(np.stack([_place(data, *point) for point in self.points.values()]))
         pixels = np.full((len(local), 2), np.nan)
         ahead = local[:, 2] > 0.0
-        pixels[ahead] = view.project(local[ahead])
+        pixels[ahead] = view.projection.project(local[ahead])
         own = {body.id for body in bodies if body.name.partition("/")[0] == self.arm}
         return {
             name: Keypoint(pixel, position, _visibility(sight, pixel, float(position[2]), own))
@@ -176,7 +176,7 @@ def _clip_line(view: Viewpoint, ends: Vector) -> Vector | None:
     `ends`: in the optical frame, shape (2, 3), m. The sides of what the camera sees are planes through it.
     """
     width, height = view.size
-    homogeneous = ends @ view.intrinsics.T  # (2, 3): u z, v z, z
+    homogeneous = ends @ view.projection.intrinsics.T  # (2, 3): u z, v z, z
     u, v, z = homogeneous.T
     inside = np.stack([u + 0.5 * z, (width - 0.5) * z - u, v + 0.5 * z, (height - 0.5) * z - v, z - 1e-6])
     first, last = 0.0, 1.0
@@ -188,4 +188,4 @@ def _clip_line(view: Viewpoint, ends: Vector) -> Vector | None:
             first, last = (max(first, crossing), last) if start < 0.0 else (first, min(last, crossing))
     if first >= last:
         return None
-    return view.project(ends[0] + np.array([[first], [last]]) * (ends[1] - ends[0]))
+    return view.projection.project(ends[0] + np.array([[first], [last]]) * (ends[1] - ends[0]))

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.mujoco.truth.projection import Projection
 from engines.mujoco.truth.surfaces import Surfaces
 from schemas.vectors import Vector
 
@@ -26,19 +27,16 @@ class Viewpoint:
 
     pose: Vector
     """Optical frame (x right, y down, z ahead) in the world, shape (4, 4)."""
-    intrinsics: Vector
-    """Camera matrix K, shape (3, 3); pixel (0, 0) is the middle of the upper left pixel."""
-    size: tuple[int, int]
-    """Width and height, pixels."""
+    projection: Projection
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self.projection.size
 
     def to_camera(self, points: Vector) -> Vector:
         """Return points, shape (n, 3), m, frame `world`, in the optical frame."""
         return (points - self.pose[:3, 3]) @ self.pose[:3, :3]
-
-    def project(self, points: Vector) -> Vector:
-        """Return pixels (u right, v down), shape (n, 2), of points in the optical frame, shape (n, 3), m."""
-        homogeneous = points @ self.intrinsics.T
-        return homogeneous[:, :2] / homogeneous[:, 2:]
 
 
 @dataclass(frozen=True)
@@ -77,13 +75,8 @@ class Sight:
         self.triangles = triangles[self.hit]
         """Number of the triangle of each such pixel, shape (n,)."""
         self._corners = surfaces.faces[self.triangles]  # (n, 3)
-        rows, columns = np.nonzero(self.hit)
-        k = view.intrinsics
-        rays = np.stack(
-            [(columns - k[0, 2]) / k[0, 0], (rows - k[1, 2]) / k[1, 1], np.ones(len(rows))], axis=1
-        )
         local = view.to_camera(vertices)[self._corners]  # (n, 3, 3)
-        self.weights = _barycentric(local, rays)
+        self.weights = _barycentric(local, view.projection.rays[self.hit])
         """Shares of the triangle's corners in the point, shape (n, 3)."""
         self.points = np.einsum("ni,nij->nj", self.weights, local)
         """Points in the optical frame, shape (n, 3), m."""
@@ -129,8 +122,8 @@ class Sight:
         local = view.to_camera(moved)
         flow = np.full((len(local), 2), np.nan)
         ahead = local[:, 2] > 0.0
-        to = view.project(local[ahead])
-        flow[ahead] = to - self.view.project(self.points[ahead])
+        to = view.projection.project(local[ahead])
+        flow[ahead] = to - self.view.projection.project(self.points[ahead])
         is_visible = np.zeros(len(local), np.bool_)
         is_visible[ahead] = sight.sees(to, local[ahead, 2])
         return Motion(

@@ -19,6 +19,7 @@ from engines.mujoco.place.part import PlacePart
 from engines.mujoco.truth.id_buffer import IdBuffer
 from engines.mujoco.truth.keypoints import instruments
 from engines.mujoco.truth.labels import label_bodies, rigid_class
+from engines.mujoco.truth.projection import Projection
 from engines.mujoco.truth.scene_class import SceneClass, tissue_class
 from engines.mujoco.truth.sight import Motion, Sight, Viewpoint
 from engines.mujoco.truth.surfaces import Piece, Surfaces, rigid_piece, soft_piece, visible_geoms
@@ -56,12 +57,15 @@ class TruthScene:
         owners = sorted({int(self.model.geom_bodyid[geom]) for geom in self._geoms})
         self._owners = {owner: number for number, owner in enumerate(owners, 1)}
         self.bodies = label_bodies(self._named(owners))
-        """All bodies that pictures may show."""
+        """All bodies that pictures may show: rigid, then soft, then the surroundings."""
+        self.rigid_count = len(owners)
         self.instruments = instruments(params, self.model)
         """Keypoints of all instruments."""
         self._versions: list[int] = []
         self._surfaces = self._renew()
-        self._buffer = IdBuffer(gl, (params.width, params.height))
+        self.projection = Projection(params.camera, params.distortion)
+        """The camera of either eye."""
+        self._buffer = IdBuffer(gl, self.projection.drawn_size)
 
     def _make_place(self) -> list[PlacePart]:
         if self._params.looks != "endoscope":
@@ -110,15 +114,15 @@ class TruthScene:
 
     def view(self, eye: Eye) -> Viewpoint:
         """Return the camera of an eye at the state looked at last."""
-        camera, pose = self._params.camera, self._mount.pose(self.data).copy()
-        pose[:3, 3] += (-0.5 if eye == "left" else 0.5) * camera.baseline * pose[:3, 0]
-        return Viewpoint(pose, camera.intrinsics(), (camera.width, camera.height))
+        pose = self._mount.pose(self.data).copy()
+        pose[:3, 3] += (-0.5 if eye == "left" else 0.5) * self._params.baseline * pose[:3, 0]
+        return Viewpoint(pose, self.projection)
 
     def _see(self, surfaces: Surfaces, vertices: Vector, eye: Eye) -> Sight:
         view = self.view(eye)
         corners = view.to_camera(vertices)[surfaces.faces]
-        triangles = self._buffer.draw(corners, view.intrinsics, self._mount.clip)
-        return Sight(surfaces, vertices, view, triangles)
+        drawn = self._buffer.draw(corners, self.projection.drawn_intrinsics, self._mount.clip)
+        return Sight(surfaces, vertices, view, self.projection.pick(drawn))
 
     def close(self) -> None:
         """Free the OpenGL context. May be called twice."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from engines.mujoco.truth.sight import Viewpoint
 from schemas.vectors import Vector
 
-__all__ = ["Cast", "cast_geoms", "cast_mesh", "pixel_rays"]
+__all__ = ["Cast", "cast_geoms", "cast_mesh"]
 
 _cast: Callable[..., float] = mujoco.mj_ray  # pyright: ignore
 _GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
@@ -25,16 +25,6 @@ class Cast(NamedTuple):
     """Distance along the optical axis, m; inf: nothing."""
     body: NDArray[np.int64]
     """Body of the model; -1: nothing."""
-
-
-def pixel_rays(view: Viewpoint) -> Vector:
-    """Return rays through the middles of all pixels, row by row, in the optical frame, z is 1."""
-    width, height = view.size
-    k = view.intrinsics
-    u, v = np.meshgrid(np.arange(width), np.arange(height))
-    return np.stack(
-        [(u.ravel() - k[0, 2]) / k[0, 0], (v.ravel() - k[1, 2]) / k[1, 1], np.ones(u.size)], axis=1
-    )
 
 
 def cast_geoms(model: mujoco.MjModel, data: mujoco.MjData, view: Viewpoint, rays: Vector) -> Cast:
