@@ -54,6 +54,8 @@ _SERVICES = {
 }
 _CARTESIAN_STATES = {name: type_ for name, type_ in crtk.CARTESIAN_STATES.items() if name not in NOT_SERVED}
 _PICTURES = {"image_raw": Image.ros_type, "image_raw/compressed": CompressedImage.ros_type}
+_TRUTH = ("depth", "segmentation", "instances")
+"""Names of pictures of truth, where a camera publishes them; no real camera does."""
 _REAL_MAX_AGE_NS = 100_000_000
 """Age of a stale state of a real arm: ten periods of 10 ms."""
 
@@ -176,6 +178,7 @@ def _camera(camera: str) -> Iterator[Row]:
         yield from (
             _event(camera, f"{eye}/{name}", type_, latched=False) for name, type_ in _PICTURES.items()
         )
+        yield from (_event(camera, f"{eye}/{name}", Image.ros_type, latched=False) for name in _TRUTH)
         yield _event(camera, f"{eye}/camera_info", CameraInfo.ros_type, latched=False)
     yield _command(camera, "markers", MarkerArray.ros_type)
     yield _event(camera, "error", StringMessage.ros_type)

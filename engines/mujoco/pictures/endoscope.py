@@ -33,6 +33,7 @@ from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange, Surf
 
 if TYPE_CHECKING:
     from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
+    from engines.mujoco.truth.camera_truth import CameraTruth
 
 __all__ = ["Endoscope", "camera_info"]
 
@@ -57,12 +58,15 @@ class Endoscope(Stepped):
             kinds["image_raw"] = Image
         if params.images in ("compressed", "both"):
             kinds["image_raw/compressed"] = CompressedImage
+        if kinds:
+            kinds |= dict.fromkeys(params.truth, Image)
         self._pictures = tuple(
             event_out(f"{eye}/{kind}", model, frame=self._frame)
             for eye in EYES
             for kind, model in kinds.items()
         )
         self._scene: EndoscopeScene | None = None
+        self._truth: CameraTruth | None = None
         self._drawing = Drawing("", "")
 
     @property
@@ -112,6 +116,12 @@ class Endoscope(Stepped):
         self._drawing = find_drawing(self.params.looks)
         if self._drawing.shortcoming:
             _log.warning("participant '%s' %s", self.name, self._drawing.shortcoming)
+        elif self.params.truth and not opengl.find().name:
+            _log.warning(
+                "participant '%s' publishes no truth: no OpenGL works here. To fix it: %s",
+                self.name,
+                opengl.REMEDY,
+            )
         if self._drawing.engine and not self._bodies:
             self._build_scene()
         return self._outputs({})
@@ -120,6 +130,10 @@ class Endoscope(Stepped):
         from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 
         self._scene = EndoscopeScene(self.params, self._drawing.engine, self._bodies)
+        if self.params.truth and opengl.find().name:
+            from engines.mujoco.truth.camera_truth import CameraTruth
+
+            self._truth = CameraTruth(self.params, self._bodies)
         return self._scene
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
@@ -140,13 +154,14 @@ class Endoscope(Stepped):
         header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
         markers = () if self._shown is None else tuple(shown_markers(self._shown))
         pictures = scene.draw(self._positions, markers, t)
-        return self._outputs(
-            {
-                f"{eye}/{name}": message
-                for eye, pixels in zip(EYES, pictures, strict=True)
-                for name, message in self._messages(eye, pixels, header)
-            }
-        )
+        messages = {
+            f"{eye}/{name}": message
+            for eye, pixels in zip(EYES, pictures, strict=True)
+            for name, message in self._messages(eye, pixels, header)
+        }
+        if self._truth is not None:
+            messages |= dict(self._truth.messages(self._positions, header))
+        return self._outputs(messages)
 
     def _messages(self, eye: Eye, pixels: NDArray[np.uint8], header: Header) -> Iterator[tuple[str, Message]]:
         params = self.params
@@ -170,7 +185,8 @@ class Endoscope(Stepped):
             )
 
     def _outputs(self, messages: Mapping[str, Message]) -> Outputs:
-        return {port.name: (messages[port.name],) if messages else () for port in self._pictures}
+        names = (port.name for port in self._pictures)
+        return {name: (messages[name],) if name in messages else () for name in names}
 
     def _compress_picture(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         from PIL import Image as Picture
@@ -221,10 +237,11 @@ class Endoscope(Stepped):
             ) from error
 
     def close(self) -> None:
-        """Free the OpenGL context."""
-        if self._scene is not None:
-            self._scene.close()
-            self._scene = None
+        """Free the OpenGL contexts."""
+        for scene in (self._scene, self._truth):
+            if scene is not None:
+                scene.close()
+        self._scene = self._truth = None
 
 
 def camera_info(

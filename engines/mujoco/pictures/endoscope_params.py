@@ -22,6 +22,8 @@ __all__ = ["EndoscopeParams", "ViewParams"]
 
 _MOST_PIXELS = 2048
 """Most pixels of a side: an uncompressed picture of 2048 x 2048 is the largest in a message."""
+_MOST_DEPTHS = 3 * _MOST_PIXELS**2 // 4
+"""Most pixels of a depth, four bytes each, in a message."""
 
 
 class ViewParams(Params):
@@ -86,6 +88,13 @@ class EndoscopeParams(SceneParams):
     images: Literal["raw", "compressed", "both", "none"] = Field(
         default="raw", description="what is published of each picture; none: the camera is off"
     )
+    truth: tuple[Literal["depth", "segmentation", "instances"], ...] = Field(
+        default=(),
+        description=(
+            "published beside the pictures, from the geometry and free of noise: depth (m, 32FC1),"
+            " segmentation by class and instances (mono16)"
+        ),
+    )
     format: Literal["jpeg", "png"] = Field(default="jpeg", description="of the compressed picture")
     quality: int = Field(
         default=95, ge=1, le=95, description="of a JPEG; above 95 files grow but pictures do not improve"
@@ -134,4 +143,15 @@ class EndoscopeParams(SceneParams):
         if self.far is not None and self.far <= self.near:
             raise ValueError(f"far ({self.far:g} m) must be beyond near ({self.near:g} m)")
         check_distortion(self.camera, self.distortion)
+        return self
+
+    @model_validator(mode="after")
+    def _truth_fits_a_message(self) -> Self:
+        if len(set(self.truth)) < len(self.truth):
+            raise ValueError("truth names something twice")
+        if "depth" in self.truth and self.width * self.height > _MOST_DEPTHS:
+            raise ValueError(
+                f"a depth of {self.width} x {self.height} pixels is larger than a message: at most"
+                f" {_MOST_DEPTHS} pixels; `trocar render --modalities` draws larger ones from a recording"
+            )
         return self

@@ -15,6 +15,7 @@ from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope import Endoscope
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.ports import position_count
+from engines.mujoco.truth.scene_class import SceneClass
 from hub.participant import Inputs, Outputs, Setup
 from hub.testing import check_engine
 from robots.dvrk.endoscope import EYES, optical_in_roll
@@ -299,3 +300,35 @@ def test_leaving_out_what_no_camera_sees_changes_no_pixel(
     assert any(picture.any() for picture in everything)
     for fewer, more in zip(some, everything, strict=True):
         np.testing.assert_array_equal(fewer, more)
+
+
+def test_truth_is_published_beside_the_pictures_and_agrees_with_them(gl: str) -> None:
+    pose = camera_pose()
+    points = np.array([(pose @ [x, y, AHEAD, 1.0])[:3] for x, y in SPREAD])
+    with make(points, truth=["depth", "segmentation", "instances"]) as endoscope:
+        endoscope.configure(Setup(PERIOD_NS, Path.cwd()))
+        outputs = endoscope.step(0, PERIOD_NS, Inputs({"qpos": state(endoscope)}))
+    for eye in EYES:
+        (depth,), (classes,), (instances,), (info,) = (
+            outputs[f"{eye}/{name}"] for name in ("depth", "segmentation", "instances", "camera_info")
+        )
+        assert isinstance(depth, Image)
+        assert isinstance(classes, Image)
+        assert isinstance(instances, Image)
+        assert isinstance(info, CameraInfo)
+        assert (depth.encoding, classes.encoding) == ("32FC1", "mono16")
+        assert (depth.step, classes.step) == (4 * depth.width, 2 * classes.width)
+        metres = depth.data.view("<f4").reshape(depth.height, depth.width)
+        numbers = instances.data.view("<u2").reshape(depth.height, depth.width)
+        seen = metres > 0.0
+        assert np.array_equal(seen, classes.data.view("<u2").reshape(seen.shape) == SceneClass.OBJECT)
+        assert len(np.unique(numbers[seen])) == len(points)
+        assert np.allclose(metres[seen], AHEAD, atol=2e-3)
+        (picture,) = outputs[f"{eye}/image_raw"]
+        assert np.array_equal(seen, pixels(picture).max(axis=2) > 0)
+        assert info.header == depth.header
+
+
+def test_truth_larger_than_a_message_is_refused() -> None:
+    with pytest.raises(ValueError, match="larger than a message"):
+        make(truth=["depth"], width=2048, height=2048)
