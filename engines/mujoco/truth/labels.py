@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from engines.mujoco.object_params import NeedleParams
@@ -29,7 +29,13 @@ class Body:
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields, the class by name."""
-        return asdict(self) | {"scene_class": self.scene_class.name.lower()}
+        return {
+            "id": self.id,
+            "name": self.name,
+            "class": self.scene_class.name.lower(),
+            "instance": self.instance,
+            "instance_name": self.instance_name,
+        }
 
 
 def label_bodies(named: Iterable[tuple[str, SceneClass]]) -> tuple[Body, ...]:

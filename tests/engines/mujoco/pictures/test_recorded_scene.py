@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import av
@@ -249,3 +250,34 @@ def test_a_cut_is_drawn_from_its_instant_on(tmp_path: Path) -> None:
     alone = scene.picture(times[-1], "overview", (160, 120), **view)
     assert np.array_equal(alone, after)
     assert (after.astype(int) - before.astype(int) != 0).any(axis=2).mean() > 0.01
+
+
+def test_render_writes_the_truth_beside_a_picture(recordings: dict[str, Recording], tmp_path: Path) -> None:
+    target = tmp_path / "truth"
+    chosen = ["--modalities", "depth,segmentation,normals,flow,keypoints", "--time", "0.1"]
+    size = ["--width", "120", "--height", "90"]
+    done = CliRunner().invoke(render_app, [str(recordings["hub"].file), *chosen, *size, "-o", str(target)])
+    assert done.exit_code == 0, done.output
+    content = json.loads((target / "truth.json").read_text())
+    liver = [body["id"] for body in content["bodies"] if body["class"] == "liver"]
+    assert len(liver) == 2  # of both engines
+    bodies, classes = (np.asarray(Image.open(target / f"{name}.png")) for name in ("bodies", "segmentation"))
+    assert bodies.dtype == classes.dtype == np.uint16
+    assert np.array_equal(np.isin(bodies, liver), classes == content["classes"]["liver"])
+    picture = np.asarray(Image.open(target / "picture.png")).astype(float)
+    red = picture[..., 0] > 1.5 * picture[..., 1] + 10.0
+    assert (red == (classes == content["classes"]["liver"])).mean() > 0.98
+    with np.load(target / "truth.npz") as arrays:
+        assert set(arrays) == {"depth", "normals", "flow", "scene_flow", "flow_visible"}
+        coarse = np.asarray(Image.open(target / "depth.png")) * 1e-4
+        assert np.abs(coarse - arrays["depth"]).max() < 0.51e-4
+        assert np.isfinite(arrays["flow"]).all(axis=2).sum() == (arrays["depth"] > 0.0).sum()
+    (arm,) = content["instruments"]
+    assert content["instruments"][arm]["keypoints"]["tip"]["visibility"] in (0, 1, 2)
+
+
+def test_render_names_the_modalities_that_there_are(recordings: dict[str, Recording]) -> None:
+    done = CliRunner().invoke(render_app, [str(recordings["hub"].file), "--modalities", "depth,heat"])
+    assert done.exit_code == 2
+    assert "heat" in done.output
+    assert "segmentation" in done.output

@@ -100,7 +100,7 @@ def test_segmentation_and_depth_are_those_of_rays(gl: str, tissue: Tissue, what:
     # a distorted edge is where the finer drawn pixels are: off by up to a sixth of a pixel
     assert same.mean() > (0.995 if what == "distorted" else 0.999)
     shown = same & sight.hit & interior(sight.bodies)
-    assert np.quantile(np.abs(depth - sight.depth)[shown], 0.999) < EDGE_M
+    assert np.quantile(np.abs(depth - sight.depth)[shown], 0.99 if what == "distorted" else 0.999) < EDGE_M
     assert np.abs(depth - sight.depth)[shown].max() < 1e-3
     scene.close()
 
