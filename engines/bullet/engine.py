@@ -15,7 +15,8 @@ from engines.tissue.ports import node_ports, node_states
 from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
 from engines.tissue.probes.near_faces import CONTACT_PERIOD_NS
 from engines.tissue.probes.params import Coupling, ProbeParams
-from engines.tissue.probes.sub_grid import SubGrid, Surface, warn_beyond
+from engines.tissue.probes.place import Surface
+from engines.tissue.probes.sub_grid import SubGrid, warn_beyond
 from engines.tissue.warn_once import warn_once
 from hub.participant import (
     BondPlan,

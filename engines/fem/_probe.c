@@ -245,6 +245,8 @@ static PyTypeObject probe_type = {
 
 static PyMethodDef functions[] = {
     {"near_faces", find_near_faces, METH_VARARGS, near_faces_doc},
+    {"closest_on_faces", closest_on_faces, METH_VARARGS, closest_on_faces_doc},
+    {"sum_at_nodes", sum_at_nodes, METH_VARARGS, sum_at_nodes_doc},
     {NULL, NULL, 0, NULL},
 };
 

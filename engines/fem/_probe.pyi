@@ -23,3 +23,20 @@ def near_faces(
     distances: NDArray[np.float64],
     /,
 ) -> int: ...
+def closest_on_faces(
+    point: NDArray[np.float64],
+    corners: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    distances: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    /,
+) -> None: ...
+def sum_at_nodes(
+    faces: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    first: int,
+    first_weights: NDArray[np.float64],
+    nodes: NDArray[np.int64],
+    parts: NDArray[np.float64],
+    /,
+) -> int: ...

@@ -25,7 +25,8 @@ from engines.tissue.elasticity.body_yield import BodyYield
 from engines.tissue.ports import node_ports, node_states, surface_changes, surface_ports
 from engines.tissue.probes.grasp import Grasp, grasp_ports, nothing_held
 from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS
-from engines.tissue.probes.sub_grid import Surface, warn_beyond
+from engines.tissue.probes.place import Surface
+from engines.tissue.probes.sub_grid import warn_beyond
 from engines.tissue.warn_once import warn_once
 from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from xxhash import xxh3_128_digest
 
+from engines.fem.place import find_place
 from engines.fem.solid import Branch
 from engines.fem.spheres import Spheres
 from engines.tissue.probes.near_faces import NearFaces
 from engines.tissue.probes.params import Coupling, ProbeParams
-from engines.tissue.probes.sub_grid import LAW_POINTS, SubGrid, Surface
+from engines.tissue.probes.place import Surface
+from engines.tissue.probes.sub_grid import LAW_POINTS, SubGrid
 from hub.participant import BondPlan, Inputs
 from schemas.ports import BondSide, bond_ports
 from schemas.vectors import Vector
@@ -54,7 +56,9 @@ class Probe:
         n, size = len(params.radii), bond.size
         self.name, self.radii = bond.name, params.radii
         self.bodies = list(range(first, first + n))
-        self.sub_grid = None if surfaces is None else SubGrid(float(self.radii[0]), RIGID, surfaces)
+        self.sub_grid = (
+            None if surfaces is None else SubGrid(float(self.radii[0]), RIGID, surfaces, find_place)
+        )
         points = 0 if surfaces is None else LAW_POINTS
         self._terms: list[Vector] = [
             np.array([[one.share, one.seconds] for one in branches]).reshape(-1, 2) for branches in series
@@ -139,10 +143,12 @@ class Probe:
                 self._spring[3] = 0.0
 
     def _relax(self, near: Sequence[NearFaces]) -> None:
-        """Take the relaxation of the nearest organ."""
+        """Take the relaxation of the nearest organ, where one relaxes."""
+        if not len(self._series):
+            return
         distances = [faces.distances.min(initial=np.inf) for faces in near]
         nearest = int(np.argmin(distances))
-        if len(self._series) and np.isfinite(distances[nearest]):
+        if np.isfinite(distances[nearest]):
             terms = self._terms[nearest]
             self._series[:] = 0.0
             self._series[: len(terms)] = terms

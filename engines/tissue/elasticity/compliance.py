@@ -88,7 +88,7 @@ class SurfaceCompliance:
         Force and motion are along `inward`, shape (3,).
         """
         at = self._place[nodes]
-        between = self._between[np.ix_(at, at)].reshape(-1, 9) @ np.outer(inward, inward).ravel()
+        between = self._between[at[:, None], at].reshape(-1, 9) @ (inward[:, None] * inward).ravel()
         return between.reshape(len(at), len(at))
 
     def on_surface(self, nodes: Indices) -> Indices:

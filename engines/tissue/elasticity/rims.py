@@ -15,12 +15,15 @@ from engines.tissue.material import Material
 from engines.tissue.meshing.tet_mesh import Indices
 from schemas.vectors import Vector
 
-__all__ = ["MIRRORED", "Rims", "mirror_displacement", "rim_share", "rims_of"]
+__all__ = ["MIRRORED", "RimWatch", "Rims", "mirror_displacement", "rim_share", "rims_of"]
 
 _LEAST_TURN = np.pi / 3
 """Least angle between the normals of two faces at a rim; the facets of round organs with 250 nodes turn by
 less.
 """
+
+_DIAGONAL = 1.415
+"""Diagonal of a square over its side, rounded up."""
 
 MIRRORED = 1.49
 """Effect of a rim on the displacement by a point force, as a number of forces at the mirror image (Guilbault,
@@ -114,6 +117,30 @@ class Rims:
         away = float(np.copysign(distances[nearest], ways[nearest] @ across))
         press = -max(-heights[nearest], 0.0) * outwards + min(away, 0.0) * across
         return away, press / np.sqrt(press @ press) if away < 0.0 else -outwards
+
+
+class RimWatch:
+    """The rims near a sphere that goes along a surface: looked for only where there may be some."""
+
+    def __init__(self, rims: Rims, nodes: Vector, reach: float) -> None:
+        """`nodes`: of the mesh, m, shape (n, 3); `reach`: largest distance, m."""
+        self._rims, self._nodes, self._reach = rims, nodes, reach
+        self._looked_at: Vector = np.zeros(3)
+        self._clear = 0.0
+        """How far around `_looked_at` no rim can be near, m."""
+
+    def near(self, centre: Vector, inward: Vector) -> tuple[float, Vector] | None:
+        """Return the distance (m) from the nearest rim and the direction of pressing, as `Rims.near`."""
+        x, y, z = (centre - self._looked_at).tolist()
+        if x * x + y * y + z * z < self._clear * self._clear:
+            return None
+        found = self._rims.near(centre, inward, self._nodes, self._reach)
+        if found is None:
+            ways = self._rims.vectors(centre, self._nodes)
+            nearest = float(np.sqrt((ways * ways).sum(axis=1)).min())
+            # farther than this, along the face or from it a rim is beyond the reach
+            self._looked_at, self._clear = centre, max(nearest - _DIAGONAL * self._reach, 0.0)
+        return found
 
 
 def rims_of(nodes: Vector, faces: Indices) -> Rims:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from engines.tissue.organs.body import Body
 from engines.tissue.probes.held_patch import missing_compliance
 from engines.tissue.probes.params import GraspParams
-from engines.tissue.probes.sub_grid import Surface
+from engines.tissue.probes.place import Surface
 from engines.tissue.warn_once import warn_once
 from hub.participant import Value, event_out, signal_out
 from schemas.ports import Port

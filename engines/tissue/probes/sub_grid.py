@@ -10,26 +10,20 @@ coupling. See docs/decisions/0086-force-of-tissue.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from engines.tissue.elasticity.body_yield import BodyYield
-from engines.tissue.elasticity.compliance import SurfaceCompliance
-from engines.tissue.elasticity.dense_body_yield import DenseBodyYield
 from engines.tissue.elasticity.half_space import DEEPEST, sphere_force
-from engines.tissue.elasticity.rims import rim_share
-from engines.tissue.material import Material
-from engines.tissue.meshing.tet_mesh import Indices
-from engines.tissue.organs.body import Body
-from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces, closest_points
+from engines.tissue.elasticity.rims import RimWatch, rim_share
+from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS, NearFaces
 from engines.tissue.probes.params import Coupling
+from engines.tissue.probes.place import Place, Surface, find_place
 from engines.tissue.warn_once import warn_once
-from robots.vector3 import cross
 from schemas.vectors import Vector
 
-__all__ = ["LAW_POINTS", "SubGrid", "Surface", "warn_beyond"]
+__all__ = ["LAW_POINTS", "SubGrid", "warn_beyond"]
 
 LAW_POINTS = 160
 """Number of points of the spring's law, dense at small forces with a steep law."""
@@ -60,48 +54,21 @@ _RATIOS = (0.2, 2.0)
 """Limits of the ratio."""
 
 
-class Surface:
-    """The surface of an anchored organ at rest under its weight, with compliance."""
-
-    def __init__(
-        self,
-        organ: Body,
-        material: Material,
-        body_yield: type[DenseBodyYield | BodyYield] = DenseBodyYield,
-    ) -> None:
-        """`organ`: a settled organ; `body_yield`: solver of its compliance."""
-        self.organ, self.material = organ, material
-        self.settled = organ.nodes
-        """m, shape (n, 3)."""
-        self.compliance = SurfaceCompliance(
-            organ.mesh, organ.anchored, organ.touchable, material, body_yield=body_yield
-        )
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Where a sphere touches a surface, or is about to."""
-
-    surface: Surface
-    nodes: Indices
-    """Nodes of the faces, shape (k,)."""
-    parts: Vector
-    """Parts of the force on each node, shape (k,), with sum 1."""
-    first_parts: Vector
-    """Parts at the beginning of the force: the sphere touches a single face, shape (k,)."""
-    point: Vector
-    """Point of the settled surface, m, shape (3,)."""
-    inward: Vector
-    """Normal of the surface into the tissue, shape (3,)."""
-    distance: float
-    """Distance of the sphere's centre from the nearest face, m."""
-
-
 class SubGrid:
     """The spring of a sphere: present yield, and law at the sphere's place."""
 
-    def __init__(self, radius: float, coupling: Coupling, surfaces: Sequence[Surface]) -> None:
-        self._radius, self._coupling, self._surfaces = radius, coupling, surfaces
+    def __init__(
+        self,
+        radius: float,
+        coupling: Coupling,
+        surfaces: Sequence[Surface],
+        find: Callable[[Surface, NearFaces, float], Place] = find_place,
+    ) -> None:
+        """`find`: `find_place`, or the same in C."""
+        self._radius, self._coupling, self._surfaces, self._find = radius, coupling, surfaces, find
+        self._rims = {
+            id(one): RimWatch(one.compliance.rims, one.settled, _RIM_ENDS * radius) for one in surfaces
+        }
         self._depths: Vector = np.linspace(0.0, 1.0, LAW_POINTS) ** 2 * _GRID_DEPTH * radius
         self._half_spaces = [sphere_force(self._depths, radius, one.material) for one in surfaces]
         self.yielded = 0.0
@@ -184,8 +151,8 @@ class SubGrid:
             near: faces in the sphere's `sight`, of each surface.
         """
         places = [
-            (self._place(surface, faces), forces)
-            for (surface, forces), faces in zip(self._force_laws, near, strict=True)
+            (self._find(surface, faces, self._radius), forces)
+            for surface, forces, faces in zip(self._surfaces, self._half_spaces, near, strict=True)
             if len(faces.spheres)
         ]
         if not places:
@@ -198,11 +165,7 @@ class SubGrid:
         self._yields = self._missing(place, between, max(float(force @ self.inward), _LEAST_FORCE_N))
         self._is_new = True
 
-    @property
-    def _force_laws(self) -> Sequence[tuple[Surface, Vector]]:
-        return list(zip(self._surfaces, self._half_spaces, strict=True))
-
-    def _at_rim(self, place: _Place, centre: Vector) -> _Place:
+    def _at_rim(self, place: Place, centre: Vector) -> Place:
         """Set the forces of a quarter-space near a rim, with a transition to a half-space.
 
         Return the place with the sphere's direction of pressing on a rim.
@@ -212,18 +175,18 @@ class SubGrid:
         if not len(surface.compliance.rims.ends):
             return place
         moved = place.parts @ (surface.organ.nodes[place.nodes] - surface.settled[place.nodes])
-        inward, reach = self.inward if self.inward.any() else place.inward, _RIM_ENDS * radius
-        found = surface.compliance.rims.near(centre - moved, inward, surface.settled, reach)
+        inward = self.inward if self.inward.any() else place.inward
+        found = self._rims[id(surface)].near(centre - moved, inward)
         if found is None:
             return place
         away, inward = found
-        self._rim = min((reach - away) / (reach - _RIM_BEGINS * radius), 1.0)
+        self._rim = min((_RIM_ENDS * radius - away) / (_RIM_ENDS * radius - _RIM_BEGINS * radius), 1.0)
         share = rim_share(away / radius, self._depths / radius)
         self._forces = self._forces * (1.0 + self._rim * (share - 1.0))
         mixed = place.inward + self._rim * (inward - place.inward)
         return replace(place, inward=mixed / np.sqrt(mixed @ mixed))
 
-    def _measure(self, place: _Place, centre: Vector, force: Vector) -> Vector:
+    def _measure(self, place: Place, centre: Vector, force: Vector) -> Vector:
         """Set direction and ratio, and return the compliance between the nodes (m/N), shape (k, k)."""
         touches = place.distance < self._radius + BAND_M
         if touches and self.inward.any():
@@ -240,7 +203,7 @@ class SubGrid:
             self.is_beyond |= bool(np.interp(pressed, self._forces, self._depths) > DEEPEST * self._radius)
         return between
 
-    def _missing(self, place: _Place, between: Vector, pressed: float) -> Vector:
+    def _missing(self, place: Place, between: Vector, pressed: float) -> Vector:
         """Return the body's depth less the yield of mesh and coupling, m, by force, shape (`LAW_POINTS`,).
 
         `pressed`: force of the present parts, N.
@@ -259,31 +222,6 @@ class SubGrid:
         missing = self._depths + (body - self.ratio * mesh - 1.0 / self._coupling.stiffness) * forces
         return np.maximum.accumulate(np.maximum(missing, 0.0))
 
-    def _place(self, surface: Surface, near: NearFaces) -> _Place:
-        """Return the place of the sphere near these faces."""
-        _, faces, weights, distances = near
-        share = np.maximum(self._radius + BAND_M - distances, 0.0)
-        if not share.any():
-            share[distances.argmin()] = 1.0
-        weighted = (share / share.sum())[:, None] * weights
-        corners = surface.settled[faces]
-        areas = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normal = share @ (areas / np.sqrt((areas * areas).sum(axis=1))[:, None])
-        point = np.einsum("fa,fai->i", weighted, corners)
-        at, away = closest_points(point, corners)
-        first = int(away.argmin())
-        nodes, numbers = np.unique(faces, return_inverse=True)
-        numbers: Indices = numbers.reshape(-1, 3)
-        return _Place(
-            surface,
-            nodes,
-            _summed(numbers, weighted, len(nodes)),
-            _summed(numbers[first], at[first], len(nodes)),
-            point,
-            -normal / np.sqrt(normal @ normal),
-            float(distances.min()),
-        )
-
 
 def warn_beyond(participant: str, probe: str, radius: float) -> None:
     """Warn once that a probe's sphere of `radius` (m) went deeper than the law is known."""
@@ -292,10 +230,3 @@ def warn_beyond(participant: str, probe: str, radius: float) -> None:
         f" {DEEPEST * radius * 1e3:.3g} mm, up to which the force of tissue is known;"
         " beyond, it is extrapolated. Press less deep, or with a larger sphere"
     )
-
-
-def _summed(numbers: Indices, parts: Vector, count: int) -> Vector:
-    """Return the sum of the parts of each number below `count`, shape (count,)."""
-    sums = np.zeros(count)
-    np.add.at(sums, numbers, parts)
-    return sums

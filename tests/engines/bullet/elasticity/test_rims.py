@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from engines.tissue.elasticity.rims import rim_share, rims_of
+from engines.tissue.elasticity.rims import RimWatch, rim_share, rims_of
 from engines.tissue.organs.params import OrganParams
 from tests.engines.bullet.rig import BLOCK, RADIUS, Rig, params
 
@@ -43,6 +45,19 @@ def test_how_far_a_sphere_is_from_the_rim(centre, away, press):
 
 def test_in_the_middle_no_rim_is_near():
     assert RIMS.near(np.array([0.0, 0.0, 3e-3]), DOWN, BODY.nodes, 8e-3) is None
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_watch_finds_the_rims_that_are_near(seed):
+    watch, random = RimWatch(RIMS, BODY.nodes, 8e-3), np.random.default_rng(seed)
+    centre = random.uniform((-0.045, -0.035, -4e-3), (0.045, 0.035, 6e-3))
+    for _ in range(30):
+        centre = centre + random.normal(0.0, 2e-3, 3)
+        found, expected = watch.near(centre, DOWN), RIMS.near(centre, DOWN, BODY.nodes, 8e-3)
+        assert (found is None) == (expected is None)
+        if found is not None and expected is not None:
+            assert found[0] == expected[0]
+            np.testing.assert_array_equal(found[1], expected[1])
 
 
 def test_farther_away_more_is_left():
