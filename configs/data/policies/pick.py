@@ -1,13 +1,13 @@
-"""A policy that picks up the needle of the scenario `policy`, from the arm's state alone.
+"""A policy for the scenario `policy`: the needle is picked up, led by the arm's state alone.
 
-It has the layout `open-h-dvrk`: eight numbers in, rows of eight numbers out. A policy of your own takes its
-place: docs/how-to/policies.md.
+Layout `open-h-dvrk`: eight numbers in, rows of eight numbers out. For a policy of your own see
+docs/how-to/policies.md.
 """
 
 import numpy as np
 
 ALONG_X = [0.70710678, 0.70710678, 0.0, 0.0]
-"""Jaws that open along x, pointing down: quaternion (x, y, z, w)."""
+"""Orientation with the jaws down, opening along x: quaternion (x, y, z, w)."""
 OPEN, SHUT = np.radians(30.0), np.radians(-20.0)
 WAYPOINTS = [(-0.170, OPEN), (-0.1895, OPEN), (-0.1895, SHUT), (-0.1495, SHUT)]
 """Height of the tip under the arm's base (m), and opening of the jaw (rad)."""
