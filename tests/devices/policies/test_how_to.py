@@ -40,7 +40,9 @@ def trocar(monkeypatch, capsys):
 
 
 def test_a_strangers_policy_drives_the_arm(stranger):
-    summary = public.run("my.yaml", set=dict([stranger.split("=")], duration="1.5 s"), record="mine", one_host=True)
+    summary = public.run(
+        "my.yaml", set=dict([stranger.split("=")], duration="1.5 s"), record="mine", one_host=True
+    )
     assert summary.measures["faults"] == 0
     assert public.verify("mine").same
     end = public.Recording("mine")["motion.PSM1/measured_cp"]["position"][-1]
