@@ -13,6 +13,7 @@ from types import TracebackType
 from typing import Any, Self, cast
 
 import numpy as np
+from pydantic import ValidationError
 
 from hub.hosting.host import Host
 from hub.observation.measures import Measures
@@ -27,6 +28,7 @@ from hub.session.reading import Reading
 from hub.session.state_digests import StateDigests
 from hub.transport.port_codec import PortCodec
 from schemas.errors import ScenarioError, SessionError, StateError, did_you_mean
+from schemas.files import Files
 from schemas.keys import Keys
 from schemas.lockstep import Ack, Entering, Grant, pack_grant
 from schemas.trocar_msgs import SessionStatus
@@ -55,7 +57,7 @@ class SteppedSession:
     """
 
     def __init__(self, loaded: ScenarioFile) -> None:
-        self._loaded = loaded
+        self._loaded, self._params = loaded, dict(loaded.params)
         # it ends where its caller ends it, in a re-simulation too
         self._scenario = in_one_host(loaded.scenario).model_copy(update={"duration": None})
         self.plan: Plan
@@ -69,7 +71,7 @@ class SteppedSession:
         self._configure_all()
 
     def _make_participants(self) -> tuple[Plan, dict[str, Stepped]]:
-        plan, made = plan_of(self._scenario, self._loaded.params)
+        plan, made = plan_of(self._scenario, self._params)
         stepped = {name: one for name, one in made.items() if isinstance(one, Stepped)}
         if devices := sorted(made.keys() - stepped.keys()):
             raise ScenarioError(
@@ -257,12 +259,7 @@ class SteppedSession:
         The outputs are neither in the state hash nor in a recording. Raises SessionError if there is no such
         observer.
         """
-        planned = self.plan.participants.get(observer)
-        if planned is None or not planned.observer:
-            observers = [one.name for one in self.plan.observers()]
-            raise SessionError(
-                f"'{observer}' is no participant that only looks; there is {', '.join(observers) or 'none'}"
-            )
+        planned = self._require_observer(observer)
         participant, h = self._stepped[observer], planned.period * self.plan.step_ns
         if observer not in self._looking:
             directory, connected = self._loaded.source.directory, self.plan.connected_inputs(observer)
@@ -272,6 +269,38 @@ class SteppedSession:
                 participant.step(0, h, self._inputs_of(observer, self._first))
         newest = {name: self._host.newest(name) for name in self.plan.order}
         return participant.step(self.time_ns, h, self._inputs_of(observer, newest))
+
+    def change_observer(self, observer: str, changes: Mapping[str, Any]) -> None:
+        """Make an observer, such as a camera, anew with changed parameters, by name as in a scenario.
+
+        Recordings from the next `restart` on state them. Raises SessionError if there is no such observer, or
+        for changes that are invalid or change its ports.
+        """
+        self._require_observer(observer)
+        spec, old = self._scenario.participants[observer], self._stepped[observer]
+        given: dict[str, Any] = {**spec.params, **changes}
+        try:
+            files = Files(self._loaded.source.directory)
+            params = type(self._params[observer]).model_validate(given, context=files.context)
+        except ValidationError as error:
+            raise SessionError(f"'{observer}' cannot have {dict(changes)}: {error}") from error
+        new = type(old)(observer, params)
+        if new.ports != old.ports:
+            raise SessionError(f"'{observer}' would have other ports with {dict(changes)}")
+        old.close()
+        self._looking.discard(observer)
+        self._stepped[observer], self._params[observer] = new, params
+        others = self._scenario.participants | {observer: spec.model_copy(update=dict(changes))}
+        self._scenario = self._scenario.model_copy(update={"participants": others})
+
+    def _require_observer(self, observer: str) -> PlannedParticipant:
+        planned = self.plan.participants.get(observer)
+        if planned is None or not planned.observer:
+            observers = [one.name for one in self.plan.observers()]
+            raise SessionError(
+                f"'{observer}' is no participant that only looks; there is {', '.join(observers) or 'none'}"
+            )
+        return planned
 
     def _inputs_of(self, observer: str, outputs: Mapping[str, Outputs]) -> Inputs:
         feeding = (one for one in self.plan.to_devices if one.target == observer)  # as observers are fed

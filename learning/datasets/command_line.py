@@ -69,6 +69,16 @@ def dataset(
         Literal["plain", "endoscope"] | None,
         typer.Option(help="Draw all pictures with these looks; default: recorded ones where they fit."),
     ] = None,
+    randomise: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=(1 << 31) - 1,
+            metavar="SEED",
+            help="Draw other textures, colours, light, view, smoke and surroundings for each episode, from"
+            " this seed on; with --looks endoscope.",
+        ),
+    ] = None,
     trust: Annotated[
         bool, typer.Option("--trust", help="Read files other than those of the recordings.")
     ] = False,
@@ -80,13 +90,17 @@ def dataset(
     """
     if output.exists() and (not output.is_dir() or any(output.iterdir())):
         raise typer.BadParameter(f"'{output}' exists already; name a new directory.", param_hint="--output")
+    if randomise is not None and looks != "endoscope":
+        raise typer.BadParameter("only endoscope looks vary: add --looks endoscope", param_hint="--randomise")
     pixels = None if size is None else _pixels(size)
     for package in _PACKAGES:
         if find_spec(package) is None:
             raise MissingExtraError("'trocar dataset'", "dataset", "pillow" if package == "PIL" else package)
     from learning.datasets.episode import Wanted
 
-    wanted = Wanted(fps, pixels, _tasks(task or ()), tuple(state or ()), tuple(action or ()), looks)
+    wanted = Wanted(
+        fps, pixels, _tasks(task or ()), tuple(state or ()), tuple(action or ()), looks, randomise
+    )
     _run(recordings, output, wanted, trust=trust)
 
 

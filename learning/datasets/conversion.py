@@ -72,8 +72,15 @@ class Conversion:
         wanted = self._wanted
         episode = Episode.of(recording, wanted)
         size = self._size or recorded_size(recording) or DEFAULT_SIZE
+        seed = None if wanted.randomise is None else wanted.randomise + sum(self.tasks.values())
         pictures = stereo(
-            recording, episode.times_ns, wanted.fps, size, looks=wanted.looks, trust=self._trust
+            recording,
+            episode.times_ns,
+            wanted.fps,
+            size,
+            looks=wanted.looks,
+            randomise=seed,
+            trust=self._trust,
         )
         if self._writer is None:
             self._writer = Writer(self._directory, wanted.fps, size, episode)
@@ -83,6 +90,7 @@ class Conversion:
             "scenario": recording.scenario().name,
             "first_frame_s": int(episode.times_ns[0]) / 1e9,
             "pictures": "recorded" if pictures.recorded else "drawn",
+            **({} if seed is None else {"randomise": seed}),
             "versions": recording.versions(),
         }
         self._writer.add(episode, pictures.count, pictures.pairs, source)

@@ -35,6 +35,8 @@ class Wanted:
     """Likewise; empty: commanded joints of all arms."""
     looks: Literal["plain", "endoscope"] | None = None
     """Looks with which all pictures are drawn; None: recorded pictures where they fit, else plain."""
+    randomise: int | None = None
+    """Seed of the looks of the first episode, which counts up; None: as recorded."""
 
 
 @dataclass(frozen=True)

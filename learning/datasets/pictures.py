@@ -46,13 +46,15 @@ def stereo(
     size: tuple[int, int],
     *,
     looks: Literal["plain", "endoscope"] | None = None,
+    randomise: int | None = None,
     trust: bool = False,
 ) -> Stereo:
     """Return the pictures at `times_ns`, shape (n,), recorded or drawn.
 
     Recorded pictures are used if no `looks` are asked for, the size is right and each frame has its own
-    picture. `trust` allows a drawn scene of changed files. Raises RecordingError if there is nothing to draw,
-    TrustError for changed files, TrocarError without OpenGL; so may the pictures.
+    picture. `randomise`: seed of drawn looks. `trust` allows a drawn scene of changed files. Raises
+    RecordingError if there is nothing to draw, TrustError for changed files, TrocarError without OpenGL; so
+    may the pictures.
     """
     ports = () if looks else _ports(recording)
     if ports and recorded_size(recording) == size:
@@ -66,8 +68,8 @@ def stereo(
                 for port, taken in zip(ports, picked, strict=True)
             )
             return Stereo(count, recorded=True, pairs=zip(*eyes, strict=True))
-    drawn = RecordedScene(recording, looks=looks or "plain", trust=trust).stereo(times_ns.tolist(), size)
-    return Stereo(len(times_ns), recorded=False, pairs=drawn)
+    scene = RecordedScene(recording, looks=looks or "plain", randomise=randomise, trust=trust)
+    return Stereo(len(times_ns), recorded=False, pairs=scene.stereo(times_ns.tolist(), size))
 
 
 def recorded_size(recording: Recording) -> tuple[int, int] | None:

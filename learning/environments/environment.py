@@ -47,6 +47,9 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         exercise: Its class.
         reward: `sparse`, 0 once the goal is reached and else -1; `shaped`, by distance and the task's events.
         images: Observe the camera's stereo pictures too, `left` and `right`.
+        looks: Of pictures: `plain`, or `endoscope` where Filament runs.
+        randomise: Draw each episode's textures, colours, light, view, smoke and surroundings anew, from the
+            episode's seed: True, or limits as in `randomise` of a camera. With `looks="endoscope"`.
         width: Of pictures, in pixels.
         height: Of pictures, in pixels.
         render_mode: `rgb_array` or None.
@@ -66,6 +69,8 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         *,
         reward: Reward = "sparse",
         images: bool = False,
+        looks: Literal["plain", "endoscope"] = "plain",
+        randomise: bool | Mapping[str, Any] = False,
         width: int = 160,
         height: int = 120,
         render_mode: Literal["rgb_array"] | None = None,
@@ -81,7 +86,10 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode '{render_mode}' is neither None nor 'rgb_array'")
         self.reward: Reward = reward
+        if looks not in ("plain", "endoscope"):
+            raise ValueError(f"looks '{looks}' is neither 'plain' nor 'endoscope'")
         self.images, self.render_mode = images, render_mode
+        self._randomise = None if randomise is False else {} if randomise is True else dict(randomise)
         self._record = None if record is None else Path(record)
         self._terminates = terminate_on_success
         scene = files("learning.environments") / "scenes" / f"{exercise.scene}.yaml"
@@ -93,6 +101,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
             "participants.task.period": duration,
             "participants.camera.width": width,
             "participants.camera.height": height,
+            "participants.camera.looks": looks,
         }
         self._session = trocar.SteppedSession(
             trocar.load_scenario(str(scene), set={**own, **(settings or {})})
@@ -185,6 +194,9 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         if unknown := sorted(set(options or {}) - {"record"}):
             raise ValueError(f"options {unknown}: there is only 'record'")
         starts, self._goal = self.exercise.draw(self.np_random)
+        if self._randomise is not None:
+            appearance = self._randomise | {"seed": int(self.np_random.integers(1 << 31))}
+            self._session.change_observer("camera", {"randomise": appearance})
         named = (options or {}).get("record")
         self._session.restart(Path(named) if named else self._next_recording())
         self._view = self._new_view() if not self._session.restores else self._view

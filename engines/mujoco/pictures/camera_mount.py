@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
+from engines.mujoco.pictures.variation import Variation
 from robots.dvrk.endoscope import FAR, optical_in_roll
 from robots.dvrk.mounted import MountedEcm
 from robots.transform import rigid_transform
@@ -28,6 +29,7 @@ class CameraMount:
             far = far or FAR
         else:
             self._mounting = look_at(_overview_camera(model))
+        self._mounting = self._mounting @ Variation(params.randomise).mounting
         self.clip = (
             params.near,
             far or float(np.linalg.norm(self._mounting[:3, 3] - model.stat.center) + 2.0 * model.stat.extent),

@@ -11,6 +11,7 @@ from engines.mujoco.params import SceneParams
 from engines.mujoco.pictures.lens import NO_DISTORTION, Distortion, check_distortion
 from engines.mujoco.pictures.sensor_params import SensorParams
 from engines.mujoco.pictures.skin_params import SkinParams
+from engines.mujoco.pictures.variation import RandomiseParams
 from hub.participant import Params
 from robots.dvrk import endoscope
 from robots.dvrk.endoscope import StereoCamera
@@ -127,6 +128,17 @@ class EndoscopeParams(SceneParams):
 
     sensor: SensorParams = Field(
         default_factory=SensorParams, description="lens and sensor with endoscope looks"
+    )
+
+    smoke: float = Field(
+        default=0.0, ge=0.0, le=1.0, description="smoke in the air with endoscope looks; 1: sight of a few cm"
+    )
+    randomise: RandomiseParams | None = Field(
+        default=None,
+        description=(
+            "random differences of what is seen, all from one seed, with endoscope looks; the offset of the"
+            " cameras with any; default: none"
+        ),
     )
 
     @property

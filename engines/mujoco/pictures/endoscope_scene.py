@@ -22,6 +22,7 @@ from engines.mujoco.pictures.lens import Lens
 from engines.mujoco.pictures.skins import Skins
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.stereo import StereoRenderer
+from engines.mujoco.pictures.variation import Variation
 from engines.mujoco.place.dress import dress_scene
 from robots import rotation
 from schemas.vectors import Vector
@@ -53,9 +54,12 @@ class EndoscopeScene:
         `engine`: what draws, as `find_drawing` returns it: for Filament, or the name of an OpenGL.
         """
         scene = spec(params)
+        self._variation = Variation(params.randomise)
         self._skins: Skins | None = None
         if isinstance(engine, Backend):
-            dress_scene(scene, params.sensor.exposure, _TONES[params.sensor.tone])
+            exposure = params.sensor.exposure + self._variation.exposure
+            smoke = min(params.smoke + self._variation.smoke, 1.0)
+            dress_scene(scene, exposure, _TONES[params.sensor.tone], smoke)
         else:
             if params.view is not None or "ECM" not in params.arms:
                 add_sky(scene)
@@ -87,8 +91,11 @@ class EndoscopeScene:
         self._sensor = Sensor(params.sensor, params.width, params.height)
         place_arms(self._model, self._data, params.arms)
         mujoco.mj_kinematics(self._model, self._data)
-        place = make_place(params, self._model, bodies, self._mount.pose(self._data)[:3, 3])
-        return FilamentRenderer(self._model, params, self._lens.drawn, clip, backend, bodies, place)
+        lens = self._mount.pose(self._data)[:3, 3]
+        place = make_place(params, self._model, bodies, lens, self._variation.place_seed)
+        return FilamentRenderer(
+            self._model, params, self._variation, self._lens.drawn, clip, backend, bodies, place
+        )
 
     def draw(
         self, positions: Vector, markers: Sequence[ShownMarker] = (), time_ns: int = 0

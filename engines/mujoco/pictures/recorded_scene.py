@@ -34,7 +34,8 @@ _DISTANCE, _LEAST = 1.4, 0.06
 """Distance of the overview, in diagonals of the box around the subject; the least side of the box, m."""
 _REACH = 0.1
 """Distance from the subject within which a tip belongs to the subject, m."""
-_LENS = ("field_of_view", "baseline", "near", "far", "distortion", "sensor", "place")
+_LENS = ("field_of_view", "baseline", "near", "far", "distortion")
+_APPEARANCE = ("sensor", "place", "smoke", "randomise")
 _OVERSAMPLING = 2
 """Pixels drawn for each one of the picture, along either side: smooths edges."""
 _FINE_PIXELS = 1024
@@ -50,9 +51,17 @@ class RecordedScene:
         robot: str | None = None,
         *,
         looks: Literal["plain", "endoscope"] = "plain",
+        randomise: int | None = None,
         trust: bool = False,
     ) -> None:
-        """Find the participant `robot`, by default the first of kind mujoco; `trust` allows changed files.
+        """Find the participant `robot`, by default the first of kind mujoco.
+
+        Args:
+            recording: of a session.
+            robot: name of the participant.
+            looks: of all pictures.
+            randomise: seed of differences of what is seen, for the recorded one; None: as recorded.
+            trust: allow changed files.
 
         Raises RecordingError if there is none, or if no scene can be built of its parameters, and TrustError
         if these name files with other contents than the recorded ones.
@@ -77,8 +86,11 @@ class RecordedScene:
         self._params, self._files = params, parameters.files
         self.states = RecordedStates(recording, name)
         """Positions of the joints, soft bodies and markers at each instant."""
-        self._skins, self._recorded_lens = _skins(participants), _recorded_lens(participants)
-        self._room_view = _room_view(participants)
+        self._skins = _skins(participants)
+        self._endoscope = _recorded_camera(participants, in_room=False)
+        self._room = _recorded_camera(participants, in_room=True)
+        for camera in () if randomise is None else (self._endoscope, self._room):
+            camera["randomise"] = (camera.get("randomise") or {}) | {"seed": randomise}
 
     def picture(
         self,
@@ -133,15 +145,16 @@ class RecordedScene:
         Raises RecordingError if the recording has no such camera.
         """
         if camera == "overview":
-            view = self._room_view if position is None and target is None else None
+            view = self._room.get("view") if position is None and target is None else None
             view = view or self._overview_camera(bodies, position, target)
-            return self._camera_params({"view": view, "baseline": 0.0}, size, bodies)
+            look = {name: value for name, value in self._room.items() if name in _APPEARANCE}
+            return self._camera_params(look | {"view": view, "baseline": 0.0}, size, bodies)
         if not self._has_endoscope:
             raise RecordingError(
                 f"'{self._recording.file}': no ECM in the scene, so there is no '{camera}' picture of an"
                 " endoscope; take the overview"
             )
-        return self._camera_params(self._recorded_lens, size, bodies)
+        return self._camera_params(self._endoscope, size, bodies)
 
     def stereo(
         self, times_ns: Iterable[int], size: tuple[int, int]
@@ -149,8 +162,8 @@ class RecordedScene:
         """Yield the pictures of both eyes at each of `times_ns`, shape (height, width, 3), RGB.
 
         They are what the endoscope of the session would publish at this size, always with the looks of arms.
-        In a scene without ECM two cameras, as far apart as its eyes, look at the soft bodies and objects, or
-        at the whole scene.
+        In a scene without ECM they are those of the scenario's own camera in the room, else two cameras, as
+        far apart as its eyes, look at the soft bodies and objects, or at the whole scene.
 
         Args:
             times_ns: simulated times, ascending; a picture shows the newest state published by then.
@@ -163,11 +176,12 @@ class RecordedScene:
 
     def stereo_camera(self, bodies: Mapping[str, SoftBody], size: tuple[int, int]) -> EndoscopeParams:
         """Return the scene with the cameras of `stereo`."""
-        shown: dict[str, Any] = {}
         if self._has_endoscope:
-            shown = self._recorded_lens
-        elif bodies or self._params.objects:
-            shown = {"view": self._overview_camera(bodies, None, None)}
+            shown = self._endoscope
+        elif "view" in self._room or not (bodies or self._params.objects):
+            shown = self._room
+        else:
+            shown = self._room | {"view": self._overview_camera(bodies, None, None)}
         return self._camera_params(shown, size, bodies)
 
     @property
@@ -240,20 +254,13 @@ def _skins(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
     }
 
 
-def _recorded_lens(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
-    """Return the scenario's parameters of the cameras of its endoscope, if it has one."""
+def _recorded_camera(participants: Mapping[str, ParticipantSpec], *, in_room: bool) -> dict[str, Any]:
+    """Return the scenario's parameters of the cameras of its endoscope, or in the room; empty without."""
+    names = (*_LENS, *_APPEARANCE, "view")
     for spec in participants.values():
-        if spec.kind == "endoscope" and "view" not in spec.params:
-            return {name: value for name, value in spec.params.items() if name in _LENS}
+        if spec.kind == "endoscope" and (spec.params.get("view") is not None) == in_room:
+            return {name: value for name, value in spec.params.items() if name in names}
     return {}
-
-
-def _room_view(participants: Mapping[str, ParticipantSpec]) -> ViewParams | None:
-    """Return where the scenario's own camera in the room stands, if it has one."""
-    for spec in participants.values():
-        if spec.kind == "endoscope" and spec.params.get("view") is not None:
-            return ViewParams.model_validate(spec.params["view"])
-    return None
 
 
 def _reduce_picture(picture: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:

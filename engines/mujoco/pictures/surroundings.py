@@ -22,9 +22,21 @@ _ALONE = 0.03
 
 
 def make_place(
-    params: EndoscopeParams, model: mujoco.MjModel, bodies: Mapping[str, SoftBody], lens: Vector
+    params: EndoscopeParams,
+    model: mujoco.MjModel,
+    bodies: Mapping[str, SoftBody],
+    lens: Vector,
+    seed: int = 0,
 ) -> list[PlacePart]:
-    """Return the surroundings of a scene; `lens`: where the camera is at the start, shape (3,), m."""
+    """Return the surroundings of a scene.
+
+    Args:
+        params: of the cameras.
+        model: compiled from the scene.
+        bodies: soft bodies at rest.
+        lens: where the camera is at the start, shape (3,), m.
+        seed: of shapes.
+    """
     if params.surroundings == "none":
         return []
     points = [body.rest.astype(np.float64) for name, body in bodies.items() if name != THREAD]
@@ -32,9 +44,9 @@ def make_place(
     cloud = np.concatenate(points) if points else np.array([[-_ALONE] * 3, [_ALONE] * 3])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
     if params.surroundings == "dry-lab":
-        return make_dry_lab(low, high)
+        return make_dry_lab(low, high, seed)
     inside = params.view is None and "ECM" in params.arms
-    return make_abdomen(low, high, lens if inside else None)
+    return make_abdomen(low, high, lens if inside else None, seed)
 
 
 def _set_points(params: EndoscopeParams, model: mujoco.MjModel) -> list[Vector]:

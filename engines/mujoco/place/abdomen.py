@@ -33,8 +33,11 @@ _CLEAR_ANGLE = 1.05
 """Half the angle around the direction of the camera in which no loop lies, rad."""
 
 
-def make_abdomen(low: Vector, high: Vector, camera: Vector | None) -> list[PlacePart]:
-    """Return the surroundings of organs in a box from `low` to `high`, m; `camera`: a lens inside."""
+def make_abdomen(low: Vector, high: Vector, camera: Vector | None, seed: int = 0) -> list[PlacePart]:
+    """Return the surroundings of organs in a box from `low` to `high`, m.
+
+    `camera`: a lens inside; `seed`: of all shapes.
+    """
     bedded = min(_BEDDED, _BEDDED_SHARE * float(high[2] - low[2]))
     centre = np.array([*(0.5 * (low + high))[:2], low[2] + bedded])
     footprint = 0.5 * float(np.linalg.norm((high - low)[:2])) + _HOLLOW
@@ -44,35 +47,35 @@ def make_abdomen(low: Vector, high: Vector, camera: Vector | None) -> list[Place
     height = max(_LEAST_HEIGHT, _CLEARANCE * float(away[2]), 1.5 * float(high[2] - low[2]))
     towards = float(np.arctan2(away[1], away[0])) if reach > 0.0 else -0.5 * np.pi
     return [
-        _bed(centre, footprint, radius),
-        _wall(centre, radius, height),
-        *_loops(centre, footprint, radius, towards),
+        _bed(centre, footprint, radius, seed),
+        _wall(centre, radius, height, seed),
+        *_loops(centre, footprint, radius, towards, seed),
     ]
 
 
-def _bed_height(x: Vector, y: Vector, footprint: float, radius: float) -> Vector:
+def _bed_height(x: Vector, y: Vector, footprint: float, radius: float, seed: int) -> Vector:
     """Return the height of the bed over its middle, m."""
     outside = np.clip((np.hypot(x, y) - footprint) / (radius - footprint), 0.0, 1.0)
-    waves = 0.004 * ripple(x, y, 0.045, 1) + 0.0015 * ripple(x, y, 0.014, 2)
+    waves = 0.004 * ripple(x, y, 0.045, 1 + seed) + 0.0015 * ripple(x, y, 0.014, 2 + seed)
     return 0.045 * outside**1.5 + waves * np.minimum(0.1 + 4.0 * outside, 1.0) - 0.001
 
 
-def _bed(centre: Vector, footprint: float, radius: float) -> PlacePart:
+def _bed(centre: Vector, footprint: float, radius: float, seed: int) -> PlacePart:
     side = 2.1 * radius
 
     def place(u: Vector, v: Vector) -> Vector:
         x, y = (u - 0.5) * side, (v - 0.5) * side
-        return centre + np.stack([x, y, _bed_height(x, y, footprint, radius)], axis=1)
+        return centre + np.stack([x, y, _bed_height(x, y, footprint, radius, seed)], axis=1)
 
     return sheet(place, (side, side), (44, 44), TISSUES["fat"], 0.09)
 
 
-def _wall(centre: Vector, radius: float, height: float) -> PlacePart:
+def _wall(centre: Vector, radius: float, height: float, seed: int) -> PlacePart:
     """Dome of the abdominal wall, seen from inside."""
 
     def place(u: Vector, v: Vector) -> Vector:
         turn, rise = 2.0 * np.pi * u, 0.5 * np.pi * v
-        folds = 1.0 + 0.01 * ripple(turn * radius * np.cos(rise), rise * height, 0.06, 5)
+        folds = 1.0 + 0.01 * ripple(turn * radius * np.cos(rise), rise * height, 0.06, 5 + seed)
         across = radius * np.cos(rise) * folds
         return centre + np.stack(
             [across * np.cos(turn), across * np.sin(turn), height * np.sin(rise) * folds], axis=1
@@ -84,8 +87,10 @@ def _wall(centre: Vector, radius: float, height: float) -> PlacePart:
     return part._replace(faces=part.faces[:, ::-1])
 
 
-def _loops(centre: Vector, footprint: float, radius: float, towards: float) -> Iterator[PlacePart]:
+def _loops(centre: Vector, footprint: float, radius: float, towards: float, seed: int) -> Iterator[PlacePart]:
     """Loops of small bowel beside and behind the organs, as seen from the direction `towards`, rad."""
+    # without a seed the phases that were chosen by eye
+    turned = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, _LOOPS) if seed else np.zeros(_LOOPS)
     for loop in range(_LOOPS):
         distance = max(footprint, _NEAREST_LOOP) + (1.2 + 1.75 * loop) * _LOOP_RADIUS
         if distance > 0.95 * radius:
@@ -94,10 +99,14 @@ def _loops(centre: Vector, footprint: float, radius: float, towards: float) -> I
         steps = np.linspace(0.0, 1.0, 150)
         turn = start + (end - start) * steps
         bends = max(3, round(2.0 * np.pi * distance / _BEND))
-        across = distance + 0.007 * np.sin(bends * turn + 2.0 * loop) + 0.003 * np.sin(1.9 * bends * turn)
+        across = (
+            distance
+            + 0.007 * np.sin(bends * turn + 2.0 * loop + turned[loop])
+            + 0.003 * np.sin(1.9 * bends * turn)
+        )
         x, y = across * np.cos(turn), across * np.sin(turn)
-        z = _bed_height(x, y, footprint, radius) + _LOOP_RADIUS * (
-            0.55 + 0.5 * np.sin(0.6 * bends * turn + 1.7 * loop)
+        z = _bed_height(x, y, footprint, radius, seed) + _LOOP_RADIUS * (
+            0.55 + 0.5 * np.sin(0.6 * bends * turn + 1.7 * loop + turned[loop])
         )
         z -= 2.5 * _LOOP_RADIUS * np.clip(1.0 - 9.0 * np.minimum(steps, 1.0 - steps), 0.0, 1.0)
         yield _tube(centre + np.stack([x, y, z], axis=1), _LOOP_RADIUS, loop)

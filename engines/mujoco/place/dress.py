@@ -14,11 +14,13 @@ _ROUGHNESS: Mapping[str, float] = {"black": 0.42, "blue": 0.4, "dark": 0.5, "ivo
 """Roughness of coats and plastics of the robot, by material; black: the matt coat of a shaft."""
 _PLASTIC, BRIGHT = "plastic", "bright metal"
 """Materials of geoms without a material."""
+_THICKEST, _SMOKE = 12.0, [0.5, 0.5, 0.52]
+"""Extinction of the thickest smoke, 1/m, and the light it scatters."""
 SHINING = ("needle",)
 """Objects of metal, by the beginning of their bodies' names."""
 
 
-def dress_scene(scene: mujoco.MjSpec, exposure: float, tone: str) -> None:
+def dress_scene(scene: mujoco.MjSpec, exposure: float, tone: str, smoke: float) -> None:
     """Give every geom of `scene` a material of metal, coat or plastic; colours stay.
 
     A material without such a property is drawn by another shader, which has to be compiled as well.
@@ -27,6 +29,7 @@ def dress_scene(scene: mujoco.MjSpec, exposure: float, tone: str) -> None:
         scene: to be drawn by Filament.
         exposure: of the camera, stops.
         tone: the renderer's name of a tone mapping.
+        smoke: from 0 to 1.
     """
     for material in scene.materials:
         material.metallic = 1.0 if material.name in _METALS else 0.0
@@ -36,7 +39,21 @@ def dress_scene(scene: mujoco.MjSpec, exposure: float, tone: str) -> None:
     for geom in scene.geoms:
         if not geom.material:
             geom.material = BRIGHT if geom.parent.name.startswith(SHINING) else _PLASTIC
-    for option, value in {"ao.enabled": 0.0, "cg.exposure": exposure}.items():
-        scene.add_numeric(name=f"filament.{option}", data=[value], size=1)
+    options = {"ao.enabled": 0.0, "cg.exposure": exposure} | (_smoke_options(smoke) if smoke else {})
+    for option, value in options.items():
+        data = value if isinstance(value, list) else [value]
+        scene.add_numeric(name=f"filament.{option}", data=data, size=len(data))
     for option, text in {"shadows.type": "pcf", "cg.tone_mapping": tone}.items():
         scene.add_text(name=f"filament.{option}", data=text)
+
+
+def _smoke_options(smoke: float) -> dict[str, float | list[float]]:
+    """Return the renderer's options of fog, the same everywhere."""
+    return {
+        "fog.enabled": 1.0,
+        "fog.density": _THICKEST * smoke,
+        "fog.color": _SMOKE,
+        "fog.distance": 0.0,
+        "fog.height_falloff": 0.0,
+        "fog.maximum_opacity": 1.0,
+    }

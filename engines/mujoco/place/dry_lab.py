@@ -14,15 +14,18 @@ _TABLE, _ROOM, _CEILING = 0.9, 1.4, 1.6
 """Side of the table, radius and height of the room, m."""
 
 
-def make_dry_lab(low: Vector, high: Vector) -> list[PlacePart]:
-    """Return the surroundings of a training set in a box from `low` to `high`, m, which lies on the drape."""
+def make_dry_lab(low: Vector, high: Vector, seed: int = 0) -> list[PlacePart]:
+    """Return the surroundings of a training set in a box from `low` to `high`, m, which lies on the drape.
+
+    `seed`: of the folds.
+    """
     centre = np.array([*(0.5 * (low + high))[:2], low[2]])
     footprint = 0.5 * float(np.linalg.norm((high - low)[:2]))
 
     def table(u: Vector, v: Vector) -> Vector:
         x, y = (u - 0.5) * _TABLE, (v - 0.5) * _TABLE
         outside = np.clip((np.hypot(x, y) - 0.8 * footprint) / 0.05, 0.0, 1.0)
-        folds = 0.004 * ripple(x, y, 0.09, 4) + 0.002 * np.abs(ripple(x, y, 0.03, 6))
+        folds = 0.004 * ripple(x, y, 0.09, 4 + seed) + 0.002 * np.abs(ripple(x, y, 0.03, 6 + seed))
         return centre + np.stack([x, y, folds * outside - 0.0008 - 0.004 * outside], axis=1)
 
     def wall(u: Vector, v: Vector) -> Vector:

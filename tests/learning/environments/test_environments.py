@@ -16,6 +16,7 @@ from gymnasium.wrappers import RecordVideo
 
 import trocar
 from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures.filament import backend
 from learning.environments.goals import event_bonus
 from schemas.errors import RecordingError, SessionError, TrocarError
 from schemas.ros import Header, Point, Pose, PoseStamped, Quaternion
@@ -349,3 +350,20 @@ def test_an_episode_is_recorded_where_reset_says(needle, tmp_path):
     assert trocar.verify(tmp_path / "mine").same
     with pytest.raises(ValueError, match="there is only 'record'"):
         needle.reset(options={"recrod": tmp_path})
+
+
+def test_the_seed_of_an_episode_decides_its_looks_and_the_recording_states_them(tmp_path):
+    if not (found := backend.find()).name:
+        pytest.skip(f"no Filament: {found.detail}")
+    arguments = {"images": True, "looks": "endoscope", "randomise": {"turn": 0.0}, "record": tmp_path}
+    env = gymnasium.make("trocar/Reach-v0", width=64, height=48, **arguments)
+    one, other, again = (env.reset(seed=seed)[0]["left"] for seed in (1, 2, 1))
+    env.close()
+    assert np.array_equal(one, again)
+    assert np.abs(one.astype(int) - other).mean() > 3.0
+    recordings = [trocar.Recording(tmp_path / f"episode-0000{k}") for k in range(3)]
+    states = [recording.scenario().participants["camera"].params["randomise"] for recording in recordings]
+    assert states[0] == states[2] != states[1]
+    assert states[0]["turn"] == 0.0
+    with pytest.raises(ValueError, match="'wet' is neither"):
+        gymnasium.make("trocar/Reach-v0", looks="wet")

@@ -9,6 +9,7 @@ from mujoco import mjrf
 
 from engines.mujoco.pictures.filament.tangent_frames import TangentFrames
 from engines.mujoco.pictures.filament.upload import Textures, vertex_layout, write_mesh
+from engines.mujoco.pictures.variation import Variation
 from engines.mujoco.place.part import PlacePart
 from engines.mujoco.textures.noise import Noise
 from engines.mujoco.textures.surface import Recipe, make_tile
@@ -22,13 +23,19 @@ class DrawnPlace:
     """The parts of a place in a scene."""
 
     def __init__(
-        self, context: mjrf.Context, scene: mjrf.Scene, parts: Sequence[PlacePart], noise: Noise
+        self,
+        context: mjrf.Context,
+        scene: mjrf.Scene,
+        parts: Sequence[PlacePart],
+        noise: Noise,
+        variation: Variation,
     ) -> None:
         self._textures: dict[Recipe, Textures] = {}
         self._drawn: list[tuple[mjrf.Mesh, mjrf.Renderable]] = []
         for part in parts:
             if part.recipe not in self._textures:
-                tile = make_tile(part.recipe, noise, part.tile, _TILE_PIXELS)
+                recipe = variation.recolour_place(part.recipe, len(self._textures))
+                tile = make_tile(recipe, noise, part.tile, _TILE_PIXELS)
                 self._textures[part.recipe] = Textures.of_maps(context, tile)
             self._drawn.append(_add(context, scene, part, self._textures[part.recipe]))
 

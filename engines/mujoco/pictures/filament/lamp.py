@@ -33,13 +33,13 @@ _RANGE = 1.0
 class Lamp:
     """Both ends, in a scene."""
 
-    def __init__(self, context: mjrf.Context, scene: mjrf.Scene, shadow_pixels: int) -> None:
-        """`shadow_pixels`: side of the shadow map; 0: no shadows."""
+    def __init__(self, context: mjrf.Context, scene: mjrf.Scene, shadow_pixels: int, colour: Vector) -> None:
+        """`shadow_pixels`: side of the shadow map; 0: no shadows. `colour`: factors of the usual colour."""
         self._ends = [
             context.create_light(
                 mjrf.LightParams(
                     type=mjrf.LightType.LIGHT_SPOT,
-                    color=_COLOUR,
+                    color=colour * _COLOUR,
                     intensity=candela,
                     cast_shadow=shadow and shadow_pixels > 0,
                     range=_RANGE,
@@ -70,12 +70,12 @@ class Lamp:
 class RoomLamp:
     """The lamp over the table of a dry lab, far away."""
 
-    def __init__(self, context: mjrf.Context, scene: mjrf.Scene, shadow_pixels: int) -> None:
-        """`shadow_pixels`: side of the shadow map; 0: no shadows."""
+    def __init__(self, context: mjrf.Context, scene: mjrf.Scene, shadow_pixels: int, colour: Vector) -> None:
+        """`shadow_pixels`: side of the shadow map; 0: no shadows. `colour`: factors of the usual colour."""
         self._light = context.create_light(
             mjrf.LightParams(
                 type=mjrf.LightType.LIGHT_DIRECTIONAL,
-                color=_ROOM_COLOUR,
+                color=colour * _ROOM_COLOUR,
                 intensity=_ROOM_LUX,
                 cast_shadow=shadow_pixels > 0,
                 shadow_map_size=shadow_pixels,

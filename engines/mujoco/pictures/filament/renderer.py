@@ -21,8 +21,9 @@ from engines.mujoco.pictures.filament.drawn_solids import DrawnSolids
 from engines.mujoco.pictures.filament.lamp import Lamp, RoomLamp
 from engines.mujoco.pictures.filament.light_control import LightControl
 from engines.mujoco.pictures.soft_body import SoftBody
+from engines.mujoco.pictures.variation import Variation
 from engines.mujoco.place.part import PlacePart
-from engines.mujoco.textures.noise import SEED, Noise
+from engines.mujoco.textures.noise import Noise
 from robots.dvrk.endoscope import StereoCamera
 from schemas.vectors import Vector
 
@@ -49,6 +50,7 @@ class FilamentRenderer:
         self,
         model: mujoco.MjModel,
         params: EndoscopeParams,
+        variation: Variation,
         camera: StereoCamera,
         clip: tuple[float, float],
         backend: Backend,
@@ -60,6 +62,7 @@ class FilamentRenderer:
         Args:
             model: what to draw, made by `place.dress_scene`.
             params: sensor and looks of soft bodies.
+            variation: random differences of colours and textures.
             camera: the two cameras.
             clip: near and far distance between which they see, m.
             backend: the graphics interface to use.
@@ -67,7 +70,8 @@ class FilamentRenderer:
             place: surroundings.
         """
         self._camera = camera
-        self._control = LightControl() if params.sensor.automatic_light else None
+        exposure = params.sensor.exposure + variation.exposure
+        self._control = LightControl(exposure) if params.sensor.automatic_light else None
         self._is_lit = False
         skins = params.soft_bodies
         half = clip[0] * tan(0.5 * camera.field_of_view)
@@ -78,7 +82,7 @@ class FilamentRenderer:
         self._scene.configure_from_model(model)
         self._scene.set_msaa(_SAMPLES)
         self._resources = mjrf.ModelResources(self._context, model)
-        noise = Noise(SEED)
+        noise = Noise(variation.texture_seed)
         self._geoms = DrawnGeoms(self._context, self._scene, model, noise)
         self._rigid = mjrf.ModelRenderables(self._scene, self._resources)
         options = mujoco.MjvOption()
@@ -87,15 +91,19 @@ class FilamentRenderer:
         pixels = 0 if params.shadows is False else _SHADOW_PIXELS
         is_room = params.surroundings == "dry-lab"
         # shadows of two lamps would cost a fifth of a picture more
-        self._lamp = Lamp(self._context, self._scene, 0 if is_room else pixels)
-        self._room_lamp = RoomLamp(self._context, self._scene, pixels) if is_room else None
+        self._lamp = Lamp(self._context, self._scene, 0 if is_room else pixels, variation.lamp_colour)
+        self._room_lamp = (
+            RoomLamp(self._context, self._scene, pixels, variation.lamp_colour) if is_room else None
+        )
         self._brightness, colour = _AMBIENT[params.surroundings]
         self._ambient = _add_ambient(self._context, self._scene, self._brightness, colour)
         self._bodies = [
-            DrawnBody(self._context, self._scene, body, skins[name].recipe(name), noise)
+            DrawnBody(
+                self._context, self._scene, body, variation.recolour(skins[name].recipe(name), name), noise
+            )
             for name, body in bodies.items()
         ]
-        self._place = DrawnPlace(self._context, self._scene, place, noise)
+        self._place = DrawnPlace(self._context, self._scene, place, noise, variation)
         self._solids = DrawnSolids(self._context, self._scene)
         # with a fourth byte: without it the driver's pixels are packed one by one, 7 ms for 2 x 640 x 480
         self._pixels = np.zeros((camera.height, 2 * camera.width, 4), np.uint8)
