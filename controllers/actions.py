@@ -6,6 +6,11 @@ surrol/tasks/psm_env.py: 10 mm, 30 degrees of yaw or 15 of pitch, jaw 40 degrees
 an electrode has no jaw, and power below 0. What is out of range is clipped. The tip's goal moves by the
 action and stays inside the workspace; the joints go there evenly within the step. A goal that the arm cannot
 reach is not taken, and counted.
+
+Alternatively (`control: tip`) an action has eight numbers for each hand: the goal of the tip in the world (m,
+quaternion x, y, z, w) and the opening of the jaw (rad), or the power of an electrode (W). The goal moves
+there by no more than `displacement` and `turn`, and the joints at even speed, as rows of a policy follow one
+another.
 """
 
 from __future__ import annotations
@@ -48,8 +53,10 @@ from schemas.vectors import Vector
 
 __all__ = ["Actions", "ActionsParams"]
 
-_NUMBERS = 5
+_NUMBERS = {"displacement": 5, "tip": 8}
 """Numbers in an action of a hand."""
+_SHORTEST = 0.1
+"""Norm of a quaternion below which no orientation can be read."""
 _Point = tuple[Length, Length, Length]
 _Angle = Annotated[Angle, Field(gt=0.0)]
 
@@ -63,6 +70,10 @@ class ActionsParams(Params):
     mounting: Mounting = "free"
     setup_joints: SetupJoints = SetupJoints()
     hands: tuple[ArmName, ...] = Field(default=("PSM1",), min_length=1, description="in the action's order")
+    control: Literal["displacement", "tip"] = Field(
+        default="displacement",
+        description="what an action is: a displacement and turn, or the tip's goal",
+    )
     action_step: Duration = Field(
         default=200_000_000, gt=0, description="time between two actions; a multiple of the period"
     )
@@ -149,6 +160,27 @@ class _Hand:
         self.power[:] = params.power if action[4] < 0.0 else 0.0
         now.jaw_start = float(now.jaw[0])
         now.jaw_end = params.opening if action[4] >= 0.0 else params.closing
+        self._go_to(position, orientation)
+
+    def follow(self, action: Vector) -> None:
+        """Begin to go to a goal of the tip, with a jaw opening or a power, shape (8,)."""
+        now, params = self.state, self.params
+        self.power[:] = min(max(float(action[7]), 0.0), params.power)
+        now.jaw_start = float(now.jaw[0])
+        now.jaw_end = min(max(float(action[7]), params.closing), params.opening)
+        way, norm = action[:3] - now.goal[:3], float(np.linalg.norm(action[3:7]))
+        if norm < _SHORTEST:
+            now.refused[0] += 1.0
+            now.start[:] = now.command
+            return
+        way *= params.displacement / max(float(np.linalg.norm(way)), params.displacement)
+        turn = rotation.log(rotation.product(action[3:7] / norm, rotation.conjugate(now.goal[3:])))
+        turn *= params.turn / max(float(np.linalg.norm(turn)), params.turn)
+        orientation = rotation.product(rotation.exp(turn), now.goal[3:])
+        self._go_to(np.clip(now.goal[:3] + way, self.low, self.high), orientation)
+
+    def _go_to(self, position: Vector, orientation: Vector) -> None:
+        now = self.state
         tip = rigid_transform(rotation.matrix(orientation), position)
         now.start[:] = now.command
         try:
@@ -162,8 +194,13 @@ class _Hand:
         """Command what is due after this share of the step's time."""
         now = self.state
         now.jaw[0] = now.jaw_start + share * (now.jaw_end - now.jaw_start)
-        share = share**3 * (10.0 + share * (6.0 * share - 15.0))
-        now.command[:] = now.start + share * (now.end - now.start)
+        now.command[:] = now.start + self._curve(share) * (now.end - now.start)
+
+    def _curve(self, share: float) -> float:
+        """Return the share of the way: smooth from rest to rest, or even between the goals of a policy."""
+        if self.params.control == "tip":
+            return share
+        return share**3 * (10.0 + share * (6.0 * share - 15.0))
 
     def series(self, shares: Sequence[float]) -> tuple[Vector, Vector]:
         """Return joints, shape (n, joints), and jaw, shape (n, 1), at shares of the step's time; end there.
@@ -172,7 +209,7 @@ class _Hand:
         """
         now = self.state
         part = np.array(shares)[:, None]
-        curve = np.array([share**3 * (10.0 + share * (6.0 * share - 15.0)) for share in shares])[:, None]
+        curve = np.array([self._curve(share) for share in shares])[:, None]
         jaws = now.jaw_start + part * (now.jaw_end - now.jaw_start)
         commands = now.start + curve * (now.end - now.start)
         now.jaw[:], now.command[:] = jaws[-1], commands[-1]
@@ -216,10 +253,14 @@ class Actions(Controller):
     @property
     def ports(self) -> tuple[Port, ...]:
         """The action in; goals of joints, jaw and tip, power, and the number of goals out of reach, out."""
-        count = _NUMBERS * len(self._hands)
+        count = _NUMBERS[self.params.control] * len(self._hands)
         action = signal_in(
             "action",
-            description="of each hand x, y, z, turn and jaw, from -1 to 1",
+            description=(
+                "of each hand x, y, z, turn and jaw, from -1 to 1"
+                if self.params.control == "displacement"
+                else "of each hand the tip's pose in the world and the jaw opening: m, quaternion, rad"
+            ),
             size=count,
             start=(0.0,) * count,
         )
@@ -263,13 +304,15 @@ class Actions(Controller):
     def measured_tip(self, arm: str, q: Vector) -> Vector:
         """Return the pose of the tip of `arm` in the world, shape (7,), as encoders tell at true `q`."""
         hand = next(hand for hand in self._hands if hand.arm == arm)
-        frames = hand.chain.frames(q - hand.offsets)
-        return matrix_to_pose(hand.base @ frames[-1])
+        return matrix_to_pose(hand.base @ hand.chain.frames(q - hand.offsets)[-1])
 
     def _act(self, inputs: Inputs) -> None:
-        action = np.clip(inputs["action"], -1.0, 1.0).reshape(-1, _NUMBERS)
-        for hand, own in zip(self._hands, action, strict=True):
-            hand.act(own)
+        rows = inputs["action"].reshape(len(self._hands), -1)
+        for hand, row in zip(self._hands, rows, strict=True):
+            if self.params.control == "displacement":
+                hand.act(np.clip(row, -1.0, 1.0))
+            else:
+                hand.follow(row)
 
     def leap(
         self,

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from importlib.resources import files
+from math import pi
 from pathlib import Path
 from typing import Any, ClassVar, Literal, cast
 
@@ -34,6 +35,11 @@ _FAR = 2.0
 _SETTLING_NS = 20_000_000
 """Time until the first action if objects are put: the period of the scenes' reports."""
 _EYES = ("left", "right")
+Control = Literal["displacement", "tip"]
+_CONTROLS: dict[Control, str] = {
+    "displacement": "x, y, z, turn and jaw, from -1 to 1,",
+    "tip": "position, quaternion (x, y, z, w) and jaw opening",
+}
 
 
 class ActionError(MessageError, InvalidAction):
@@ -55,6 +61,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_mode: `rgb_array` or None.
         record: A directory in which each episode is recorded, `episode-00000` and so on.
         terminate_on_success: End an episode when its goal is reached, instead of going on to hold it.
+        control: `displacement`: actions of -1 to 1; `tip`: goals of the tips, as poses in the world.
         step: Simulated time of a step, s.
         delay: Age of observations, s, as of a slow camera or link; reward and success are of now.
         hashed: Keep `state_hash`. Without it, and without a recording, a step costs less, with the same bits.
@@ -76,6 +83,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_mode: Literal["rgb_array"] | None = None,
         record: str | Path | None = None,
         terminate_on_success: bool = False,
+        control: Control = "displacement",
         step: float = 0.2,
         delay: float = 0.0,
         hashed: bool = True,
@@ -92,10 +100,12 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._randomise = None if randomise is False else {} if randomise is True else dict(randomise)
         self._record = None if record is None else Path(record)
         self._terminates = terminate_on_success
+        self._control: Control = control
         scene = files("learning.environments") / "scenes" / f"{exercise.scene}.yaml"
         duration = f"{step:g} s"
         settling_ns = _SETTLING_NS if exercise.puts else 0
         own = {
+            "participants.actions.control": control,
             "participants.actions.action_step": duration,
             "participants.actions.first_action": f"{settling_ns / 1e6:g} ms",
             "participants.task.period": duration,
@@ -149,7 +159,10 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self.images:
             parts |= {eye: spaces.Box(0, 255, picture, np.uint8) for eye in _EYES}
         self.observation_space = spaces.Dict(parts)  # pyright: ignore[reportAttributeAccessIssue, reportIncompatibleVariableOverride]
-        self.action_space = spaces.Box(-1.0, 1.0, (5 * len(self.exercise.hands),), np.float32)
+        self._limit, numbers = (1.0, 5) if self._control == "displacement" else (_FAR * pi, 8)
+        self.action_space = spaces.Box(
+            -self._limit, self._limit, (numbers * len(self.exercise.hands),), np.float32
+        )
 
     @property
     def layout(self) -> dict[str, slice]:
@@ -160,6 +173,11 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
             layout[name] = slice(at, at + size)
             at += size
         return layout
+
+    @property
+    def step_s(self) -> float:
+        """Simulated time of a step, s."""
+        return self._count * self._session.plan.step_ns / 1e9
 
     @property
     def time_s(self) -> float:
@@ -223,7 +241,7 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
         """
         self._require_open()
         given = self._numbers(action)
-        self._advance(self._count - self._lag, {"actions.action": np.clip(given, -1.0, 1.0)})
+        self._advance(self._count - self._lag, {"actions.action": given})
         self._past.append(self._observe())
         if self._lag:
             self._advance(self._lag)
@@ -245,12 +263,12 @@ class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
             if given.dtype.kind in "biuf" and given.shape == self.action_space.shape:
                 numbers = given.astype(np.float64)
                 if np.isfinite(numbers).all():
-                    return numbers
+                    return np.clip(numbers, -self._limit, self._limit)
         except (ValueError, TypeError):  # lists of several lengths, objects of other libraries
             pass
         raise ActionError(
-            f"action {action!r:.200}: expected {self.action_space.shape} finite numbers, x, y, z, turn"
-            f" and jaw of {' and '.join(self.exercise.hands)}; they are clipped to -1 to 1"
+            f"action {action!r:.200}: expected {self.action_space.shape} finite numbers,"
+            f" {_CONTROLS[self._control]} of {' and '.join(self.exercise.hands)}"
         )
 
     def _require_open(self) -> None:

@@ -6,7 +6,7 @@ import os
 import sys
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,6 +19,8 @@ __all__ = ["app"]
 
 app = typer.Typer()
 
+_LARGEST_CONTRACT = 100_000
+"""Bytes of a file with a contract."""
 _PACKAGES = ("gymnasium", "joblib", "pyarrow", "scipy")
 
 
@@ -27,8 +29,21 @@ def judge(
     *,
     policy: Annotated[
         str | None,
-        typer.Option(metavar="POLICY", help="expert, random, hold, or MODULE:NAME of a class of your own."),
+        typer.Option(
+            metavar="POLICY",
+            help="expert, random, hold, a backend's address such as openpi://HOST:8000, or MODULE:NAME of a"
+            " class of your own.",
+        ),
     ] = None,
+    contract: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", exists=True, help="Contract with a backend, YAML, as `contract` of a scene."
+        ),
+    ] = None,
+    execute: Annotated[
+        int, typer.Option(min=1, help="Rows of a backend's answer before the next question.")
+    ] = 5,
     suite: Annotated[
         str, typer.Option(help="training, suturing, tissue, all, or exercises, with commas.")
     ] = "suturing",
@@ -75,19 +90,31 @@ def judge(
     if policy is None or output is None:
         raise ScenarioError("a verdict needs --policy and --output; or compare two with --compare DIR DIR")
     from learning.judge.difficulties import difficulties_of
-    from learning.judge.policies import open_policy
+    from learning.judge.policies import PolicyAddress, open_policy
     from learning.judge.suites import exercises_of
     from learning.judge.verdict import Verdict
     from learning.own_directory import claim_directory
 
     sys.path.insert(0, str(Path.cwd()))  # a policy of one's own lies where the command is typed
-    open_policy(policy)
+    address = PolicyAddress(policy, _stated(contract), execute)
+    open_policy(address)
     verdict = Verdict(
-        policy, exercises_of(suite), difficulties_of(difficulty), seeds, output, recorded=record
+        address, exercises_of(suite), difficulties_of(difficulty), seeds, output, recorded=record
     )
     with claim_directory(output, "verdict"):
         verdict.open()
         _run(verdict, jobs or os.cpu_count() or 1, ray)
+
+
+def _stated(file: Path | None) -> dict[str, Any] | None:
+    """Return the entries of a contract that a file states."""
+    from robots.policies.contract import Contract
+    from schemas.yaml_model import load_yaml_model
+
+    if file is None:
+        return None
+    read = load_yaml_model(Contract, file, largest=_LARGEST_CONTRACT, writer="you", error=ScenarioError)
+    return read.model_dump(mode="json", exclude_unset=True)
 
 
 def _compare(first: Path, second: Path) -> None:

@@ -17,6 +17,8 @@ from schemas.errors import TrocarError
 __all__ = ["Trial", "judge_trial", "make_environment"]
 
 Row = dict[str, Any]
+_STEP_S = 0.2
+"""Step of an environment, s, in which the steps of an exercise are counted."""
 
 
 class Trial(NamedTuple):
@@ -38,15 +40,18 @@ class Trial(NamedTuple):
         return self.exercise, difficulty.delay, difficulty.settings(self.seed)
 
 
-def make_environment(trial: Trial, *, images: bool) -> Environment:
-    """Return the environment of a trial; an episode ends by success, loss, or after the exercise's steps."""
+def make_environment(trial: Trial, wanted: Mapping[str, Any]) -> Environment:
+    """Return the environment of a trial; episodes end by success or loss.
+
+    `wanted`: further arguments, as of a policy.
+    """
     exercise, delay, settings = trial.world
     return make(
         ENVIRONMENTS[f"trocar/{exercise}-v0"][0],
         terminate_on_success=True,
-        images=images,
         delay=delay,
         settings=dict(settings),
+        **wanted,
     )
 
 
@@ -62,11 +67,11 @@ def judge_trial(env: Environment, policy: JudgedPolicy, trial: Trial, recording:
     options = {"record": recording} if recording else None
     observation, info = env.reset(seed=trial.seed, options=options)
     happened = Happened(env)
-    limit = ENVIRONMENTS[f"trocar/{trial.exercise}-v0"][1]
+    limit_s = ENVIRONMENTS[f"trocar/{trial.exercise}-v0"][1] * _STEP_S
     error, ended = None, False
     try:
         policy.begin(env, trial.seed)
-        while not ended and happened.steps < limit:
+        while not ended and happened.steps * env.step_s < limit_s - 1e-9:
             observation, _, ended, _, info = env.step(policy.act(observation))
             happened.see_step(info)
     except (TrocarError, ArithmeticError, LookupError, TypeError, ValueError, OSError) as failure:

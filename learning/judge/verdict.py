@@ -21,8 +21,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, cast
 
+from learning.judge.contract_policy import ContractPolicy
 from learning.judge.episode import Row, Trial, judge_trial, make_environment
-from learning.judge.policies import open_policy
+from learning.judge.policies import PolicyAddress, open_policy
 from learning.own_directory import MARKER, whole_file
 from learning.workers import run_calls
 from schemas.errors import ScenarioError
@@ -37,7 +38,7 @@ _AT_ONCE = 10
 class Verdict:
     """The trials of a policy, and the directory of the results."""
 
-    policy: str
+    policy: PolicyAddress
     exercises: tuple[str, ...]
     difficulties: tuple[str, ...]
     seeds: int
@@ -98,7 +99,9 @@ class Verdict:
     def description(self) -> dict[str, Any]:
         """Settings of the verdict, and the version of Trocar."""
         return {
-            "policy": self.policy,
+            "policy": self.policy.name,
+            "contract": self.policy.contract,
+            "execute": self.policy.execute,
             "exercises": list(self.exercises),
             "difficulties": list(self.difficulties),
             "seeds": self.seeds,
@@ -110,16 +113,18 @@ class Verdict:
         return self.directory / "trials" / f"{trial.name}.json"
 
 
-def judge_trials(policy: str, trials: Sequence[Trial], directory: str | None) -> list[Row]:
+def judge_trials(policy: PolicyAddress, trials: Sequence[Trial], directory: str | None) -> list[Row]:
     """Return the rows of some trials; recordings go below `directory`."""
     judged = open_policy(policy)
     rows: list[Row] = []
-    with ExitStack() as stack:
+    with ExitStack() as held, ExitStack() as stack:
+        if isinstance(judged, ContractPolicy):
+            held.callback(judged.close)
         env, world = None, None
         for trial in trials:
             if env is None or world != trial.world:
                 stack.close()
-                env, world = make_environment(trial, images=judged.images), trial.world
+                env, world = make_environment(trial, judged.environment), trial.world
                 stack.callback(env.close)
             recording = Path(directory) / trial.name if directory else None
             if recording is not None:

@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 import trocar
 from hub.command_line.app import app
 from learning.judge.difficulties import DIFFICULTIES, difficulties_of
+from learning.judge.episode import Trial
+from learning.judge.policies import PolicyAddress
 from learning.judge.suites import SUITES, exercises_of
 from learning.judge.verdict import Verdict, judge_trials
 from schemas.errors import ScenarioError
@@ -58,8 +60,8 @@ def test_a_verdict_can_be_appealed(expert, trial):
 def test_a_trial_judged_again_has_the_same_bits(expert, tmp_path):
     place, _ = expert
     file = place / "trials" / "NeedlePick-nominal-00001.json"
-    verdict = Verdict("expert", ("NeedlePick",), ("nominal", "joint-errors"), 2, place)
-    (again,) = judge_trials("expert", [verdict.trials[1]], None)
+    verdict = Verdict(PolicyAddress("expert"), ("NeedlePick",), ("nominal", "joint-errors"), 2, place)
+    (again,) = judge_trials(PolicyAddress("expert"), [verdict.trials[1]], None)
     there = json.loads(file.read_text())
     assert again["state_hash"] == there["state_hash"]
     assert again["metrics"] == there["metrics"]
@@ -81,10 +83,10 @@ def test_an_interrupted_verdict_goes_on(expert):
 def test_a_directory_is_of_one_verdict(expert, tmp_path):
     place, _ = expert
     with pytest.raises(ScenarioError, match=r"another verdict \(other policy, difficulties, seeds\)"):
-        Verdict("random", ("NeedlePick",), ("nominal",), 1, place).open()
+        Verdict(PolicyAddress("random"), ("NeedlePick",), ("nominal",), 1, place).open()
     (tmp_path / "letter.txt").write_text("mine")
     with pytest.raises(ScenarioError, match="something else than a verdict"):
-        Verdict("random", ("NeedlePick",), ("nominal",), 1, tmp_path).open()
+        Verdict(PolicyAddress("random"), ("NeedlePick",), ("nominal",), 1, tmp_path).open()
 
 
 def test_the_page_leads_to_each_trial(expert):
@@ -95,8 +97,9 @@ def test_the_page_leads_to_each_trial(expert):
     assert "http" not in page.replace('http-equiv="Content-Security-Policy"', "")
 
 
-def test_a_policy_that_fails_does_not_end_the_suite(tmp_path):
-    rows = judge_trials(f"{OWN}:Failing", Verdict("", ("Reach",), ("nominal",), 2, tmp_path).trials, None)
+def test_a_policy_that_fails_does_not_end_the_suite():
+    trials = [Trial("Reach", "nominal", seed) for seed in (0, 1)]
+    rows = judge_trials(PolicyAddress(f"{OWN}:Failing"), trials, None)
     assert [row["failure"] for row in rows] == ["policy failed", "goal not reached"]
     assert "expected (5,) finite numbers" in rows[0]["error"]
     assert rows[0]["steps"] == 2
