@@ -20,7 +20,6 @@ from devices.policies.policy import open_policy
 from devices.policies.questions import Questions, picture_port
 from devices.samples import clock_of
 from hub.participant import Device, Params, Sample, Value, event_in, event_out
-from schemas.errors import MessageError
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import Image
@@ -88,14 +87,11 @@ class PolicyDevice(Device):
             self._thread.start()
 
     def write(self, port: str, value: Value) -> None:
-        """Keep an observation or a picture; a picture of another size is reported, and the arms wait."""
+        """Keep an observation or a picture. Raises MessageError for another message."""
         messages = value if isinstance(value, tuple) else (cast("Message", value),)
-        for message in messages:
-            try:
-                with self._asking:
-                    self._questions.accept(port, message)
-            except MessageError as error:
-                self._problems.append(str(error))
+        with self._asking:
+            for message in messages:
+                self._questions.accept(port, message)
         self._asked.set()
 
     def read(self, t: int) -> list[Sample]:  # noqa: ARG002

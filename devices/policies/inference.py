@@ -46,8 +46,8 @@ class Inference:
             self._drop(str(error))
         return self._away
 
-    def answer(self, asked: PolicyObservation, question: Observation) -> ActionChunk:
-        """Return the policy's answer, or the fault."""
+    def answer(self, asked: PolicyObservation, question: Observation | str) -> ActionChunk:
+        """Return the policy's answer, or the fault; a text in place of the question is the fault."""
         start_ns, fault = monotonic_ns(), ""
         rows = np.zeros((0, 0))
         try:
@@ -69,7 +69,9 @@ class Inference:
             inference_ns=monotonic_ns() - start_ns,
         )
 
-    def _ask(self, question: Observation) -> Vector:
+    def _ask(self, question: Observation | str) -> Vector:
+        if isinstance(question, str):
+            raise MessageError(question)
         if self._policy is None and monotonic() >= self._retry_s:
             self._away = ""
             self.open()
