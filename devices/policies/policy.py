@@ -9,6 +9,7 @@ A session's device and a loop without a session use the same backends.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +28,7 @@ __all__ = ["BACKENDS", "Observation", "Policy", "check_actions", "check_backend"
 BACKENDS = {
     "openpi": "openpi://HOST:PORT, a websocket server of openpi",
     "groot": "groot://HOST:PORT, a ZeroMQ server of GR00T",
+    "i4h": "i4h:ENVIRONMENT or i4h:ENVIRONMENT@HOST:PORT, a process of Isaac for Healthcare (Zenoh)",
     "onnx": "onnx:FILE.onnx, a model in a process of its own",
     "lerobot": "lerobot:DIRECTORY, a checkpoint of LeRobot in a process of its own",
     "python": "python:FILE.py:NAME or python:MODULE:NAME, a function or a class in a process of its own",
@@ -84,6 +86,7 @@ def check_backend(backend: str) -> str:
         "openpi": _is_address(backend),
         "groot": _is_address(backend),
         "python": all(rest.rpartition(":")[::2]),
+        "i4h": re.fullmatch(r"[A-Za-z0-9_-]+(@[^/*$?#@]+:[0-9]+)?", rest) is not None,
     }
     if not is_complete.get(prefix, bool(rest)):
         raise ValueError(f"'{backend}' is incomplete, expected {BACKENDS[prefix]}")
@@ -131,6 +134,10 @@ def open_policy(
         from devices.policies.groot import GrootPolicy
 
         return GrootPolicy(backend, terms, timeout_s)
+    if prefix == "i4h":
+        from devices.policies.i4h import I4hPolicy
+
+        return I4hPolicy(backend, terms, timeout_s)
     from devices.policies.child import ChildPolicy
 
     return ChildPolicy(backend, terms, timeout_s, directory or Path.cwd(), python)
