@@ -33,12 +33,28 @@ def dataset(
     ],
     *,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="A new directory.")],
-    fps: Annotated[int, typer.Option(min=1, max=1000, help="Frames in a second of simulated time.")] = 25,
+    layout: Annotated[
+        Literal["lerobot-v3", "open-h"],
+        typer.Option(
+            "--format",
+            help="LeRobot's present format, or Open-H: LeRobot v2.1 with poses of PSM1 and PSM2 in the"
+            " endoscope's frame, and truths of the scene.",
+        ),
+    ] = "lerobot-v3",
+    fps: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=1000,
+            help="Frames in a second of simulated time; default: 25, of Open-H 30.",
+            show_default=False,
+        ),
+    ] = None,
     size: Annotated[
         str | None,
         typer.Option(
             metavar="WxH",
-            help="Pixels of the pictures; default: as recorded, else 640x480.",
+            help="Pixels of the pictures; default: as recorded, else 640x480; of Open-H 960x540.",
             show_default=False,
         ),
     ] = None,
@@ -98,8 +114,17 @@ def dataset(
             raise MissingExtraError("'trocar dataset'", "dataset", "pillow" if package == "PIL" else package)
     from learning.datasets.episode import Wanted
 
+    if layout == "open-h" and (state or action):
+        raise typer.BadParameter("Open-H names its own numbers", param_hint="--state, --action")
     wanted = Wanted(
-        fps, pixels, _tasks(task or ()), tuple(state or ()), tuple(action or ()), looks, randomise
+        fps or (30 if layout == "open-h" else 25),
+        pixels,
+        _tasks(task or ()),
+        tuple(state or ()),
+        tuple(action or ()),
+        layout,
+        looks,
+        randomise,
     )
     _run(recordings, output, wanted, trust=trust)
 

@@ -8,12 +8,16 @@ from types import TracebackType
 from typing import Any, Self
 
 from learning.datasets.episode import Episode, Wanted, open_recording
+from learning.datasets.open_h_writer import OpenHWriter
 from learning.datasets.pictures import DEFAULT_SIZE, recorded_size, stereo
 from learning.datasets.writer import Writer
 from schemas.errors import RecordingError, SessionError, TrustError
 from trocar import Recording
 
 __all__ = ["Conversion"]
+
+OPEN_H_SIZE = (960, 540)
+"""Size of Open-H's pictures of a dVRK (JHU)."""
 
 
 class Conversion:
@@ -25,7 +29,7 @@ class Conversion:
         `trust` allows drawn scenes of changed files.
         """
         self._directory, self._wanted, self._trust = directory, wanted, trust
-        self._writer: Writer | None = None
+        self._writer: Writer | OpenHWriter | None = None
         self._size = wanted.size
         self.tasks: dict[str, int] = {}
         """Number of episodes of each task."""
@@ -71,7 +75,7 @@ class Conversion:
         """Append a recording; return the episode's length, s."""
         wanted = self._wanted
         episode = Episode.of(recording, wanted)
-        size = self._size or recorded_size(recording) or DEFAULT_SIZE
+        size = self._size or self._default_size(recording)
         seed = None if wanted.randomise is None else wanted.randomise + sum(self.tasks.values())
         pictures = stereo(
             recording,
@@ -83,7 +87,8 @@ class Conversion:
             trust=self._trust,
         )
         if self._writer is None:
-            self._writer = Writer(self._directory, wanted.fps, size, episode)
+            kind = OpenHWriter if wanted.format == "open-h" else Writer
+            self._writer = kind(self._directory, wanted.fps, size, episode)
             self._size = size
         source: dict[str, Any] = {
             "recording": str(path.resolve()),
@@ -98,6 +103,11 @@ class Conversion:
             self.tasks_without_recording.remove(scenario)
         self.tasks[episode.task] = self.tasks.get(episode.task, 0) + 1
         return pictures.count / wanted.fps
+
+    def _default_size(self, recording: Recording) -> tuple[int, int]:
+        if self._wanted.format == "open-h":
+            return OPEN_H_SIZE
+        return recorded_size(recording) or DEFAULT_SIZE
 
     def summary(self) -> str:
         """Return a summary of the data set, in a line. Raises RecordingError if nothing was made."""

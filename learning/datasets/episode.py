@@ -10,7 +10,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from learning.datasets import open_h
 from learning.datasets.columns import Columns, choose_columns, commanded_columns, measured_columns
+from learning.datasets.tips import Tips
 from schemas.errors import RecordingError
 from schemas.scenario import Scenario
 from trocar import Recording, recover
@@ -33,6 +35,8 @@ class Wanted:
     """Ports, or fields of ports; empty: measured joints of all arms."""
     action: tuple[str, ...] = ()
     """Likewise; empty: commanded joints of all arms."""
+    format: Literal["lerobot-v3", "open-h"] = "lerobot-v3"
+    """Layout of the files, and names of state and action."""
     looks: Literal["plain", "endoscope"] | None = None
     """Looks with which all pictures are drawn; None: recorded pictures where they fit, else plain."""
     randomise: int | None = None
@@ -53,6 +57,14 @@ class Episode:
     action_names: tuple[str, ...]
     action: NDArray[np.float32]
     """Commands at the time of the next frame, shape (n, len(action_names))."""
+    meta: Mapping[str, tuple[tuple[str, ...], NDArray[np.float32]]] = field(
+        default_factory=dict[str, "tuple[tuple[str, ...], NDArray[np.float32]]"]
+    )
+    """Truths of the scene by feature: names of columns, and the newest values at each frame."""
+    texts: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Texts by feature, the same in all frames."""
+    frame: str = ""
+    """Reference frame of poses; empty for joints."""
 
     @classmethod
     def of(cls, recording: Recording, wanted: Wanted) -> Episode:
@@ -61,8 +73,15 @@ class Episode:
         Each frame has its action, a frame later. Raises RecordingError if the recording lacks numbers, or
         lasts for less than a frame.
         """
-        state = choose_columns(recording, wanted.state) if wanted.state else measured_columns(recording)
-        action = choose_columns(recording, wanted.action) if wanted.action else commanded_columns(recording)
+        tips = Tips(recording) if wanted.format == "open-h" else None
+        if tips is not None:
+            state, action = open_h.state_columns(tips), open_h.action_columns(tips)
+        else:
+            state = choose_columns(recording, wanted.state) if wanted.state else measured_columns(recording)
+            action = (
+                choose_columns(recording, wanted.action) if wanted.action else commanded_columns(recording)
+            )
+        truths = {} if tips is None else open_h.meta_columns(recording, tips)
         for one in (*state, *action):
             if not len(one.times_ns):
                 raise RecordingError(f"'{recording.file}': nothing is recorded of '{one.port}'")
@@ -85,6 +104,9 @@ class Episode:
             action_names=_names(action),
             # an action leads from one frame to the next: it comes after the picture that it answers
             action=np.hstack([one.at(times_ns[1:]) for one in action]),
+            meta={name: (one.names, one.at(times_ns[:-1])) for name, one in truths.items()},
+            texts={} if tips is None else open_h.tools(tips),
+            frame="" if tips is None else tips.frame,
         )
 
 

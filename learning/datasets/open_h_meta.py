@@ -1,0 +1,151 @@
+"""Descriptions of an Open-H data set: `info.json`, `modality.json` for GR00T-H, and the README."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from learning.datasets.episode import Episode
+from learning.datasets.open_h import ARMS
+from learning.datasets.video import CODEC, PIXEL_FORMAT
+from robots.dvrk.crtk import CAMERA_FRAME
+from robots.policies.states import state_groups
+
+__all__ = ["CHUNK", "FORMAT", "Counts", "info", "modality", "readme"]
+
+FORMAT = "v2.1"
+CHUNK = 1000
+"""Episodes in a directory."""
+_SPLITS = (("train", 0.0, 0.8), ("val", 0.8, 0.9), ("test", 0.9, 1.0))
+"""Name, begin and end of each split, as shares of the episodes."""
+
+
+class Counts(NamedTuple):
+    """Sizes of a data set."""
+
+    episodes: int
+    frames: int
+    tasks: int
+
+
+def info(
+    first: Episode, fps: int, size: tuple[int, int], videos: Sequence[str], counts: Counts
+) -> dict[str, Any]:
+    """Return the content of `meta/info.json`; `first` has the columns of all episodes."""
+    width, height = size
+    one: dict[str, Any] = {"shape": [1], "names": None}
+    video = {
+        "dtype": "video",
+        "shape": [height, width, 3],
+        "names": ["height", "width", "channel"],
+        "info": {
+            "video.fps": fps,
+            "video.height": height,
+            "video.width": width,
+            "video.channels": 3,
+            "video.codec": CODEC,
+            "video.pix_fmt": PIXEL_FORMAT,
+            "video.is_depth_map": False,
+            "has_audio": False,
+        },
+    }
+    numbers = {"observation.state": first.state_names, "action": first.action_names}
+    numbers |= {name: columns for name, (columns, _) in first.meta.items()}
+    text = {"dtype": "string", "shape": [1], "names": ["value"]}
+    return {
+        "codebase_version": FORMAT,
+        "robot_type": "dvrk",
+        "total_episodes": counts.episodes,
+        "total_frames": counts.frames,
+        "total_tasks": counts.tasks,
+        "total_videos": counts.episodes * len(videos),
+        "total_chunks": -(-counts.episodes // CHUNK),
+        "chunks_size": CHUNK,
+        "fps": fps,
+        "tolerance_s": 1e-4,
+        "frame": first.frame,
+        "units": {"position": "m", "jaw": "rad", "force": "N", "torque": "N m"},
+        "splits": _splits(counts.episodes),
+        "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
+        "video_path": "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4",
+        "features": {
+            **dict.fromkeys(videos, video),
+            **{
+                name: {"dtype": "float32", "shape": [len(names)], "names": list(names)}
+                for name, names in numbers.items()
+            },
+            **dict.fromkeys(first.texts, text),
+            "instruction.text": text | {"description": "the task in words"},
+            "timestamp": {"dtype": "float32", **one},
+            **{
+                key: {"dtype": "int64", **one}
+                for key in ("frame_index", "episode_index", "index", "task_index")
+            },
+        },
+    }
+
+
+def _splits(episodes: int) -> dict[str, str]:
+    """Return ranges of episodes; a small data set is all for training."""
+    cuts = {share: int(share * episodes) if episodes >= len(ARMS) * 5 else episodes for share in (0.8, 0.9)}
+    cuts |= {0.0: 0, 1.0: episodes}
+    return {name: f"{cuts[begin]}:{cuts[end]}" for name, begin, end in _SPLITS}
+
+
+def modality() -> dict[str, Any]:
+    """Return the groups of state and action as GR00T-H names them, with the left camera of the endoscope."""
+    groups: dict[str, dict[str, int]] = {}
+    at = 0
+    for arm in ARMS:
+        for group in state_groups("open-h-dvrk", arm, "", ()):
+            groups[group.name] = {"start": at, "end": at + len(group.fields)}
+            at += len(group.fields)
+    return {
+        "state": groups,
+        "action": groups,
+        "video": {"endoscope_left": {"original_key": "observation.images.endoscope.left"}},
+        "annotation": {"human.task_description": {"original_key": "task_index"}},
+    }
+
+
+def readme(first: Episode, fps: int, size: tuple[int, int], counts: Counts, tasks: Sequence[str]) -> str:
+    """Return the README in the sections that Open-H asks for."""
+    absent = [arm for arm in ARMS if f"observation.meta.tool.{arm.lower()}" not in first.texts]
+    truths = "".join(f"- `{name}`: {len(columns)} numbers\n" for name, (columns, _) in first.meta.items())
+    hours = f"{counts.frames / fps / 3600:.3f}"
+    frame = f"`{first.frame}`{', the tip of the endoscope' if first.frame == CAMERA_FRAME else ''}"
+    done = "".join(f"- {task}\n" for task in tasks)
+    missing = f" {', '.join(absent)} is not in the scene: its numbers are constant." if absent else ""
+    return f"""# Simulated demonstrations on a dVRK
+
+## Dataset Description
+
+{counts.episodes} episodes, {counts.frames} frames, {hours} hours. Data type: physical simulation (Trocar).
+License: chosen by the publisher.
+
+{done}
+## Collection Procedure
+
+Programmatic or teleoperated, as `recordings.json` says of each episode; each recording simulates again to the
+same bits. No episode shows a recovery unless its task says so.
+
+## Robot Platform
+
+Simulated da Vinci Research Kit: patient-side manipulators PSM1 and PSM2, endoscope.{missing}
+
+## Sensors & Cameras
+
+Stereo endoscope, {size[0]} x {size[1]} pixels, {fps} frames a second. Truths of the simulation:
+
+{truths}
+## Action & State Space Representation
+
+Absolute Cartesian set-points (action) and measured poses (state) of PSM1, then PSM2: x, y, z in m,
+quaternion x, y, z, w, jaw in rad. Reference frame: {frame}.
+The action of a frame is the set-point at the time of the next frame.
+
+## Data Synchronization
+
+All numbers and pictures have the clock of the simulation: state and pictures are those of the frame's time,
+without interpolation and without skew; timestamps are exact multiples of the frame time.
+"""
