@@ -132,7 +132,7 @@ class ChildPolicy:
                 except (EOFError, OSError) as error:
                     self._answers.put(EOFError(str(error)))
                     return
-                except (ValueError, KeyError, TypeError) as error:
+                except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
                     self._answers.put(error)
                     return
 
