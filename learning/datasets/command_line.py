@@ -17,7 +17,7 @@ from schemas.errors import MissingExtraError, RecordingError
 if TYPE_CHECKING:
     from learning.datasets.episode import Wanted
 
-__all__ = ["app"]
+__all__ = ["app", "pixels_of"]
 
 app = typer.Typer()
 
@@ -108,7 +108,7 @@ def dataset(
         raise typer.BadParameter(f"'{output}' exists already; name a new directory.", param_hint="--output")
     if randomise is not None and looks != "endoscope":
         raise typer.BadParameter("only endoscope looks vary: add --looks endoscope", param_hint="--randomise")
-    pixels = None if size is None else _pixels(size)
+    pixels = None if size is None else pixels_of(size)
     for package in _PACKAGES:
         if find_spec(package) is None:
             raise MissingExtraError("'trocar dataset'", "dataset", "pillow" if package == "PIL" else package)
@@ -142,7 +142,8 @@ def _tasks(given: Sequence[str]) -> dict[str, str]:
     return tasks
 
 
-def _pixels(size: str) -> tuple[int, int]:
+def pixels_of(size: str) -> tuple[int, int]:
+    """Return width and height of `WxH`. Raises BadParameter for anything else."""
     found = re.fullmatch(r"(\d{1,4})x(\d{1,4})", size.strip().lower())
     width, height = (int(found[1]), int(found[2])) if found else (0, 0)
     if not all(_LEAST <= side <= _MOST and side % 2 == 0 for side in (width, height)):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from learning.datasets.episode import Episode
-from learning.datasets.open_h import ARMS
+from learning.datasets.open_h import ARMS, META
 from learning.datasets.video import CODEC, PIXEL_FORMAT
 from robots.dvrk.crtk import CAMERA_FRAME
 from robots.policies.states import state_groups
@@ -16,6 +16,8 @@ __all__ = ["CHUNK", "FORMAT", "Counts", "info", "modality", "readme"]
 FORMAT = "v2.1"
 CHUNK = 1000
 """Episodes in a directory."""
+STATISTICS = ("min", "max", "mean", "std", "count")
+"""Statistics of format v2.1."""
 _SPLITS = (("train", 0.0, 0.8), ("val", 0.8, 0.9), ("test", 0.9, 1.0))
 """Name, begin and end of each split, as shares of the episodes."""
 
@@ -52,20 +54,14 @@ def info(
     numbers = {"observation.state": first.state_names, "action": first.action_names}
     numbers |= {name: columns for name, (columns, _) in first.meta.items()}
     text = {"dtype": "string", "shape": [1], "names": ["value"]}
-    return {
+    whole = {
         "codebase_version": FORMAT,
         "robot_type": "dvrk",
-        "total_episodes": counts.episodes,
-        "total_frames": counts.frames,
-        "total_tasks": counts.tasks,
-        "total_videos": counts.episodes * len(videos),
-        "total_chunks": -(-counts.episodes // CHUNK),
         "chunks_size": CHUNK,
         "fps": fps,
         "tolerance_s": 1e-4,
         "frame": first.frame,
         "units": {"position": "m", "jaw": "rad", "force": "N", "torque": "N m"},
-        "splits": _splits(counts.episodes),
         "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
         "video_path": "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4",
         "features": {
@@ -82,6 +78,21 @@ def info(
                 for key in ("frame_index", "episode_index", "index", "task_index")
             },
         },
+    }
+    return with_counts(whole, counts)
+
+
+def with_counts(info: Mapping[str, Any], counts: Counts) -> dict[str, Any]:
+    """Return the content of `info.json` for other counts of episodes."""
+    videos = sum(feature["dtype"] == "video" for feature in info["features"].values())
+    return {
+        **info,
+        "total_episodes": counts.episodes,
+        "total_frames": counts.frames,
+        "total_tasks": counts.tasks,
+        "total_videos": counts.episodes * videos,
+        "total_chunks": -(-counts.episodes // CHUNK),
+        "splits": _splits(counts.episodes),
     }
 
 
@@ -108,26 +119,32 @@ def modality() -> dict[str, Any]:
     }
 
 
-def readme(first: Episode, fps: int, size: tuple[int, int], counts: Counts, tasks: Sequence[str]) -> str:
-    """Return the README in the sections that Open-H asks for."""
-    absent = [arm for arm in ARMS if f"observation.meta.tool.{arm.lower()}" not in first.texts]
-    truths = "".join(f"- `{name}`: {len(columns)} numbers\n" for name, (columns, _) in first.meta.items())
-    hours = f"{counts.frames / fps / 3600:.3f}"
-    frame = f"`{first.frame}`{', the tip of the endoscope' if first.frame == CAMERA_FRAME else ''}"
+def readme(info: Mapping[str, Any], tasks: Sequence[str]) -> str:
+    """Return the README in the sections that Open-H asks for; `info` is the content of `info.json`."""
+    features, fps = info["features"], info["fps"]
+    absent = [arm for arm in ARMS if f"{META}tool.{arm.lower()}" not in features]
+    truths = "".join(
+        f"- `{name}`: {feature['shape'][0]} numbers\n"
+        for name, feature in features.items()
+        if name.startswith(META) and feature["dtype"] == "float32"
+    )
+    height, width, _ = next(one["shape"] for one in features.values() if one["dtype"] == "video")
+    hours = f"{info['total_frames'] / fps / 3600:.3f}"
+    frame = f"`{info['frame']}`{', the tip of the endoscope' if info['frame'] == CAMERA_FRAME else ''}"
     done = "".join(f"- {task}\n" for task in tasks)
     missing = f" {', '.join(absent)} is not in the scene: its numbers are constant." if absent else ""
     return f"""# Simulated demonstrations on a dVRK
 
 ## Dataset Description
 
-{counts.episodes} episodes, {counts.frames} frames, {hours} hours. Data type: physical simulation (Trocar).
-License: chosen by the publisher.
+{info["total_episodes"]} episodes, {info["total_frames"]} frames, {hours} hours.
+Data type: physical simulation (Trocar). License: chosen by the publisher.
 
 {done}
 ## Collection Procedure
 
-Programmatic or teleoperated, as `recordings.json` says of each episode; each recording simulates again to the
-same bits. No episode shows a recovery unless its task says so.
+Programmatic or teleoperated, as `recordings.json` or `sources.jsonl` says of each episode; each recording
+simulates again to the same bits. No episode shows a recovery unless its task says so.
 
 ## Robot Platform
 
@@ -135,7 +152,7 @@ Simulated da Vinci Research Kit: patient-side manipulators PSM1 and PSM2, endosc
 
 ## Sensors & Cameras
 
-Stereo endoscope, {size[0]} x {size[1]} pixels, {fps} frames a second. Truths of the simulation:
+Stereo endoscope, {width} x {height} pixels, {fps} frames a second. Truths of the simulation:
 
 {truths}
 ## Action & State Space Representation

@@ -33,8 +33,6 @@ from schemas.errors import RecordingError
 __all__ = ["OpenHWriter"]
 
 _VIDEOS = tuple(f"observation.images.endoscope.{eye}" for eye in EYES)
-_STATISTICS = ("min", "max", "mean", "std", "count")
-"""Statistics of format v2.1."""
 
 
 class OpenHWriter:
@@ -73,7 +71,7 @@ class OpenHWriter:
             for name, values in columns.items()
             if values.dtype.kind != "U"
         } | {key: one.statistics() for key, one in pictures.items()}
-        kept = {name: {key: one[key] for key in _STATISTICS} for name, one in statistics.items()}
+        kept = {name: {key: one[key] for key in open_h_meta.STATISTICS} for name, one in statistics.items()}
         self._tasks[episode.task] = task
         row = {"episode_index": number, "tasks": [episode.task], "length": count}
         self._lines["episodes"].append(row)
@@ -140,14 +138,14 @@ class OpenHWriter:
             text = "".join(json.dumps(line) + "\n" for line in lines)
             (meta / f"{name}.jsonl").write_text(text, encoding="utf-8")
         counts = open_h_meta.Counts(self.episodes, self.frames, len(self._tasks))
-        contents = {
+        contents: dict[str, Any] = {
             "info": open_h_meta.info(self._first, self._fps, self._size, _VIDEOS, counts),
             "modality": open_h_meta.modality(),
             "recordings": self._sources,
         }
         for name, content in contents.items():
             (meta / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-        text = open_h_meta.readme(self._first, self._fps, self._size, counts, list(self._tasks))
+        text = open_h_meta.readme(contents["info"], list(self._tasks))
         (meta / "README.md").write_text(text, encoding="utf-8")
 
 

@@ -1,0 +1,1 @@
+"""`trocar demonstrate`: experts' episodes by the thousand, as a data set."""
