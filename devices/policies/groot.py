@@ -8,6 +8,8 @@ Source: NVIDIA/Isaac-GR00T N1.7, gr00t/policy/server_client.py and getting_start
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from threading import RLock
+from time import monotonic
 from typing import Any, cast
 from urllib.parse import urlsplit
 
@@ -23,6 +25,10 @@ from schemas.vectors import Vector
 __all__ = ["GrootPolicy"]
 
 
+_POLL_MS = 50
+"""Longest wait until a question is given up, ms."""
+
+
 class GrootPolicy:
     """A socket to a server. After a DeviceError it is closed; open another."""
 
@@ -34,10 +40,10 @@ class GrootPolicy:
         self._backend, self._terms, self._timeout_s = backend, terms, timeout_s
         self._videos = {name: camera.key or name.replace("/", "_") for name, camera in terms.cameras.items()}
         address = urlsplit(backend)
+        self._using, self._closing = RLock(), False
         self._socket: Any = cast("Any", zmq.Context.instance()).socket(zmq.REQ)
         for option, value in (
             (zmq.LINGER, 0),
-            (zmq.RCVTIMEO, round(1e3 * timeout_s)),
             (zmq.SNDTIMEO, round(1e3 * timeout_s)),
             (zmq.MAXMSGSIZE, MOST_BYTES),
         ):
@@ -142,29 +148,44 @@ class GrootPolicy:
     def _request(self, endpoint: str, data: Any) -> Any:
         import zmq
 
-        if self._socket is None:
-            raise DeviceError(f"policy '{self._backend}' is closed")
         request: dict[str, Any] = {"endpoint": endpoint}
         if data is not None:
             request["data"] = data
-        try:
-            self._socket.send(pack_groot(request))
-            answer: Any = unpack(self._socket.recv())
-        except zmq.ZMQError as error:
-            self.close()  # an answer that comes later is to an old question
-            raise DeviceError(
-                f"policy '{self._backend}' has not answered '{endpoint}' within {self._timeout_s:g} s"
-            ) from error
+        with self._using:
+            if self._socket is None:
+                raise DeviceError(f"policy '{self._backend}' is closed")
+            try:
+                self._socket.send(pack_groot(request))
+                message = self._receive()
+            except zmq.ZMQError as error:
+                self.close()
+                raise DeviceError(f"policy '{self._backend}' cannot be asked: {error}") from error
+            if message is None:
+                self.close()  # an answer that comes later is to an old question
+                raise DeviceError(
+                    f"policy '{self._backend}' has not answered '{endpoint}' within {self._timeout_s:g} s"
+                )
+        answer: Any = unpack(message)
         if isinstance(answer, dict) and "error" in answer:
             reason = cast("dict[str, Any]", answer)["error"]
             raise MessageError(f"policy '{self._backend}' reports an error: {reason!s:.300}")
         return cast("Any", answer)
 
+    def _receive(self) -> bytes | None:
+        """Return the answer; None after the longest wait, or once the policy is to be closed."""
+        deadline = monotonic() + self._timeout_s
+        while not self._socket.poll(_POLL_MS):
+            if self._closing or monotonic() > deadline:
+                return None
+        return self._socket.recv()
+
     def close(self) -> None:
-        """Disconnect."""
-        socket, self._socket = self._socket, None
-        if socket is not None:
-            socket.close()
+        """Disconnect; a question on its way is given up."""
+        self._closing = True
+        with self._using:  # a socket belongs to one thread at a time
+            socket, self._socket = self._socket, None
+            if socket is not None:
+                socket.close()
 
 
 def _names(groups: tuple[Group, ...]) -> list[str]:

@@ -33,6 +33,8 @@ _MOST_BYTES = 2**20
 """Largest command."""
 _MOST_COMMANDS = 32
 """Most commands that wait; more are refused."""
+_POLL_S = 0.05
+"""Longest wait until a question is given up."""
 
 
 class I4hPolicy:
@@ -98,8 +100,10 @@ class I4hPolicy:
         deadline, others = monotonic() + self._timeout_s, ""
         while True:
             try:
-                payload = self._commands.get(timeout=max(deadline - monotonic(), 0.0))
+                payload = self._commands.get(timeout=_POLL_S)
             except Empty:
+                if monotonic() < deadline and not self._session.is_closed():
+                    continue
                 raise DeviceError(
                     f"policy '{self._backend}' has not answered within {self._timeout_s:g} s{others}"
                 ) from None
