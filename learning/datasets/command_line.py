@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from engines.mujoco.truth.modality import Modality, parse_modalities
 from schemas.errors import MissingExtraError, RecordingError
 
 if TYPE_CHECKING:
@@ -34,11 +35,12 @@ def dataset(
     *,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="A new directory.")],
     layout: Annotated[
-        Literal["lerobot-v3", "open-h"],
+        Literal["lerobot-v3", "open-h", "coco", "bop"],
         typer.Option(
             "--format",
             help="LeRobot's present format, or Open-H: LeRobot v2.1 with poses of PSM1 and PSM2 in the"
-            " endoscope's frame, and truths of the scene.",
+            " endoscope's frame, and truths of the scene; or pictures alone, drawn and annotated: COCO's"
+            " masks and keypoints, BOP's poses.",
         ),
     ] = "lerobot-v3",
     fps: Annotated[
@@ -95,6 +97,14 @@ def dataset(
             " this seed on; with --looks endoscope.",
         ),
     ] = None,
+    truth: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Truth beside the pictures of a LeRobotDataset: depth,segmentation,normals,flow,keypoints,"
+            " or some of these.",
+        ),
+    ] = None,
     trust: Annotated[
         bool, typer.Option("--trust", help="Read files other than those of the recordings.")
     ] = False,
@@ -116,6 +126,10 @@ def dataset(
 
     if layout == "open-h" and (state or action):
         raise typer.BadParameter("Open-H names its own numbers", param_hint="--state, --action")
+    if layout in ("coco", "bop") and (state or action or task or truth):
+        raise typer.BadParameter(
+            "these belong to a LeRobotDataset", param_hint="--state --action --task --truth"
+        )
     wanted = Wanted(
         fps or (30 if layout == "open-h" else 25),
         pixels,
@@ -125,6 +139,7 @@ def dataset(
         layout,
         looks,
         randomise,
+        frozenset[Modality]() if truth is None else _modalities(truth),
     )
     _run(recordings, output, wanted, trust=trust)
 
@@ -140,6 +155,13 @@ def _tasks(given: Sequence[str]) -> dict[str, str]:
             raise typer.BadParameter(f"two tasks {whose}: expected one", param_hint="--task")
         tasks[scenario] = " ".join((named[2] if named else text).split())
     return tasks
+
+
+def _modalities(text: str) -> frozenset[Modality]:
+    try:
+        return parse_modalities(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--truth") from None
 
 
 def pixels_of(size: str) -> tuple[int, int]:
@@ -177,13 +199,15 @@ def _run(recordings: list[Path], output: Path, wanted: Wanted, *, trust: bool) -
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+    from learning.datasets.annotated import Annotated
     from learning.datasets.conversion import Conversion
     from learning.own_directory import NewDirectory
 
     console = Console(stderr=True, highlight=False)
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with NewDirectory(output, "data set") as new:
-        conversion = Conversion(new.path, wanted, trust=trust)
+        is_annotated = wanted.format in ("coco", "bop")
+        conversion = (Annotated if is_annotated else Conversion)(new.path, wanted, trust=trust)
         try:
             with _raise_on_sigterm(), conversion as made, Progress(*columns, console=console) as bar:
                 counted = bar.add_task("recordings", total=len(recordings))

@@ -7,9 +7,13 @@ from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from learning.datasets.episode import Episode, Wanted, open_recording
 from learning.datasets.open_h_writer import OpenHWriter
 from learning.datasets.pictures import DEFAULT_SIZE, recorded_size, stereo
+from learning.datasets.truth import RecordedScene, open_scene, open_truth, write_truth
 from learning.datasets.writer import Writer
 from schemas.errors import RecordingError, SessionError, TrustError
 from trocar import Recording
@@ -99,6 +103,9 @@ class Conversion:
             "versions": recording.versions(),
         }
         self._writer.add(episode, pictures.count, pictures.pairs, source)
+        if wanted.truth:
+            scene = open_scene(recording, wanted.looks, seed, recorded=pictures.recorded, trust=self._trust)
+            self._write_truth(scene, self._writer.episodes - 1, episode.times_ns[: pictures.count], size)
         if (scenario := recording.scenario().name) in self.tasks_without_recording:
             self.tasks_without_recording.remove(scenario)
         self.tasks[episode.task] = self.tasks.get(episode.task, 0) + 1
@@ -108,6 +115,15 @@ class Conversion:
         if self._wanted.format == "open-h":
             return OPEN_H_SIZE
         return recorded_size(recording) or DEFAULT_SIZE
+
+    def _write_truth(
+        self, scene: RecordedScene, episode: int, times_ns: NDArray[np.int64], size: tuple[int, int]
+    ) -> None:
+        """Write the truth of an episode at the times of its frames, shape (n,)."""
+        place = self._directory / "truth" / f"episode_{episode:06d}"
+        after_ns = int(times_ns[-1]) + 1_000_000_000 // self._wanted.fps
+        with open_truth(scene, size) as truth:
+            write_truth(place, truth, times_ns.tolist(), after_ns, self._wanted.truth)
 
     def summary(self) -> str:
         """Return a summary of the data set, in a line. Raises RecordingError if nothing was made."""

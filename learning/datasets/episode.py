@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.mujoco.truth.modality import Modality
 from learning.datasets import open_h
 from learning.datasets.columns import Columns, choose_columns, commanded_columns, measured_columns
 from learning.datasets.tips import Tips
@@ -35,12 +36,14 @@ class Wanted:
     """Ports, or fields of ports; empty: measured joints of all arms."""
     action: tuple[str, ...] = ()
     """Likewise; empty: commanded joints of all arms."""
-    format: Literal["lerobot-v3", "open-h"] = "lerobot-v3"
+    format: Literal["lerobot-v3", "open-h", "coco", "bop"] = "lerobot-v3"
     """Layout of the files, and names of state and action."""
     looks: Literal["plain", "endoscope"] | None = None
     """Looks with which all pictures are drawn; None: recorded pictures where they fit, else plain."""
     randomise: int | None = None
     """Seed of the looks of the first episode, which counts up; None: as recorded."""
+    truth: frozenset[Modality] = frozenset()
+    """Modalities written beside the pictures."""
 
 
 @dataclass(frozen=True)

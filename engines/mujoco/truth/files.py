@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from engines.mujoco.truth.sight import Viewpoint
 __all__ = [
     "DEPTH_STEP_M",
     "camera_json",
+    "depth_steps",
     "frame_json",
     "instance_picture",
     "scene_json",
@@ -38,14 +40,19 @@ DEPTH_STEP_M = 1e-4
 
 
 def write_frame(
-    directory: Path, frame: TruthFrame, bodies: tuple[Body, ...], modalities: frozenset[Modality]
+    directory: Path,
+    frame: TruthFrame,
+    bodies: tuple[Body, ...],
+    modalities: frozenset[Modality],
+    scene: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
-    """Write the chosen modalities of a frame into an existing directory. Raises OSError if that fails."""
+    """Write the chosen modalities of a frame into an existing directory. Raises OSError if that fails.
+
+    `scene`: what truth.json has beside the frame's own numbers.
+    """
     sight, arrays = frame.sight, dict[str, NDArray[Any]]()
     if "depth" in modalities:
-        write_png(
-            directory / "depth.png", np.rint(sight.depth / DEPTH_STEP_M).clip(0, 65535).astype(np.uint16)
-        )
+        write_png(directory / "depth.png", depth_steps(sight.depth))
         arrays["depth"] = sight.depth
     if "segmentation" in modalities:
         write_png(directory / "segmentation.png", sight.classes)
@@ -58,8 +65,13 @@ def write_frame(
         arrays["flow_visible"] = frame.motion.is_visible
     if arrays:
         np.savez_compressed(directory / "truth.npz", allow_pickle=False, **arrays)
-    content = scene_json(bodies) | frame_json(frame, keypoints="keypoints" in modalities)
+    content = {**scene, **frame_json(frame, keypoints="keypoints" in modalities)}
     (directory / "truth.json").write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
+def depth_steps(depth: NDArray[np.float32]) -> NDArray[np.uint16]:
+    """Return depths, m, in steps of `DEPTH_STEP_M`; farther ones than fit are the farthest that fits."""
+    return np.rint(depth / DEPTH_STEP_M).clip(0, 65535).astype(np.uint16)
 
 
 def write_png(file: Path, values: NDArray[np.uint16]) -> None:

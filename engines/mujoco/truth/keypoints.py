@@ -12,8 +12,7 @@ import numpy as np
 from engines.mujoco.params import SceneParams
 from engines.mujoco.truth.labels import Body
 from engines.mujoco.truth.sight import Sight, Viewpoint
-from engines.mujoco.truth.surfaces import geom_triangles, visible_geoms
-from robots import rotation
+from engines.mujoco.truth.surfaces import body_triangles
 from robots.dvrk.instruments import SHAFT_RADIUS
 from robots.dvrk.mounted import MountedPsm
 from robots.transform import inverse_transform, rigid_transform
@@ -93,7 +92,7 @@ def instruments(params: SceneParams, model: mujoco.MjModel) -> tuple[Instrument,
 def _instrument(arm: str, params: MountedPsm, model: mujoco.MjModel) -> Instrument:
     roll, *wrist = [joint.name for joint in params.tool.joints]
     body = model.body(f"{arm}/{roll}").id
-    height = _body_points(model, body, "shaft")[:, 2]
+    height = body_triangles(model, body, "shaft").vertices[:, 2]
     last, tip = model.body(f"{arm}/{params.chain.joints[-1].name}").id, params.chain.tip
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -108,24 +107,8 @@ def _instrument(arm: str, params: MountedPsm, model: mujoco.MjModel) -> Instrume
     for link in params.end_effector_links:
         if link.name not in parents:
             finger = model.body(f"{arm}/{link.name}").id
-            points[f"{link.name}_end"] = finger, _far_end(_body_points(model, finger))
+            points[f"{link.name}_end"] = finger, _far_end(body_triangles(model, finger).vertices)
     return Instrument(arm, params.tool.name, points, tip[:3, :3], (body, ends[0], ends[1]))
-
-
-def _body_points(model: mujoco.MjModel, body: int, part: str = "") -> Vector:
-    """Return the vertices of a body's visible geoms in the body's frame, shape (n, 3), m.
-
-    `part`: only of geoms or meshes whose names end so.
-    """
-    found: list[Vector] = []
-    for geom in visible_geoms(model):
-        mesh = int(model.geom_dataid[geom])
-        kind, number = (mujoco.mjtObj.mjOBJ_MESH, mesh) if mesh >= 0 else (mujoco.mjtObj.mjOBJ_GEOM, geom)
-        name = mujoco.mj_id2name(model, kind, number) or ""
-        if int(model.geom_bodyid[geom]) == body and name.endswith(part):
-            turn = rotation.matrix(np.roll(model.geom_quat[geom], -1))
-            found.append(geom_triangles(model, geom).vertices @ turn.T + model.geom_pos[geom])
-    return np.concatenate(found)
 
 
 def _far_end(points: Vector) -> Vector:

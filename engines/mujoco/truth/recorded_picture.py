@@ -7,7 +7,7 @@ from pathlib import Path
 from PIL import Image
 
 from engines.mujoco.pictures.recorded_scene import Camera, Point, RecordedScene
-from engines.mujoco.truth.files import write_frame
+from engines.mujoco.truth.files import scene_json, write_frame
 from engines.mujoco.truth.modality import Modality
 from engines.mujoco.truth.recorded_truth import RecordedTruth
 from robots.dvrk.endoscope import Eye
@@ -50,4 +50,4 @@ def write_truth(
     with RecordedTruth(scene.states, params, bodies) as truth:
         after_ns = time_ns + step_ns if "flow" in modalities else None
         frame = next(truth.frames([time_ns], (eye,), after_ns))[eye]
-        write_frame(directory, frame, truth.bodies, modalities)
+        write_frame(directory, frame, truth.bodies, modalities, scene_json(truth.bodies))

@@ -9,14 +9,18 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.recorded_states import RecordedStates
 from engines.mujoco.pictures.soft_body import SoftBody
+from engines.mujoco.pictures.solid_meshes import Triangles
 from engines.mujoco.truth.keypoints import Keypoint
 from engines.mujoco.truth.labels import Body
+from engines.mujoco.truth.projection import Projection
 from engines.mujoco.truth.sight import Motion, Sight, Viewpoint
+from engines.mujoco.truth.surfaces import body_triangles
 from engines.mujoco.truth.truth_scene import Instant, TruthScene
 from robots.dvrk.endoscope import Eye
 from schemas.errors import TrocarError
@@ -75,6 +79,23 @@ class RecordedTruth:
     def bodies(self) -> tuple[Body, ...]:
         """All bodies that pictures may show."""
         return self.scene.bodies
+
+    @property
+    def projection(self) -> Projection:
+        """The camera of either eye."""
+        return self.scene.projection
+
+    def silhouette(self, frame: TruthFrame, body: Body) -> NDArray[np.bool_]:
+        """Return the pixels, shape (height, width), that a body would have alone in the scene.
+
+        `frame`: the one yielded last, without motion.
+        """
+        return self.scene.silhouette(frame.sight, body)
+
+    def model(self, body: Body) -> Triangles:
+        """Return the triangles of a rigid body in the body's frame, m."""
+        model = self.scene.model
+        return body_triangles(model, model.body(body.name).id)
 
     def frames(
         self, times_ns: Sequence[int], eyes: tuple[Eye, ...], after_ns: int | None = None

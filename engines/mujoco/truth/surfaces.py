@@ -18,10 +18,11 @@ from engines.mujoco.pictures.skin_mesh import SkinMesh
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.solid_meshes import Triangles, solid_mesh
 from engines.mujoco.truth.scene_class import LIQUIDS, SURFACES, SceneClass
+from robots import rotation
 from schemas.soft_surface import FILM_STEP_M
 from schemas.vectors import Vector
 
-__all__ = ["Piece", "Surfaces", "geom_triangles", "rigid_piece", "soft_piece", "visible_geoms"]
+__all__ = ["Piece", "Surfaces", "body_triangles", "rigid_piece", "soft_piece", "visible_geoms"]
 
 _SHOWN_GROUPS = 3
 """Geoms of these first groups are drawn; collision shapes are in the next."""
@@ -100,7 +101,7 @@ def rigid_piece(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, body: int, scene_class: SceneClass
 ) -> Piece:
     """Return the triangles of a geom of the model, moved by `data`."""
-    shape = geom_triangles(model, geom)
+    shape = _geom_triangles(model, geom)
 
     def vertices() -> Vector:
         return shape.vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
@@ -143,7 +144,30 @@ def _kind_classes(outside: SceneClass) -> NDArray[np.uint16]:
     return classes
 
 
-def geom_triangles(model: mujoco.MjModel, geom: int) -> Triangles:
+def body_triangles(model: mujoco.MjModel, body: int, part: str = "") -> Triangles:
+    """Return the triangles of a body's visible geoms in the body's frame, m.
+
+    `part`: only of geoms or meshes whose names end so.
+    """
+    vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
+    for geom in visible_geoms(model):
+        if int(model.geom_bodyid[geom]) != body or not _geom_name(model, geom).endswith(part):
+            continue
+        shape, turn = _geom_triangles(model, geom), rotation.matrix(np.roll(model.geom_quat[geom], -1))
+        vertices.append(shape.vertices @ turn.T + model.geom_pos[geom])
+        faces.append(shape.faces + count)
+        count += len(shape.vertices)
+    return Triangles(np.concatenate(vertices), np.concatenate(faces))
+
+
+def _geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """Return the name of a geom's mesh, or of the geom without mesh."""
+    mesh = int(model.geom_dataid[geom])
+    kind, number = (mujoco.mjtObj.mjOBJ_MESH, mesh) if mesh >= 0 else (mujoco.mjtObj.mjOBJ_GEOM, geom)
+    return mujoco.mj_id2name(model, kind, number) or ""
+
+
+def _geom_triangles(model: mujoco.MjModel, geom: int) -> Triangles:
     """Return the triangles of a geom in the geom's own frame."""
     mesh = int(model.geom_dataid[geom])
     if mesh < 0:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from engines.mujoco.model import place as place_arms
 from engines.mujoco.model import spec
@@ -15,10 +16,11 @@ from engines.mujoco.pictures.camera_mount import CameraMount
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.surroundings import make_place
+from engines.mujoco.pictures.variation import Variation
 from engines.mujoco.place.part import PlacePart
 from engines.mujoco.truth.id_buffer import IdBuffer
 from engines.mujoco.truth.keypoints import instruments
-from engines.mujoco.truth.labels import label_bodies, rigid_class
+from engines.mujoco.truth.labels import Body, label_bodies, rigid_class
 from engines.mujoco.truth.projection import Projection
 from engines.mujoco.truth.scene_class import SceneClass, tissue_class
 from engines.mujoco.truth.sight import Motion, Sight, Viewpoint
@@ -71,7 +73,8 @@ class TruthScene:
         if self._params.looks != "endoscope":
             return []
         lens = self._mount.pose(self.data)[:3, 3]
-        return make_place(self._params, self.model, self._soft, lens)
+        seed = Variation(self._params.randomise).place_seed
+        return make_place(self._params, self.model, self._soft, lens, seed)
 
     def _named(self, owners: list[int]) -> Iterator[tuple[str, SceneClass]]:
         for owner in owners:
@@ -123,6 +126,13 @@ class TruthScene:
         corners = view.to_camera(vertices)[surfaces.faces]
         drawn = self._buffer.draw(corners, self.projection.drawn_intrinsics, self._mount.clip)
         return Sight(surfaces, vertices, view, self.projection.pick(drawn))
+
+    def silhouette(self, sight: Sight, body: Body) -> NDArray[np.bool_]:
+        """Return the pixels, shape (height, width), that a body would have alone, at the last state."""
+        own = self._surfaces.faces[self._surfaces.bodies == body.id]
+        corners = sight.view.to_camera(self._surfaces.vertices())[own]
+        drawn = self._buffer.draw(corners, self.projection.drawn_intrinsics, self._mount.clip)
+        return self.projection.pick(drawn) >= 0
 
     def close(self) -> None:
         """Free the OpenGL context. May be called twice."""
