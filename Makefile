@@ -7,7 +7,7 @@ NEEDS := ros or browser or release or search
 PYTEST := pytest -n 4 --dist loadgroup
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: demo test test-all check docs format clean
+.PHONY: demo test test-all check docs gallery format clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.all ## run the palpation scenario, record it and write a report
@@ -23,6 +23,9 @@ test-all: test ## everything: also tests with ROS, a browser, fresh environments
 
 docs: $(VENV)/.dev ## the documentation, in build/site
 	NO_MKDOCS_2_WARNING=1 mkdocs build --strict
+
+gallery: $(VENV)/.dev ## the pictures and films of docs/gallery.md, drawn from the scenarios
+	python docs/tools/gallery.py
 
 check: $(VENV)/.dev
 	ruff check .
