@@ -45,8 +45,11 @@ Robot = Annotated[
     typer.Option(metavar="NAME", help="Whose scene, where several participants are of kind mujoco."),
 ]
 LooksName = Annotated[
-    Literal["plain", "endoscope"],
-    typer.Option(help="endoscope: light, textures and surroundings as an endoscope sees them, by Filament."),
+    Literal["plain", "endoscope"] | None,
+    typer.Option(
+        help="endoscope: light, textures and surroundings as an endoscope sees them, by Filament; default:"
+        " looks of the recorded camera."
+    ),
 ]
 Trusted = Annotated[bool, typer.Option("--trust", help="Read files other than those it was recorded with.")]
 
@@ -81,7 +84,7 @@ def render(
     width: Pixels = 800,
     height: Pixels = 600,
     robot: Robot = None,
-    looks: LooksName = "plain",
+    looks: LooksName = None,
     trust: Trusted = False,
 ) -> None:
     """Draw the scene of a recording at one moment, with its soft bodies and markers."""
@@ -131,7 +134,7 @@ def film(
     width: Pixels = 800,
     height: Pixels = 600,
     robot: Robot = None,
-    looks: LooksName = "plain",
+    looks: LooksName = None,
     trust: Trusted = False,
 ) -> None:
     """Write a film of a recording, with title and time."""
@@ -169,7 +172,7 @@ def _open_scene(
     command: str,
     recording: Path,
     robot: str | None,
-    looks: Literal["plain", "endoscope"],
+    looks: Literal["plain", "endoscope"] | None,
     *,
     trust: bool,
     encoder: bool = False,

@@ -50,7 +50,7 @@ class RecordedScene:
         recording: Recording,
         robot: str | None = None,
         *,
-        looks: Literal["plain", "endoscope"] = "plain",
+        looks: Literal["plain", "endoscope"] | None = "plain",
         randomise: int | None = None,
         trust: bool = False,
     ) -> None:
@@ -59,14 +59,14 @@ class RecordedScene:
         Args:
             recording: of a session.
             robot: name of the participant.
-            looks: of all pictures.
+            looks: of all pictures; None: those of the recorded camera.
             randomise: seed of differences of what is seen, for the recorded one; None: as recorded.
             trust: allow changed files.
 
         Raises RecordingError if there is none, or if no scene can be built of its parameters, and TrustError
         if these name files with other contents than the recorded ones.
         """
-        self._recording, self._looks = recording, looks
+        self._recording = recording
         participants = recording.scenario().participants
         robots = [name for name, spec in participants.items() if spec.kind == "mujoco"]
         if not robots or robot not in (None, *robots):
@@ -89,6 +89,7 @@ class RecordedScene:
         self._skins = _skins(participants)
         self._endoscope = _recorded_camera(participants, in_room=False)
         self._room = _recorded_camera(participants, in_room=True)
+        self._looks = looks or _recorded_looks(participants)
         for camera in () if randomise is None else (self._endoscope, self._room):
             camera["randomise"] = (camera.get("randomise") or {}) | {"seed": randomise}
 
@@ -261,6 +262,12 @@ def _recorded_camera(participants: Mapping[str, ParticipantSpec], *, in_room: bo
         if spec.kind == "endoscope" and (spec.params.get("view") is not None) == in_room:
             return {name: value for name, value in spec.params.items() if name in names}
     return {}
+
+
+def _recorded_looks(participants: Mapping[str, ParticipantSpec]) -> Literal["plain", "endoscope"]:
+    """Return the looks of the scenario's cameras: `endoscope` if any has them."""
+    looks = [spec.params.get("looks") for spec in participants.values() if spec.kind == "endoscope"]
+    return "endoscope" if "endoscope" in looks else "plain"
 
 
 def _reduce_picture(picture: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:

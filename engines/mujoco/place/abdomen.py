@@ -27,6 +27,8 @@ _HOLLOW = 0.012
 _LOOP_RADIUS, _LOOPS = 0.0125, 3
 _NEAREST_LOOP = 0.045
 """Least distance of a loop from the middle of the organs, m: a small organ lies alone on the bed."""
+_CLOSE_LOOP, _FAR_LOOP = (24, 150), (14, 90)
+"""Cells around and points along the nearest loop, which may be close to the lens, and the others."""
 _BEND = 0.065
 """Way along a loop from bend to bend, m: tighter ones would fold it into itself."""
 _CLEAR_ANGLE = 1.05
@@ -84,7 +86,7 @@ def _wall(centre: Vector, radius: float, height: float, seed: int) -> PlacePart:
     part = sheet(
         place, (round(2.0 * np.pi * radius / 0.12) * 0.12, 0.24), (32, 12), TISSUES["peritoneum"], 0.12
     )
-    return part._replace(faces=part.faces[:, ::-1])
+    return part._replace(faces=part.faces[:, ::-1], is_shaded=False)
 
 
 def _loops(centre: Vector, footprint: float, radius: float, towards: float, seed: int) -> Iterator[PlacePart]:
@@ -96,7 +98,8 @@ def _loops(centre: Vector, footprint: float, radius: float, towards: float, seed
         if distance > 0.95 * radius:
             return
         start, end = towards + _CLEAR_ANGLE, towards + 2.0 * np.pi - _CLEAR_ANGLE
-        steps = np.linspace(0.0, 1.0, 150)
+        around, pieces = _CLOSE_LOOP if loop == 0 else _FAR_LOOP
+        steps = np.linspace(0.0, 1.0, pieces)
         turn = start + (end - start) * steps
         bends = max(3, round(2.0 * np.pi * distance / _BEND))
         across = (
@@ -109,11 +112,14 @@ def _loops(centre: Vector, footprint: float, radius: float, towards: float, seed
             0.55 + 0.5 * np.sin(0.6 * bends * turn + 1.7 * loop + turned[loop])
         )
         z -= 2.5 * _LOOP_RADIUS * np.clip(1.0 - 9.0 * np.minimum(steps, 1.0 - steps), 0.0, 1.0)
-        yield _tube(centre + np.stack([x, y, z], axis=1), _LOOP_RADIUS, loop)
+        yield _tube(centre + np.stack([x, y, z], axis=1), _LOOP_RADIUS, around, loop)
 
 
-def _tube(line: Vector, radius: float, seed: int) -> PlacePart:
-    """Return a tube of bowel along a line, shape (k, 3), m: narrower and wider by turns."""
+def _tube(line: Vector, radius: float, around: int, seed: int) -> PlacePart:
+    """Return a tube of bowel along a line, shape (k, 3), m: narrower and wider by turns.
+
+    `around`: cells around it.
+    """
     ways = np.gradient(line, axis=0)
     steps = np.linalg.norm(ways, axis=1)
     ahead = ways / steps[:, None]
@@ -131,5 +137,5 @@ def _tube(line: Vector, radius: float, seed: int) -> PlacePart:
         across = np.cos(turn)[:, None] * aside[index] + np.sin(turn)[:, None] * up[index]
         return line[index] + width[index, None] * across
 
-    part = sheet(place, (0.08, float(along[-1])), (24, len(line) - 1), TISSUES["bowel"], 0.08)
-    return part._replace(faces=part.faces[:, ::-1])
+    part = sheet(place, (0.08, float(along[-1])), (around, len(line) - 1), TISSUES["bowel"], 0.08)
+    return part._replace(faces=part.faces[:, ::-1], is_shaded=False)

@@ -26,6 +26,8 @@ class PlacePart(NamedTuple):
     recipe: Recipe
     tile: float
     """Side of a tile, m."""
+    is_shaded: bool = True
+    """Whether shadows fall on it: a third of the cost of a picture, hardly seen far from instruments."""
 
 
 def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:

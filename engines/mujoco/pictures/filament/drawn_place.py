@@ -48,7 +48,9 @@ def _add(
     layout = vertex_layout(len(frames.source), frames.faces.size)
     mesh = context.create_mesh(layout)
     write_mesh(mesh, layout, frames.vertices(part.vertices), frames.faces.astype(np.uint32))
-    renderable = context.create_renderable(mjrf.RenderableParams(cast_shadow=False, receive_shadow=True))
+    renderable = context.create_renderable(
+        mjrf.RenderableParams(cast_shadow=False, receive_shadow=part.is_shaded)
+    )
     renderable.set_mesh(mesh, 0, frames.faces.size)
     renderable.set_material(textures.material())
     scene.add_renderable(renderable)
