@@ -1,5 +1,7 @@
 """A server's bad days in a session: each is named, the arm holds, the recording is marked and verifies."""
 
+from time import sleep
+
 import numpy as np
 import pytest
 
@@ -127,3 +129,19 @@ def test_a_contract_that_the_server_contradicts_ends_the_session_at_its_start(tm
         pytest.raises(ParticipantError, match=r"rate: the policy has 30\.0, the contract 100\.0"),
     ):
         run(tmp_path, address)
+
+
+def test_answers_that_are_late_are_late(tmp_path):
+    """An answer of 50 ms of rows comes after a second: none of them is executed."""
+
+    def late(observation, connection):
+        sleep(1.0)
+        return good()
+
+    with openpi_server(late) as (address, _):
+        values = {"pace": "realtime", "duration": "3 s", "participants.policy.time": "wall"}
+        run(tmp_path, address, **values)
+    recording = trocar.Recording(tmp_path / "recording")
+    assert recording["governor.late"]["data"][-1] >= 1
+    assert recording["governor.answers"]["data"][-1] == 0
+    assert not list(recording["governor.PSM1/servo_cp"].messages())
