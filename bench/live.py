@@ -46,6 +46,7 @@ LEFT_OUT = {
     "browser": "a person drives it from a page",
     "keys": "a person drives it by the keyboard",
     "peg-board-keys": "a person drives it by the keyboard",
+    "ros-policy": "a policy's server drives a real arm",
 }
 """Scenarios that do not run by themselves."""
 
