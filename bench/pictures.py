@@ -6,7 +6,8 @@ The scene: an instrument over a lobe of liver in an abdomen, 320 x 288 pixels fo
 moved for every pair. Both looks draw the same states in one process in turns; `ratio` is the median of
 the rounds' ratios of CPU time, all threads counted. `pairs_per_cpu_second` depends on the machine.
 `first_picture_s` has all shaders to compile, unless the driver has kept them on disk. `update_ms` is the
-part of a pair for vertices and tangent frames of the tissue, and their upload.
+part of a pair for vertices and tangent frames of the tissue, and their upload. `truth`: segmentation and
+depth against ray casting, flow against moved points (`bench.picture_truth`).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.picture_truth import measure_truth
 from engines.mujoco import model
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
@@ -135,7 +137,7 @@ def main() -> None:
         sys.exit(f"Filament: {found.detail or 'runs'}; OpenGL: {gl.detail}. To fix it: {backend.REMEDY}")
     result = {"filament": f"{found.name}{' on the CPU' if found.software else ''}"} | measure(found, gl.name)
     if wants_json:
-        print(json.dumps(result, indent=2))
+        print(json.dumps(result | {"truth": measure_truth(gl.name)}, indent=2))
         return
     for name, value in result.items():
         print(f"{name}: {value if isinstance(value, str) else round(value, 2)}")
