@@ -46,7 +46,7 @@ class Instrument:
     """Name of the instrument, `LARGE_NEEDLE_DRIVER_400006`."""
     points: Mapping[str, tuple[int, Vector]]
     """Body, and place in the body's frame, shape (3,), m, by name: `shaft_end`, joints of the wrist, `tip`,
-    ends of the fingers.
+    ends of fingers or blade.
     """
     tip_turn: Vector
     """Turn of the tip frame in its body, shape (3, 3)."""
@@ -104,10 +104,10 @@ def _instrument(arm: str, params: MountedPsm, model: mujoco.MjModel) -> Instrume
     points |= {name: (model.body(f"{arm}/{name}").id, np.zeros(3)) for name in wrist}
     points["tip"] = last, tip[:3, 3]
     parents = {link.parent for link in params.end_effector_links}
-    for link in params.end_effector_links:
-        if link.name not in parents:
-            finger = model.body(f"{arm}/{link.name}").id
-            points[f"{link.name}_end"] = finger, _far_end(body_triangles(model, finger).vertices)
+    fingers = [link.name for link in params.end_effector_links if link.name not in parents]
+    for name in fingers or wrist[-1:]:  # a hook or a blade is fixed to the last link
+        finger = model.body(f"{arm}/{name}").id
+        points[f"{name}_end"] = finger, _far_end(body_triangles(model, finger).vertices)
     return Instrument(arm, params.tool.name, points, tip[:3, :3], (body, ends[0], ends[1]))
 
 

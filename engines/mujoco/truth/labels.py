@@ -74,4 +74,8 @@ def _instrument_class(arm: MountedPsm, link: str) -> SceneClass:
     wrist = [joint.name for joint in arm.tool.joints]
     if link not in wrist:
         return SceneClass.ARM
-    return SceneClass.SHAFT if link == wrist[0] else SceneClass.WRIST
+    if link == wrist[0]:
+        return SceneClass.SHAFT
+    # a hook, a blade or a sphere is fixed to the last link
+    is_tool = link == wrist[-1] and not arm.end_effector_links
+    return SceneClass.JAW if is_tool else SceneClass.WRIST

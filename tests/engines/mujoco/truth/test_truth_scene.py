@@ -268,3 +268,16 @@ def test_shaft_edges_bound_the_shaft(over_tissue: TruthScene) -> None:
     assert low.max() < 1.0
     assert high.min() < 1.5
     assert low.max() > -1.5
+
+
+def test_a_hook_is_the_working_end_of_its_instrument(gl: str) -> None:
+    arm = {**TISSUE["arms"]["PSM1"], "instrument": "PERMANENT_CAUTERY_HOOK_400183"}
+    params = EndoscopeParams.model_validate(TISSUE | {"arms": TISSUE["arms"] | {"PSM1": arm}, "skins": {}})
+    scene = TruthScene(params, gl)
+    sight = scene.look(start_positions(params), ("left",)).sights["left"]
+    assert (sight.classes == SceneClass.JAW).any()
+    (instrument,) = scene.instruments
+    points = instrument.keypoints(scene.data, sight, scene.bodies)
+    u, v = np.rint(points["wrist_yaw_end"].pixel).astype(int)
+    assert SceneClass.JAW in sight.classes[v - 1 : v + 2, u - 1 : u + 2]
+    scene.close()
