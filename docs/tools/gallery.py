@@ -58,7 +58,7 @@ class Shot(NamedTuple):
 
 
 _FILM = (480, 384)
-_NEAR, _TABLE = (0.075, -0.1, 0.075), (0.0, -0.008, 0.028)
+_NEAR, _TABLE = (0.075, -0.1, 0.085), (0.0, -0.008, 0.048)
 """Where a camera stands, and looks at, beside the needle of `pick` and `hand-over`, m."""
 SHOTS = (
     Shot("cart", "cart", 2.0, 1.0, camera="overview", looks="plain"),

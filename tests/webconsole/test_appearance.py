@@ -131,6 +131,24 @@ def test_the_browser_draws_textures_blood_and_surroundings(person):
     assert person.errors == []
 
 
+def test_smoke_rises_from_where_tissue_was_burnt_last(person):
+    person.page.get_by_role("slider", name="Instant of the recording").fill("0.4")
+    person.sees("Boolean(trocar.scene.surfaces[0].burnt)")
+    seen = person.page.evaluate("""() => {
+      const { scene } = trocar, { burnt } = scene.surfaces[0]
+      for (let i = 0; i < 10; i++) scene.smokes(0, 0.004, i / 10)
+      const many = scene.smoke.puffs.length
+      const highest = Math.max(...scene.smoke.puffs.map(({ sprite }) => sprite.position.z))
+      const near = scene.smoke.puffs.every(({ from }) => from.distanceTo(burnt) < 1e-6)
+      for (let i = 10; i < 40; i++) scene.smokes(0, 0, i / 10)
+      const left = scene.smoke.puffs.filter(({ sprite }) => sprite.visible).length
+      scene.smokes(0, 0.004, 0)
+      return { many, rises: highest > burnt.z + 0.01, near, left, anew: scene.smoke.puffs.length }
+    }""")
+    assert seen == {"many": 9, "rises": True, "near": True, "left": 0, "anew": 0}
+    assert person.errors == []
+
+
 def test_the_choice_is_kept_and_textures_are_loaded_once(person):
     person.page.get_by_label("Looks of the scene").select_option("simple")
     person.sees("trocar.scene.level === 'simple'")

@@ -13,6 +13,7 @@ from schemas.errors import MessageError
 from schemas.scenario import Scenario
 from schemas.soft_surface import FaceKind, SoftSurface
 from schemas.trocar_msgs import SoftBodyState, SurfaceChange, SurfaceFilm
+from schemas.vectors import VectorCodec
 from tests.engines.tissue.cut_block import CutBlock
 from tests.webconsole.conftest import served
 from tests.webconsole.recorded_cut import STEP_NS, film_at, nodes_at, write_cut
@@ -102,6 +103,16 @@ def test_a_strangers_film_is_a_problem_of_its_surface_alone():
     damaged = film.model_copy(update={"nodes": film.nodes[::-1].copy()})
     with pytest.raises(MessageError, match="ascending"):
         stage.film("tissue.block/nodes", Value(0, encode(damaged)))
+
+
+def test_a_page_gets_the_smoke_of_a_surface():
+    port = signal_out("block/smoke", unit="g/s")
+    stage = Stage(SCENARIO, (*OUTLETS, Outlet("tissue", port)), lambda _: Params())
+    assert stage.smokes == {"tissue.block/nodes": "tissue.block/smoke"}
+    assert "tissue.block/smoke" in stage.shown
+    value = Value(0, VectorCodec(port).encode(np.array([0.004]), 0))
+    section = stage.smoke("tissue.block/nodes", value)
+    assert (section.kind, np.frombuffer(section.content, "<f4")[0]) == (SectionKind.SMOKE, np.float32(0.004))
 
 
 def test_a_strangers_change_is_a_problem_of_its_surface_alone():

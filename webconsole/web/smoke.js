@@ -5,7 +5,7 @@ import * as THREE from "./vendor/three.module.js"
 const PUFFS = 28, EVERY_S = 0.08, LIFE_S = 1.6
 const RISE_M_PER_S = 0.03, SPREAD_M_PER_S = 0.006
 const FIRST_M = 0.004, LAST_M = 0.03
-const THICK_G_PER_S = 8e-3, THICKEST = 0.35, LEAST_G_PER_S = 2e-5
+const THICK_G_PER_S = 8e-3, THICKEST = 0.8, LEAST_G_PER_S = 2e-5
 
 export class Smoke {
   constructor(world) {
@@ -37,7 +37,6 @@ export class Smoke {
   puff(rate, place, time) {
     if (this.puffs.length < PUFFS) {
       const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: disc(), transparent: true, depthWrite: false, color: 0xd8d8d6 }))
-      sprite.userData.marker = true
       this.world.add(sprite)
       this.puffs.push({ sprite })
     }
@@ -68,7 +67,7 @@ function disc() {
     const turn = 2.4 * i, reach = (half / 2) * Math.sqrt(i / 14), radius = half / 2.2
     const [x, y] = [half + reach * Math.cos(turn), half + reach * Math.sin(turn)]
     const shade = onto.createRadialGradient(x, y, 0, x, y, radius)
-    shade.addColorStop(0, "rgba(255, 255, 255, 0.22)")
+    shade.addColorStop(0, "rgba(255, 255, 255, 0.3)")
     shade.addColorStop(1, "rgba(255, 255, 255, 0)")
     onto.fillStyle = shade
     onto.fillRect(0, 0, 2 * half, 2 * half)
