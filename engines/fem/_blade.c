@@ -19,7 +19,7 @@ toughness times swept area. An edge pushes forward only; backwards it leaves its
 
 typedef struct {
     int32_t node[4];
-    double share[4], edge[3], forward[3], goal[3], mass, width, impulse[3];
+    double share[4], weight[4], edge[3], forward[3], goal[3], mass, width, impulse[3];
     double most, borne; /* impulse of slipping, and its part that the mesh bears */
 } Front;
 
@@ -297,6 +297,7 @@ static int prepare(const Body *body, const Spheres *spheres, const Edges *edges,
         front->goal[i] = (goal[i] - x[i]) / seconds;
     for (int a = 0; a < 4; a++) {
         front->node[a] = *corner_of(body, element, a);
+        front->weight[a] = front->share[a] * (double)body->inverse_mass[front->node[a]];
         inverse += front->share[a] * front->share[a] * (double)body->inverse_mass[front->node[a]];
     }
     front->mass = inverse > 0.0 ? 1.0 / inverse : 0.0;
@@ -330,8 +331,7 @@ static void push(const Body *body, Front *front)
         double change = kept * wanted[i] - front->impulse[i];
         front->impulse[i] += change;
         for (int a = 0; a < 4; a++)
-            body->velocity[4 * front->node[a] + i] +=
-                (float)(front->share[a] * (double)body->inverse_mass[front->node[a]] * change);
+            body->velocity[4 * front->node[a] + i] += (float)(front->weight[a] * change);
     }
 }
 

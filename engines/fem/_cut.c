@@ -11,6 +11,7 @@ sub-steps are made: both sides are smooth. Mass stays with the elements.
 #define SAME_SIDE 0.35     /* sine of the least angle between faces of different sides of the surface */
 #define LEAST_ALONG 0.5    /* sine of the least angle between cut and surface for a move along the surface */
 #define EDGE_SLACK 1e-9    /* of a triangle's edges, in its own coordinates: neighbours leave no gap */
+#define BOX_SLACK 1e-8     /* m: of a box around triangles, more than the slack of their edges */
 #define POWER_ITERATIONS 12
 
 /* Middle of an element of the uncut mesh: moved nodes must not carry it across what has been swept already. */
@@ -167,6 +168,17 @@ static void place_on(Body *body, int32_t node, const double *triangle, const int
     memcpy(rest, before, sizeof before);
 }
 
+/* Whether the way from a to b may meet what a box contains. */
+static int may_meet(const double a[3], const double b[3], const double low[3], const double high[3])
+{
+    int beside = 0;
+    for (int i = 0; i < 3; i++) {
+        double least = low[i] - BOX_SLACK, most = high[i] + BOX_SLACK;
+        beside |= (a[i] < least && b[i] < least) || (a[i] > most && b[i] > most);
+    }
+    return !beside;
+}
+
 /* Number of the first triangle on the way between the middles of two elements, or -1. */
 static int first_crossed(const double a[3], const double b[3], const double *triangles, int count)
 {
@@ -186,8 +198,8 @@ int cut_along(Body *body, const double *triangles, int count)
             low[i] = triangles[3 * k + i] < low[i] ? triangles[3 * k + i] : low[i];
             high[i] = triangles[3 * k + i] > high[i] ? triangles[3 * k + i] : high[i];
         }
-        low[i] -= (double)body->limits[3], high[i] += (double)body->limits[3];
     }
+    double around = (double)body->limits[3];
     int elements = 4 * body->blocks, near = 0, found = 0, opened = -1;
     int32_t *close = PyMem_RawMalloc(sizeof(int32_t) * (size_t)elements);
     int32_t *faces = PyMem_RawMalloc(sizeof(int32_t) * (size_t)elements * 8), *by = faces + 4 * elements;
@@ -197,14 +209,17 @@ int cut_along(Body *body, const double *triangles, int count)
             if (is_gone(body, e))
                 continue;
             middle_of(body, e, a);
-            if (a[0] < low[0] || a[1] < low[1] || a[2] < low[2] || a[0] > high[0] || a[1] > high[1] || a[2] > high[2])
+            int is_far = 0;
+            for (int i = 0; i < 3; i++)
+                is_far |= a[i] < low[i] - around || a[i] > high[i] + around;
+            if (is_far)
                 continue;
             close[near++] = e;
             for (int f = 4 * e; f < 4 * e + 4; f++) {
                 if (body->across[f] < 0)
                     continue;
                 middle_of(body, body->across[f] / 4, b);
-                int t = first_crossed(a, b, triangles, count);
+                int t = may_meet(a, b, low, high) ? first_crossed(a, b, triangles, count) : -1;
                 if (t >= 0)
                     faces[found] = f, by[found++] = t;
             }

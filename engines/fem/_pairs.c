@@ -36,8 +36,16 @@ int have_moved(const Pairs *pairs)
     return 0;
 }
 
-/* Bring the places of the vertices up to date. */
-void place_vertices(Pairs *pairs)
+/* Bring the places of the vertices up to date that have pairs, or belong to the faces of pairs. */
+void place_used(Pairs *pairs)
+{
+    for (int n = 0; n < pairs->uses; n++) {
+        const Vertex *vertex = pairs->vertex + pairs->used[n];
+        place_of(pairs, vertex->body, vertex->node, pairs->place + 3 * pairs->used[n]);
+    }
+}
+
+static void place_vertices(Pairs *pairs)
 {
     for (int k = 0; k < pairs->vertices; k++)
         place_of(pairs, pairs->vertex[k].body, pairs->vertex[k].node, pairs->place + 3 * k);
@@ -50,6 +58,7 @@ void free_pairs(Pairs *pairs)
     PyMem_RawFree(pairs->vertex);
     PyMem_RawFree(pairs->before);
     PyMem_RawFree(pairs->start);
+    PyMem_RawFree(pairs->used);
     PyMem_RawFree(pairs->pair);
 }
 
@@ -75,13 +84,15 @@ static int find_room(Pairs *pairs)
         PyMem_RawFree(pairs->place);
         PyMem_RawFree(pairs->before);
         PyMem_RawFree(pairs->start);
+        PyMem_RawFree(pairs->used);
         pairs->room = most;
+        pairs->used = PyMem_RawMalloc(sizeof(int32_t) * (size_t)most);
         pairs->vertex = PyMem_RawMalloc(sizeof(Vertex) * (size_t)most);
         pairs->place = PyMem_RawMalloc(sizeof(double) * 3 * (size_t)most);
         pairs->before = PyMem_RawMalloc(sizeof(float) * 3 * (size_t)most);
         pairs->start = PyMem_RawMalloc(sizeof(int32_t) * ((size_t)most + 1));
     }
-    return pairs->changes && pairs->vertex && pairs->place && pairs->before && pairs->start ? 0 : -1;
+    return pairs->changes && pairs->vertex && pairs->place && pairs->before && pairs->start && pairs->used ? 0 : -1;
 }
 
 /* Collect the vertices of a body, and mark them as 0 among -1 in `place`. */
@@ -265,6 +276,20 @@ static int sort_pairs(Pairs *pairs, const Found *found)
     return 0;
 }
 
+/* Collect the vertices of the pairs and of their faces. */
+static void find_used(Pairs *pairs)
+{
+    for (int k = 0; k < pairs->vertices; k++)
+        pairs->used[k] = pairs->start[k] < pairs->start[k + 1];
+    for (int p = 0; p < pairs->start[pairs->vertices]; p++)
+        for (int a = 0; a < 3; a++)
+            pairs->used[pairs->pair[p].corner[a]] = 1;
+    pairs->uses = 0;
+    for (int k = 0; k < pairs->vertices; k++)
+        if (pairs->used[k])
+            pairs->used[pairs->uses++] = k;
+}
+
 /* Find the vertices near all faces; return -1 without memory. */
 static int look_everywhere(const Pairs *pairs, const Grid *grid, const Stars *stars, Found *found)
 {
@@ -296,6 +321,8 @@ int find_pairs(Pairs *pairs)
         int made = make_grid(pairs, &grid);
         failed = made < 0 || (made && look_everywhere(pairs, &grid, stars, &found)) || sort_pairs(pairs, &found);
     }
+    if (!failed)
+        find_used(pairs);
     for (int b = 0; b < pairs->bodies && !failed; b++)
         pairs->changes[b] = pairs->body[b]->changes;
     pairs->are_known = !failed;

@@ -21,6 +21,8 @@ typedef struct {
     float *before;        /* (room, 3): displacements when the pairs were found */
     int32_t *start;       /* (room + 1,): first pair by vertex */
     Pair *pair;
+    int uses;
+    int32_t *used;        /* (room,): vertices of pairs and of their faces, ascending */
 } Pairs;
 
 /* Place of a node in the frame of all bodies. */
@@ -31,7 +33,7 @@ static inline void place_of(const Pairs *pairs, int body, int32_t node, double x
         x[i] = pairs->middle[3 * body + i] + (double)own->rest[4 * node + i] + (double)own->displacement[4 * node + i];
 }
 
-void place_vertices(Pairs *pairs);
+void place_used(Pairs *pairs);
 int have_moved(const Pairs *pairs);
 int find_pairs(Pairs *pairs);
 void free_pairs(Pairs *pairs);

@@ -13,15 +13,15 @@ int read_way(Solid *self, PyObject *args, Way *way, Course *course)
 {
     Py_buffer *held = way->held;
     memset(way, 0, sizeof *way);
-    if (!PyArg_ParseTuple(args, "y*y*y*w*ffiffy*y*w*w*w*w*", held, held + 1, held + 2, held + 3, &way->spheres.friction,
-                          &course->seconds, &course->sub_steps, &course->gravity, &way->drag, held + 4, held + 9,
-                          held + 5, held + 6, held + 7, held + 8))
+    if (!PyArg_ParseTuple(args, "y*y*y*y*w*ffiffy*y*w*w*w*w*", held, held + 10, held + 1, held + 2, held + 3,
+                          &way->spheres.friction, &course->seconds, &course->sub_steps, &course->gravity, &way->drag,
+                          held + 4, held + 9, held + 5, held + 6, held + 7, held + 8))
         return -1;
     Spheres *spheres = &way->spheres;
     Edges *edges = &way->edges;
     way->body = &self->body;
     spheres->count = (int)(held[1].len / (Py_ssize_t)sizeof(double));
-    spheres->path = held[0].buf, spheres->radius = held[1].buf, spheres->free = held[2].buf;
+    spheres->path = held[0].buf, way->middle = held[10].buf, spheres->radius = held[1].buf, spheres->free = held[2].buf;
     spheres->force = held[3].buf;
     edges->count = (int)(held[4].len / 8);
     edges->samples = edges->count ? (int)(held[5].len / 4) / edges->count : 0;
@@ -40,10 +40,10 @@ void release_way(Way *way)
         PyBuffer_Release(way->held + k);
 }
 
-PyDoc_STRVAR(advance_doc, "advance(path, radius, free, force, friction, seconds, sub_steps, gravity, drag, ends, \
+PyDoc_STRVAR(advance_doc, "advance(path, middle, radius, free, force, friction, seconds, sub_steps, gravity, drag, ends, \
 toughness, element, front, ahead, area)\n--\n\n\
-Advance by sub-steps of `seconds` while spheres go along `path`, shape (sub_steps + 1, n, 3), m; add the force on each\n\
-sphere to `force`, shape (sub_steps, n, 3), N. The last arguments are edges of blades: `ends`, shape (e, 2), are\n\
+Advance by sub-steps of `seconds` while spheres go along `path`, shape (sub_steps + 1, n, 3), m, in the frame in which\n\
+`middle` is the body's; write the force on each sphere to `force`, shape (sub_steps, n, 3), N. The last arguments are edges of blades: `ends`, shape (e, 2), are\n\
 spheres; `toughness`, shape (e,), J/m^2, infinite of a blunt edge, negative of one that passes through; `element`,\n\
 shape (e, samples), `front` and `ahead`, shape (e, samples, 3), and `area` are their state.\n\
 Return how many faces have been cut open.");

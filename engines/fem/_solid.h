@@ -72,7 +72,7 @@ typedef struct {
     double *area;        /* (1,): swept so far, m^2 */
 } Edges;
 
-#define WAY_BUFFERS 10
+#define WAY_BUFFERS 11
 
 /* A body on its way through a step: its instruments, and memory. */
 typedef struct {
@@ -80,6 +80,8 @@ typedef struct {
     Spheres spheres;
     Edges edges;
     float drag;        /* damping over mass, 1/s */
+    const double *middle; /* of the body, in the frame in which the path is given */
+    double *path;      /* in the frame of the body */
     int *near;         /* faces near the spheres */
     int32_t *beside;   /* boxes and nodes near them */
     int besides;       /* their pairs */

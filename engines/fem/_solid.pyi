@@ -10,6 +10,7 @@ class Solid:
     def advance(
         self,
         path: NDArray[np.float64],
+        middle: NDArray[np.float64],
         radius: NDArray[np.float64],
         free: NDArray[np.uint8],
         force: NDArray[np.float64],

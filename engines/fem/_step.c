@@ -58,6 +58,7 @@ static void accelerate(const Body *body, float seconds, float gravity, float dra
 
 static void end_way(Way *way)
 {
+    PyMem_RawFree(way->path);
     PyMem_RawFree(way->near);
     PyMem_RawFree(way->beside);
     PyMem_RawFree(way->begun);
@@ -69,15 +70,21 @@ static void end_way(Way *way)
 static int begin_way(Way *way, int sub_steps, float seconds)
 {
     const Body *body = way->body;
-    const Spheres *spheres = &way->spheres;
+    Spheres *spheres = &way->spheres;
+    int numbers = 3 * spheres->count;
     size_t fronts = 3 * (size_t)(way->edges.count * way->edges.samples + 1);
+    way->path = PyMem_RawMalloc(sizeof(double) * ((size_t)(sub_steps + 1) * (size_t)numbers + 1));
     way->near = PyMem_RawMalloc(sizeof(int) * (size_t)(spheres->count + 1) * (MOST_NEAR + 1));
     way->beside = PyMem_RawMalloc(sizeof(int32_t) * (2 * (size_t)body->boxes * (size_t)body->nodes + 1));
     way->begun = PyMem_RawCalloc(fronts, sizeof(double));
     way->impulses = PyMem_RawCalloc(fronts, sizeof(double));
     way->triangles = PyMem_RawCalloc(6 * fronts, sizeof(double));
-    if (!way->near || !way->beside || !way->begun || !way->impulses || !way->triangles)
+    if (!way->path || !way->near || !way->beside || !way->begun || !way->impulses || !way->triangles)
         return -1;
+    for (int i = 0; i < (sub_steps + 1) * numbers; i++)
+        way->path[i] = spheres->path[i] - way->middle[i % 3];
+    spheres->path = way->path;
+    memset(spheres->force, 0, sizeof(double) * (size_t)sub_steps * (size_t)numbers);
     for (int s = 0; s < spheres->count; s++) {
         int *found = way->near + s * (MOST_NEAR + 1);
         *found = spheres->free[s] ? find_near(body, spheres, s, sub_steps, found + 1, MOST_NEAR) : 0;

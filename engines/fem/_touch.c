@@ -208,9 +208,11 @@ static int find_meetings(Touch *touch)
 {
     const Pairs *pairs = &touch->pairs;
     int found = 0;
-    for (int k = 0; k < pairs->vertices; k++)
+    for (int n = 0; n < pairs->uses; n++) {
+        int k = pairs->used[n];
         if (pairs->start[k] < pairs->start[k + 1])
             found += meet(touch, k, touch->meeting + found);
+    }
     return found;
 }
 
@@ -266,7 +268,7 @@ int part_bodies(Touch *touch, double seconds, double share)
         return -1;
     if (pairs->start[pairs->vertices] == 0)
         return 0;
-    place_vertices(pairs);
+    place_used(pairs);
     if (touch->room < pairs->vertices) {
         PyMem_RawFree(touch->meeting);
         touch->room = pairs->vertices;

@@ -56,6 +56,8 @@ class FemEngine(Stepped):
         self._heating: Heating | None = None
         self._layers: list[LayerOutputs | None] = []
         """Outputs of each organ with layers."""
+        self._sharpened: list[Organ] = []
+        """Organs that scissors may cut."""
         self._together: Together | None = None
         self._blood: Blood | None = None
         self._attachments: Attachments | None = None
@@ -114,17 +116,16 @@ class FemEngine(Stepped):
         seconds, end = h * 1e-9, t + h
         for probe in self._probes:
             probe.begin(inputs, seconds)
-        forces = self._spheres.forces
-        forces[:] = 0.0
-        for organ in self._organs:
+        for organ in self._sharpened:
             organ.sharpen(seconds)
         if self._attachments is not None:
             self._attachments.begin(seconds)
         if self._together is None:
             for organ in self._organs:
-                forces += organ.advance(seconds, self.params.gravity)
+                organ.advance(seconds, self.params.gravity)
         else:
-            forces += self._together.advance(seconds, self.params.gravity)
+            self._together.advance(seconds, self.params.gravity)
+        self._spheres.sum_forces(organ.forces for organ in self._organs)
         are_finite = [probe.end() for probe in self._probes]
         due, touch = end % self.params.node_period == 0, end // CONTACT_PERIOD_NS != t // CONTACT_PERIOD_NS
         if due or touch or not all(are_finite):
@@ -244,6 +245,7 @@ class FemEngine(Stepped):
     def close(self) -> None:
         """Forget the organs."""
         self._heating = self._together = self._blood = self._attachments = None
+        self._sharpened = []
         for kept in (self._organs, self._probes, self._grasps, self._surfaces, self._layers):
             kept.clear()
 
@@ -282,6 +284,7 @@ class FemEngine(Stepped):
                 outputs.update(nothing_held(name))
         for organ in self._organs:
             organ.meet(self._spheres, blades, scissors)
+        self._sharpened = self._organs if scissors else []
         if self._attachments is not None:
             self._attachments.meet(self._spheres, blades, scissors)
         for organ in self._changing:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from math import sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,11 +157,14 @@ class Organ:
         self.solid.stand()
         self.sample(0)
 
-    def advance(self, seconds: float, gravity: float) -> Vector:
-        """Advance; return the force on each sphere in each sub-step, N, shape (k, n, 3)."""
-        forces = self.solid.advance(seconds, self.way, self.friction, gravity)
-        self.follow_surface()
-        return forces
+    def advance(self, seconds: float, gravity: float) -> None:
+        """Advance on its own."""
+        if self.solid.compiled.advance(*self.arguments(seconds, gravity)):
+            self.follow_surface()
+
+    def arguments(self, seconds: float, gravity: float) -> tuple[Any, ...]:
+        """Return the arguments of `_solid.c` for a step of `seconds`, the same objects for every step."""
+        return self.solid.arguments(seconds, self.way, self.forces, self.friction, gravity, 0.0)
 
     def sharpen(self, seconds: float) -> None:
         """Let scissors cut that close in a step of `seconds`."""
@@ -299,6 +303,8 @@ class Organ:
         self._free = self._presses.copy()
         self.way = SphereWay(spheres.path, spheres.radii, self._free, self._edges)
         """Ways of the spheres in a step."""
+        self.forces = self.way.no_forces()
+        """Force on each sphere in each sub-step of the last step, N, shape (k, n, 3)."""
 
     def held_by(self, bodies: Collection[int]) -> list[int]:
         """Return the nodes that these spheres hold."""

@@ -317,10 +317,11 @@ class Solid:
     def arguments(
         self, seconds: float, way: SphereWay, forces: Vector, friction: float, gravity: float, drag: float
     ) -> tuple[Any, ...]:
-        """Return the arguments of `_solid.c` for `advance`, which adds to `forces`, shape (k, n, 3)."""
+        """Return the arguments of `_solid.c` for `advance`, which writes `forces`, shape (k, n, 3)."""
         sub_steps, edges = len(way.path) - 1, way.edges
         return (
-            np.ascontiguousarray(way.path - self.middle),
+            way.path,
+            self.middle,
             way.radii,
             way.free,
             forces,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,13 @@ class Spheres:
         """Centres at the ends of the sub-steps, m, in `world`, shape (k + 1, n, 3)."""
         self.forces: Vector = np.zeros((sub_steps, len(radii), 3))
         """Force of the tissue in each sub-step, N, shape (k, n, 3)."""
+
+    def sum_forces(self, parts: Iterable[Vector]) -> None:
+        """Set `forces` to the sum of the forces of all organs."""
+        first, *others = parts
+        self.forces[:] = first
+        for other in others:
+            self.forces += other
 
     def nearest(self, places: Vector, among: NDArray[np.integer]) -> NDArray[np.int64]:
         """Return the sphere `among` these nearest to each place (m, shape (n, 3)); -1 if there is none."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,9 @@ class Together:
             _AHEAD * edge,
             _SKIN * edge,
         )
+        self._step = 0.0, 0.0
+        """Length of a step, s, and gravity, m/s^2, for which `_arguments` are."""
+        self._arguments: tuple[tuple[Any, ...], ...] = ()
 
     def attach(self, attachments: Attachments) -> None:
         """Let the organs hang together."""
@@ -58,18 +62,14 @@ class Together:
         for organ in self._organs:
             organ.stand()
 
-    def advance(self, seconds: float, gravity: float) -> Vector:
-        """Advance; return the force on each sphere in each sub-step, N, shape (k, n, 3)."""
-        forces = [organ.way.no_forces() for organ in self._organs]
-        self._compiled.advance(
-            tuple(
-                organ.solid.arguments(seconds, organ.way, found, organ.friction, gravity, 0.0)
-                for organ, found in zip(self._organs, forces, strict=True)
-            )
-        )
-        for organ in self._organs:
-            organ.follow_surface()
-        return np.add.reduce(forces)
+    def advance(self, seconds: float, gravity: float) -> None:
+        """Advance; the organs have the forces on the spheres."""
+        if self._step != (seconds, gravity):
+            self._step = seconds, gravity
+            self._arguments = tuple(organ.arguments(seconds, gravity) for organ in self._organs)
+        if self._compiled.advance(self._arguments):
+            for organ in self._organs:
+                organ.follow_surface()
 
     def forget(self) -> None:
         """Search pairs anew: the organs have been restored."""
