@@ -83,13 +83,13 @@ def out_of_reach(seeds: int) -> Iterator[Row]:
         }
 
 
-def servoing_pictures(seeds: int) -> Iterator[Row]:
+def servoing_pictures(seeds: int, looks: str) -> Iterator[Row]:
     """The controller with rendered pictures and an arm that is where it is commanded to be."""
     rng = np.random.default_rng(3)
     for number in range(seeds):
         reached, start, target = random_goal(rng)
         lost = range(20, 20 + _SECOND) if number % 2 else range(0)
-        errors = _steered(reached, start, target, lost)
+        errors = _steered(reached, start, target, lost, looks)
         above = np.flatnonzero(errors >= 1.0)
         yield {
             "goal": number,
@@ -99,7 +99,9 @@ def servoing_pictures(seeds: int) -> Iterator[Row]:
         }
 
 
-def _steered(reached: np.ndarray, start: np.ndarray, target: np.ndarray, lost: range) -> np.ndarray:
+def _steered(
+    reached: np.ndarray, start: np.ndarray, target: np.ndarray, lost: range, looks: str
+) -> np.ndarray:
     """Return the distances (px) of the features from the goal at each picture."""
     from engines.mujoco.model import build
     from engines.mujoco.pictures.endoscope import Endoscope
@@ -109,7 +111,7 @@ def _steered(reached: np.ndarray, start: np.ndarray, target: np.ndarray, lost: r
     scene = {
         "arms": {"ECM": {"start": start.tolist()}},
         "fixtures": {"box": {"kind": "disc-box", "position": box[:3], "orientation": box[3:]}},
-        "looks": False,
+        "looks": "none" if looks == "plain" else looks,
         "width": CAMERA.width,
         "height": CAMERA.height,
     }
@@ -192,11 +194,12 @@ def trouble(seeds: int) -> Iterator[Row]:
             }
 
 
-def tracking_pictures(seeds: int) -> Iterator[Row]:  # noqa: ARG001
+def tracking_pictures(seeds: int, looks: str) -> Iterator[Row]:  # noqa: ARG001
     """The scenario as it is, and with the authors' camera."""
     for name, values in PICTURED.items():
         with tempfile.TemporaryDirectory() as directory:
             record = Path(directory) / "session"
+            values = values | {"participants.endoscope.looks": looks}
             trocar.run("needle-tracking", set=values, pace="fast", one_host=True, record=record)
             recording = trocar.Recording(record)
             found = {
@@ -214,9 +217,10 @@ def tracking_pictures(seeds: int) -> Iterator[Row]:  # noqa: ARG001
             }
 
 
-def carried_pictures(seeds: int) -> Iterator[Row]:
+def carried_pictures(seeds: int, looks: str) -> Iterator[Row]:
     """Rendered pictures of as many needles, held and carried otherwise, without physics."""
     for name, changes in PICTURED.items():
+        changes = changes | {"participants.endoscope.looks": looks}
         runs = [track_pictures(changes, seed) for seed in range(seeds)]
         found = {port: np.array([run[port][_SECOND:] for run in runs]) for port in runs[0]}
         yield {
@@ -232,9 +236,11 @@ def carried_pictures(seeds: int) -> Iterator[Row]:
 PARTS: dict[str, Callable[[int], Iterator[Row]]] = {
     "servoing": servoing,
     "out-of-reach": out_of_reach,
-    "servoing-pictures": servoing_pictures,
     "tracking": tracking,
     "trouble": trouble,
+}
+PICTURED_PARTS: dict[str, Callable[[int, str], Iterator[Row]]] = {
+    "servoing-pictures": servoing_pictures,
     "tracking-pictures": tracking_pictures,
     "carried-pictures": carried_pictures,
 }
@@ -242,14 +248,16 @@ PARTS: dict[str, Callable[[int], Iterator[Row]]] = {
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="default: all")
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, *PICTURED_PARTS, []], help="default: all")
     parser.add_argument("--seeds", type=int, default=50)
+    parser.add_argument("--looks", choices=["plain", "endoscope"], default="plain", help="of drawn pictures")
     parser.add_argument("--json", action="store_true")
     given = parser.parse_args()
-    for part in given.parts or PARTS:
+    for part in given.parts or [*PARTS, *PICTURED_PARTS]:
         if not given.json:
             print(f"\n{part}, {given.seeds} seeds")
-        for row in PARTS[part](given.seeds):
+        drawn = PICTURED_PARTS.get(part)
+        for row in PARTS[part](given.seeds) if drawn is None else drawn(given.seeds, given.looks):
             print(json.dumps({"part": part} | row) if given.json else row, flush=True)
 
 

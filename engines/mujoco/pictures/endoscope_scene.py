@@ -59,7 +59,8 @@ class EndoscopeScene:
         if isinstance(engine, Backend):
             exposure = params.sensor.exposure + self._variation.exposure
             smoke = min(params.smoke + self._variation.smoke, 1.0)
-            dress_scene(scene, exposure, _TONES[params.sensor.tone], smoke)
+            printed = [name for name, fixture in params.fixtures.items() if fixture.kind == "disc-box"]
+            dress_scene(scene, exposure, _TONES[params.sensor.tone], smoke, printed)
         else:
             if params.view is not None or "ECM" not in params.arms:
                 add_sky(scene)

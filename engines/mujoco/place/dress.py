@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import mujoco
 
@@ -12,7 +12,7 @@ _METALS: Mapping[str, float] = {"steel": 0.27}
 """Roughness of metals of the robot, by material."""
 _ROUGHNESS: Mapping[str, float] = {"black": 0.42, "blue": 0.4, "dark": 0.5, "ivory": 0.35}
 """Roughness of coats and plastics of the robot, by material; black: the matt coat of a shaft."""
-_PLASTIC, BRIGHT = "plastic", "bright metal"
+_PLASTIC, _PAPER, BRIGHT = "plastic", "paper", "bright metal"
 """Materials of geoms without a material."""
 _THICKEST, _SMOKE = 12.0, [0.5, 0.5, 0.52]
 """Extinction of the thickest smoke, 1/m, and the light it scatters."""
@@ -20,7 +20,9 @@ SHINING = ("needle",)
 """Objects of metal, by the beginning of their bodies' names."""
 
 
-def dress_scene(scene: mujoco.MjSpec, exposure: float, tone: str, smoke: float) -> None:
+def dress_scene(
+    scene: mujoco.MjSpec, exposure: float, tone: str, smoke: float, printed: Collection[str] = ()
+) -> None:
     """Give every geom of `scene` a material of metal, coat or plastic; colours stay.
 
     A material without such a property is drawn by another shader, which has to be compiled as well.
@@ -30,15 +32,19 @@ def dress_scene(scene: mujoco.MjSpec, exposure: float, tone: str, smoke: float) 
         exposure: of the camera, stops.
         tone: the renderer's name of a tone mapping.
         smoke: from 0 to 1.
+        printed: bodies of matt paper, without highlights that a program would take for a mark.
     """
     for material in scene.materials:
         material.metallic = 1.0 if material.name in _METALS else 0.0
         material.roughness = _METALS.get(material.name, _ROUGHNESS.get(material.name, 0.45))
     scene.add_material(name=_PLASTIC, metallic=0.0, roughness=0.4)
+    scene.add_material(name=_PAPER, metallic=0.0, roughness=0.95)
     scene.add_material(name=BRIGHT, metallic=1.0, roughness=0.22)
     for geom in scene.geoms:
         if not geom.material:
-            geom.material = BRIGHT if geom.parent.name.startswith(SHINING) else _PLASTIC
+            name = geom.parent.name
+            plain = _PAPER if name.partition("/")[0] in printed else _PLASTIC
+            geom.material = BRIGHT if name.startswith(SHINING) else plain
     options = {"ao.enabled": 0.0, "cg.exposure": exposure} | (_smoke_options(smoke) if smoke else {})
     for option, value in options.items():
         data = value if isinstance(value, list) else [value]

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.command_line import film_app, render_app
-from engines.mujoco.pictures.recorded_scene import Camera, RecordedScene
+from engines.mujoco.pictures.recorded_scene import Camera, RecordedScene, _recorded_looks
 from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
 from hub.session.launch import launch
@@ -281,3 +281,13 @@ def test_render_names_the_modalities_that_there_are(recordings: dict[str, Record
     assert done.exit_code == 2
     assert "heat" in done.output
     assert "segmentation" in done.output
+
+
+def test_a_recording_is_drawn_with_the_looks_of_its_camera_unless_told_otherwise(
+    recordings: dict[str, Recording],
+) -> None:
+    recording = recordings["hub"]
+    assert RecordedScene(recording, looks=None)._looks == "plain"
+    camera = recording.scenario().participants["camera"]
+    with_looks = camera.model_copy(update={"looks": "endoscope"})
+    assert _recorded_looks({"robot": camera, "camera": with_looks}) == "endoscope"
