@@ -1,0 +1,1 @@
+"""Behaviour cloning: demonstrations of the oracles, training in PyTorch, and the learnt policy."""

@@ -1,0 +1,19 @@
+from collections.abc import Iterator
+
+from torch import Tensor
+from torch.nn import functional as functional
+
+class Module:
+    def __call__(self, inputs: Tensor) -> Tensor: ...
+    def parameters(self) -> Iterator[Tensor]: ...
+
+class Linear(Module):
+    weight: Tensor
+    bias: Tensor
+    def __init__(self, in_features: int, out_features: int) -> None: ...
+
+class ReLU(Module): ...
+
+class Sequential(Module):
+    def __init__(self, *layers: Module) -> None: ...
+    def __iter__(self) -> Iterator[Module]: ...

@@ -1,0 +1,3 @@
+from torch import Tensor
+
+def l1_loss(input: Tensor, target: Tensor) -> Tensor: ...
