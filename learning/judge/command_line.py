@@ -50,7 +50,7 @@ def judge(
     difficulty: Annotated[
         str,
         typer.Option(
-            help="nominal, joint-errors, latency-100, latency-200, latency-300, with commas; or all."
+            help="nominal, joint-errors, camera-offset, looks, latency-100, -200, -300, with commas; or all."
         ),
     ] = "nominal",
     seeds: Annotated[int, typer.Option(min=1, help="Episodes of each exercise and difficulty.")] = 50,

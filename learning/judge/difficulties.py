@@ -34,10 +34,29 @@ def _joint_errors(seed: int) -> Mapping[str, Any]:
     return {"participants.actions.joint_errors": {"within": list(_JOINTS), "seed": seed}}
 
 
+def _camera_offset(seed: int) -> Mapping[str, Any]:
+    """Return a camera that stands and looks elsewhere, and else shows the same."""
+    same = {
+        "textures": False,
+        "colour": 0.0,
+        "light": 0.0,
+        "exposure": 0.0,
+        "smoke": 0.0,
+        "background": False,
+    }
+    return {"participants.camera.randomise": {"seed": seed, "offset": "5 mm", "turn": "3 deg", **same}}
+
+
+def _looks(seed: int) -> Mapping[str, Any]:
+    return {"participants.camera.looks": "endoscope", "participants.camera.randomise": {"seed": seed}}
+
+
 DIFFICULTIES: Mapping[str, Difficulty] = MappingProxyType(
     {
         "nominal": Difficulty("as in training"),
         "joint-errors": Difficulty("encoders with offsets, as on a real arm: 5 mm at the tip", _joint_errors),
+        "camera-offset": Difficulty("a camera up to 5 mm and 3 degrees off, on each axis", _camera_offset),
+        "looks": Difficulty("endoscope looks that differ from trial to trial", _looks),
         "latency-100": Difficulty("observations 100 ms old", delay=0.1),
         "latency-200": Difficulty("observations 200 ms old", delay=0.2),
         "latency-300": Difficulty("observations 300 ms old", delay=0.3),

@@ -3,14 +3,16 @@
 import json
 import re
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
 import trocar
+from engines.mujoco.pictures import opengl
 from hub.command_line.app import app
 from learning.judge.difficulties import DIFFICULTIES, difficulties_of
-from learning.judge.episode import Trial
+from learning.judge.episode import Trial, make_environment
 from learning.judge.policies import PolicyAddress
 from learning.judge.suites import SUITES, exercises_of
 from learning.judge.verdict import Verdict, judge_trials
@@ -115,6 +117,20 @@ def test_two_policies_on_the_same_seeds(expert, tmp_path):
     assert "no difference is shown" in output  # two pairs say little
     with pytest.raises(ScenarioError, match="holds no verdict with a finished trial"):
         judge("--compare", tmp_path, other)
+
+
+def test_seeds_move_the_camera_alone():
+    if not (found := opengl.find()).name:
+        pytest.skip(found.detail)
+    pictures = []
+    for seed in (1, 2, 1):
+        env = make_environment(Trial("Reach", "camera-offset", seed), {"images": True})
+        observation, _ = env.reset(seed=5)
+        pictures.append(observation)
+        env.close()
+    np.testing.assert_array_equal(pictures[0]["left"], pictures[2]["left"])
+    assert (pictures[0]["left"] != pictures[1]["left"]).any()
+    np.testing.assert_array_equal(pictures[0]["observation"], pictures[1]["observation"])
 
 
 def test_names():
