@@ -84,11 +84,11 @@ def follow(
 def _residual(arm: PlacedArm, way: Way, measured: Vector) -> Residual:
     inside = way.reached > 0.0
     off = (measured - way.joints)[inside]
-    apart = np.linalg.norm(arm.tip(measured[inside]) - arm.tip(way.joints[inside]), axis=1)
+    apart: Vector = np.linalg.norm(arm.tip(measured[inside]) - arm.tip(way.joints[inside]), axis=1)
     joints = arm.mounted.chain.joints
     return Residual(
         {joint.name: float(np.sqrt(np.mean(off[:, i] ** 2))) for i, joint in enumerate(joints)},
         {joint.name: joint.unit for joint in joints},
         float(np.sqrt(np.mean(apart**2))),
-        float(apart.max()),
+        float(np.max(apart)),
     )

@@ -23,7 +23,7 @@ class Config:
 
 made = make_env(2, cfg=Config())
 envs = made["trocar"][0]
-observation, _ = envs.reset(seed=0)
+observation, _ = envs.reset(seed=0, options={"lerobot_new_rollout": True})
 assert observation["pixels"]["left"].shape == (2, 48, 64, 3), observation["pixels"]["left"].shape
 assert str(observation["pixels"]["right"].dtype) == "uint8"
 assert observation["agent_pos"].shape == (2, 11)

@@ -80,9 +80,12 @@ class LeRobotEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         self.observation_space = spaces.Dict(parts)
         self.metadata = {**env.metadata, "render_fps": 5}
 
-    def reset(self, **arguments: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin an episode, as the environment of Trocar does."""
-        observation, info = self.env.reset(**arguments)
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begin an episode; options of LeRobot's own, such as `lerobot_new_rollout`, have no meaning here."""
+        own = {name: value for name, value in (options or {}).items() if not name.startswith("lerobot_")}
+        observation, info = self.env.reset(seed=seed, options=own or None)
         return self._rename(observation), info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
