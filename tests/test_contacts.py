@@ -94,14 +94,14 @@ def test_an_instrument_without_spheres_touches_nothing(write, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("number", "mode", "spheres"),
-    [("400183", "monopolar", 3), ("400179", "monopolar", 5), ("400172", "bipolar", 8)],
+    ("number", "mode", "spheres", "bare"),
+    [("400183", "monopolar", 10, 3), ("400179", "monopolar", 5, None), ("400172", "bipolar", 8, None)],
 )
-def test_an_energy_instrument_heats_tissue_of_our_own_without_a_word(write, number, mode, spheres):
+def test_an_energy_instrument_heats_tissue_of_our_own_without_a_word(write, number, mode, spheres, bare):
     change = [f"scene.arms.PSM1.instrument='{number}'"]
     fem = load(write(TOUCHES), [*change, "participants.tissue.kind=fem"])
     (probe,) = fem.params["tissue"].probes.values()
-    assert (probe.energy.mode, probe.spheres) == (mode, spheres)
+    assert (probe.energy.mode, probe.spheres, probe.energy.bare) == (mode, spheres, bare)
     (probe,) = load(write(TOUCHES), change).params["tissue"].probes.values()
     assert probe.energy is None, "tissue in Bullet knows no heat"
     cold = [*change, "participants.tissue.kind=fem", "participants.tissue.probes={PSM1: {energy: null}}"]

@@ -13,6 +13,7 @@ sub-steps are made: both sides are smooth. Mass stays with the elements.
 #define EDGE_SLACK 1e-9    /* of a triangle's edges, in its own coordinates: neighbours leave no gap */
 #define BOX_SLACK 1e-8     /* m: of a box around triangles, more than the slack of their edges */
 #define POWER_ITERATIONS 12
+#define PATCH 2.5 /* half a side of a patch of a tear, over an edge of its element */
 
 /* Middle of an element of the uncut mesh: moved nodes must not carry it across what has been swept already. */
 static void middle_of(const Body *body, int element, double middle[3])
@@ -237,6 +238,15 @@ int cut_along(Body *body, const double *triangles, int count)
     return opened;
 }
 
+/* Cubic root of a positive number, by Newton's method: that of libm differs from one to the other. */
+static double cbrt_of(double x)
+{
+    double y = sqrt(sqrt(x)), last = 0.0;
+    for (int k = 0; k < 60 && y != last; k++)
+        last = y, y = (2.0 * y + x / (y * y)) / 3.0;
+    return y;
+}
+
 /* Right Cauchy-Green tensor of an element, xx, yy, zz, yz, xz, xy. */
 static void cauchy_green(const Body *body, int element, double C[6])
 {
@@ -261,11 +271,11 @@ static void times(const double C[6], const double v[3], double out[3])
     out[2] = C[4] * v[0] + C[3] * v[1] + C[2] * v[2];
 }
 
-/* Square of the largest stretch of an element, 0 if it is below `least`; no function of libm, for the same bits. */
-static double largest_stretch(const Body *body, int element, double least)
+/* Square of the largest stretch of an element and its direction in the resting body, 0 if it is below `least`; no
+function of libm, for the same bits. */
+static double largest_stretch(const double C[6], double least, double v[3])
 {
-    double C[6], v[3], next[3];
-    cauchy_green(body, element, C);
+    double next[3];
     double a = C[0] - 1.0, b = C[1] - 1.0, c = C[2] - 1.0;
     double strain = a * a + b * b + c * c + 2.0 * (C[3] * C[3] + C[4] * C[4] + C[5] * C[5]);
     if (strain < (least - 1.0) * (least - 1.0))
@@ -304,27 +314,121 @@ static int stretched_face(const Body *body, int element)
     return found;
 }
 
-/* Write the faces that tear at a largest `stretch`: one of each element stretched more than its neighbours. */
-int find_torn(const Body *body, float stretch, int32_t *faces, int most)
+/* Edge of a regular tetrahedron of the element's volume. */
+static double edge_of(const Body *body, int element)
 {
-    int elements = 4 * body->blocks, found = 0;
-    double least = (double)stretch * (double)stretch, *square = PyMem_RawMalloc(sizeof(double) * (size_t)elements);
-    if (square == NULL)
-        return -1;
-    for (int e = 0; e < elements; e++)
-        square[e] = is_gone(body, e) ? 0.0 : largest_stretch(body, e, least);
-    for (int e = 0; e < elements && found < most; e++) {
-        if (square[e] == 0.0)
-            continue;
-        int is_most = 1;
-        for (int a = 0; a < 4; a++) {
-            int other = body->across[4 * e + a];
-            is_most &= other < 0 || square[other / 4] <= square[e];
-        }
-        int face = is_most ? stretched_face(body, e) : -1;
-        if (face >= 0)
-            faces[found++] = face;
+    return cbrt_of(6.0 * 1.4142135623730951 * (double)body->volumes[element]);
+}
+
+/* Energy of distortion that an element sets free by each area of tear: its density times the element's edge. */
+static double release(const Body *body, int element)
+{
+    double C[6];
+    cauchy_green(body, element, C);
+    return 0.5 * (double)body->shear[element] * (C[0] + C[1] + C[2] - 3.0) * edge_of(body, element);
+}
+
+/* Whether an element tears: `at_end` of a tear by its toughness, if there is one, else by its stretch. */
+static double tearing(const Body *body, const Limits *limits, int element, int at_end)
+{
+    double C[6], v[3];
+    if (at_end && limits->toughness > 0.0) {
+        double free = release(body, element);
+        return free >= limits->toughness ? free : 0.0;
     }
-    PyMem_RawFree(square);
-    return found;
+    cauchy_green(body, element, C);
+    return largest_stretch(C, limits->stretch * limits->stretch, v);
+}
+
+/* Mean right Cauchy-Green tensor of an element and of those that share a node with it. */
+static void mean_cauchy_green(const Body *body, int element, double mean[6])
+{
+    memset(mean, 0, 6 * sizeof(double));
+    for (int e = 0; e < 4 * body->blocks; e++) {
+        double C[6];
+        int is_near = 0;
+        for (int a = 0; a < 4; a++)
+            is_near |= has_corner(body, element, *corner_of(body, e, a));
+        if (!is_near || is_gone(body, e))
+            continue;
+        cauchy_green(body, e, C);
+        for (int i = 0; i < 6; i++)
+            mean[i] += (double)body->volumes[e] * C[i];
+    }
+    double whole = (mean[0] + mean[1] + mean[2]) / 3.0;
+    for (int i = 0; i < 6; i++)
+        mean[i] *= whole > 0.0 ? 4.0 / whole : 1.0; /* the scale is none of the direction's */
+}
+
+/* Write two triangles around the end of a tear in an element, or around its middle, across its largest stretch. */
+static void write_patch(const Body *body, int element, const uint8_t *is_end, double *triangles)
+{
+    double C[6], v[3] = {1.0, 0.0, 0.0}, u[3], w[3], middle[3] = {0.0, 0.0, 0.0}, half = PATCH * edge_of(body, element);
+    int count = 0;
+    for (int a = 0; a < 4; a++) {
+        int32_t node = *corner_of(body, element, a);
+        for (int i = 0; i < 3 && is_end[node]; i++)
+            middle[i] += (double)body->rest[4 * node + i];
+        count += is_end[node] != 0;
+    }
+    if (count)
+        for (int i = 0; i < 3; i++)
+            middle[i] /= count;
+    else
+        middle_of(body, element, middle);
+    mean_cauchy_green(body, element, C);
+    largest_stretch(C, 1.0, v);
+    int least = fabs(v[0]) < fabs(v[1]) ? (fabs(v[0]) < fabs(v[2]) ? 0 : 2) : (fabs(v[1]) < fabs(v[2]) ? 1 : 2);
+    double axis[3] = {least == 0 ? 1.0 : 0.0, least == 1 ? 1.0 : 0.0, least == 2 ? 1.0 : 0.0};
+    cross(v, axis, u);
+    normalise(u);
+    cross(v, u, w);
+    static const double sign[6][2] = {{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}};
+    for (int k = 0; k < 6; k++)
+        for (int i = 0; i < 3; i++)
+            triangles[3 * k + i] = middle[i] + half * (sign[k][0] * u[i] + sign[k][1] * w[i]);
+}
+
+/* Mark the nodes of faces that were opened. */
+static void mark_ends(const Body *body, uint8_t *is_end)
+{
+    for (int slot = body->skin; slot < body->faces; slot++)
+        for (int a = 0; a < 3 && body->surface[3 * slot] >= 0; a++)
+            is_end[body->surface[3 * slot + a]] = 1;
+}
+
+/* Choose the element that tears: the first of those at ends of tears, else of all; -1: none. */
+static int choose(const Body *body, const Limits *limits, const uint8_t *is_end)
+{
+    int chosen[2] = {-1, -1};
+    double most[2] = {0.0, 0.0};
+    for (int e = 0; e < 4 * body->blocks; e++) {
+        int at_end = 0;
+        for (int a = 0; a < 4; a++)
+            at_end |= is_end[*corner_of(body, e, a)];
+        double value = is_gone(body, e) ? 0.0 : tearing(body, limits, e, at_end);
+        if (value > most[at_end])
+            most[at_end] = value, chosen[at_end] = e;
+    }
+    return chosen[1] >= 0 ? chosen[1] : chosen[0];
+}
+
+/* Let the tissue tear: a tear runs on at its end, across the largest stretch, or begins where that is largest. One
+patch at a time, since it relaxes all around. Return how many faces have been opened, or -1 without memory. */
+int tear_on(Body *body, const Limits *limits)
+{
+    double triangles[18];
+    uint8_t *is_end = PyMem_RawCalloc((size_t)body->node_room + 1, 1);
+    if (is_end == NULL)
+        return -1;
+    mark_ends(body, is_end);
+    int opened = 0, element = choose(body, limits, is_end);
+    if (element >= 0) {
+        write_patch(body, element, is_end, triangles);
+        opened = cut_along(body, triangles, 2);
+        int32_t face = opened ? -1 : stretched_face(body, element);
+        opened = face >= 0 ? open_faces(body, &face, 1) : opened;
+    }
+    PyMem_RawFree(is_end);
+    return opened;
 }

@@ -53,6 +53,7 @@ typedef struct {
     float *excess;            /* (elements,): of the dry residue over the mean of the corners, K */
     float *damage;            /* (DAMAGES, elements) */
     uint8_t *stage;           /* (elements,) */
+    const uint8_t *bursts;    /* (elements,): whether steam takes a dry element away, as a cutting current does */
     float *flow;              /* (2, nodes): scratch */
 } Body;
 
@@ -105,7 +106,8 @@ static float absorb(const Body *body, const Tissue *tissue, int e, float mean, f
     body->excess[e] = (double)now > SMALLEST_RISE ? now : 0.0f;
     if (mean + now > (float)tissue->charring && body->stage[e] == TISSUE)
         body->stage[e] = CHARRED;
-    if (mean + now > (float)tissue->vaporising && body->stage[e] != VAPORISED) {
+    int is_burst = body->bursts[e] && power > 0.0f;
+    if ((is_burst || mean + now > (float)tissue->vaporising) && body->stage[e] != VAPORISED) {
         body->stage[e] = VAPORISED;
         book->vaporised += (double)volume;
         book->ash += tissue->dry_mass * (double)volume;
@@ -213,7 +215,7 @@ static void advance_body(const Body *body, const Tissue *tissues, float seconds,
         }
 }
 
-#define MOST_BUFFERS 12
+#define MOST_BUFFERS 13
 
 typedef struct {
     Py_buffer view[MOST_BUFFERS];
@@ -255,7 +257,7 @@ static PyObject *advance(PyObject *Py_UNUSED(module), PyObject *args)
     if (!PyArg_ParseTuple(args, "Oy*w*fi", &arrays, &tissues, &book, &seconds, &sub_steps))
         return NULL;
     Buffers held;
-    int failed = hold(&held, arrays, 12, 6);
+    int failed = hold(&held, arrays, 13, 7);
     if (!failed && (tissues.len % sizeof(Tissue) || book.len != sizeof(Book))) {
         PyErr_SetString(PyExc_ValueError, "constants of tissue, or its book, of another length");
         failed = 1;
@@ -263,8 +265,8 @@ static PyObject *advance(PyObject *Py_UNUSED(module), PyObject *args)
     if (!failed) {
         Py_buffer *view = held.view;
         Body body = {(int)(view[4].len / 4), (int)(view[3].len / 4), view[0].buf, view[1].buf, view[2].buf, view[3].buf,
-                     view[4].buf, view[5].buf, view[6].buf, view[7].buf, view[8].buf, view[9].buf, view[10].buf,
-                     view[11].buf};
+                     view[4].buf, view[5].buf, view[7].buf, view[8].buf, view[9].buf, view[10].buf, view[11].buf,
+                     view[6].buf, view[12].buf};
         Py_BEGIN_ALLOW_THREADS;
         advance_body(&body, tissues.buf, seconds, sub_steps, book.buf);
         Py_END_ALLOW_THREADS;

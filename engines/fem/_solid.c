@@ -6,8 +6,6 @@ See docs/decisions/0125-tissue-of-our-own.md; `_step.c` advances.
 
 #include "_solid.h"
 
-#define MOST_TORN 64 /* faces at a time */
-
 /* Read the arguments of `advance`: a way through a step, whose buffers are held until `release_way`. */
 int read_way(Solid *self, PyObject *args, Way *way, Course *course)
 {
@@ -109,17 +107,15 @@ static PyObject *remove_method(Solid *self, PyObject *elements)
     return change(self, elements, remove_elements, 4 * self->body.blocks);
 }
 
-PyDoc_STRVAR(tear_doc, "tear(stretch)\n--\n\nOpen a face of each element that is stretched beyond `stretch` and more \
-than its neighbours;\nreturn how many.");
+PyDoc_STRVAR(tear_doc, "tear(stretch, toughness)\n--\n\nOpen faces at the ends of tears, by `toughness` (J/m^2; 0: by \
+`stretch`), or where the stretch is largest\nand beyond `stretch`; return how many.");
 
-static PyObject *tear(Solid *self, PyObject *stretch)
+static PyObject *tear(Solid *self, PyObject *args)
 {
-    int32_t faces[MOST_TORN];
-    double limit = PyFloat_AsDouble(stretch);
-    if (PyErr_Occurred())
+    Limits limits;
+    if (!PyArg_ParseTuple(args, "dd", &limits.stretch, &limits.toughness))
         return NULL;
-    int found = find_torn(&self->body, (float)limit, faces, MOST_TORN);
-    int opened = found > 0 ? open_faces(&self->body, faces, found) : found;
+    int opened = tear_on(&self->body, &limits);
     return opened < 0 ? PyErr_NoMemory() : PyLong_FromLong(opened);
 }
 
@@ -244,7 +240,7 @@ static PyMethodDef methods[] = {
     {"forces", (PyCFunction)forces, METH_O, forces_doc},
     {"open", (PyCFunction)open_method, METH_O, open_doc},
     {"remove", (PyCFunction)remove_method, METH_O, remove_doc},
-    {"tear", (PyCFunction)tear, METH_O, tear_doc},
+    {"tear", (PyCFunction)tear, METH_VARARGS, tear_doc},
     {"measure", (PyCFunction)measure_method, METH_NOARGS, measure_doc},
     {"pieces", (PyCFunction)pieces, METH_O, pieces_doc},
     {NULL, NULL, 0, NULL},

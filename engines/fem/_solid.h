@@ -72,6 +72,12 @@ typedef struct {
     double *area;        /* (1,): swept so far, m^2 */
 } Edges;
 
+/* What tissue bears before it tears. */
+typedef struct {
+    double stretch;   /* largest principal stretch */
+    double toughness; /* J/m^2, at the end of a tear; 0: the stretch counts there too */
+} Limits;
+
 #define WAY_BUFFERS 11
 
 /* A body on its way through a step: its instruments, and memory. */
@@ -163,7 +169,7 @@ int32_t *no_places(const Body *body);
 int open_faces(Body *body, const int32_t *faces, int count);
 int remove_elements(Body *body, const int32_t *elements, int count);
 int measure(const Body *body, float *sharpness, float *bulk_rate);
-int find_torn(const Body *body, float stretch, int32_t *faces, int most);
+int tear_on(Body *body, const Limits *limits);
 void label_pieces(const Body *body, int32_t *labels, int32_t *stack);
 int cut_along(Body *body, const double *triangles, int count);
 

@@ -34,6 +34,8 @@ times relaxation time: up to the frequency 1 / damping that of stiffness-proport
 _SETTLED_PERIODS = 3.0
 """Time of settling under weight, in periods of the slowest swing, which drag damps critically."""
 _LEAST_SETTLING_S = 0.1
+_FOLDED = 3.0
+"""Way that a node of a divided organ may go, over the extent of the organ: a freed flap is folded back."""
 _NO_SPHERES = np.zeros(0), np.zeros(0, np.uint8)
 _SAMPLES = 40
 """Points along a blade: the width of a cut is known to a fortieth of the blade's length."""
@@ -178,8 +180,10 @@ class Organ:
 
     def tear(self) -> None:
         """Open faces that are stretched beyond the limit of the tissue, if there is one."""
-        limit = None if self._cutting is None else self._cutting.tear_stretch
-        if limit is not None and self.solid.tear(limit):
+        cutting = self._cutting
+        if cutting is None or cutting.tear_stretch is None:
+            return
+        if self.solid.tear(cutting.tear_stretch, cutting.tear_toughness):
             self._note_opened("torn", np.unique(self.solid.holder[self.held]))
             self._note_change()
 
@@ -195,7 +199,7 @@ class Organ:
         if self.solid.divisible and moved >= self._reach:
             self._drop_loose_pieces()
             moved = self._largest_move()
-        if not moved < self._reach:
+        if not moved < (_FOLDED if self.solid.divisible else 1.0) * self._reach:
             raise SessionError(
                 f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from"
                 f" its place. {self._likely_cause(moved)}"

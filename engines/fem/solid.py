@@ -333,9 +333,12 @@ class Solid:
             *(edges.ends, edges.toughness, edges.element, edges.front, edges.ahead, edges.swept),
         )
 
-    def tear(self, stretch: float) -> int:
-        """Open faces stretched beyond `stretch`; return how many."""
-        return self.compiled.tear(stretch)
+    def tear(self, stretch: float, toughness: float | None = None) -> int:
+        """Tear tissue stretched beyond `stretch`, at the end of a tear by `toughness` (J/m^2), if stated.
+
+        Return how many faces have opened.
+        """
+        return self.compiled.tear(stretch, toughness or 0.0)
 
     def remove(self, elements: Indices) -> int:
         """Let elements go; return how many were there."""

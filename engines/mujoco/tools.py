@@ -5,12 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 from hub.participant import Tool
+from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.end_effectors.scissors import Scissors
 from robots.dvrk.mounted import MountedPsm
 from schemas.vectors import Vector
 
 __all__ = ["instrument_tool"]
+
+
+def _energy(mounted: MountedPsm) -> dict[str, Any]:
+    """Return the mode of an energy instrument; the stem of an electrode is insulated."""
+    mode: dict[str, Any] = {"mode": mounted.tool.energy}
+    if isinstance(electrode := mounted.end_effector, Electrode):
+        mode["bare"] = len(electrode.bare(mounted.tool.tip))
+    return mode
 
 
 def instrument_tool(arm: str, mounted: MountedPsm, base: Vector) -> Tool:
@@ -27,7 +36,7 @@ def instrument_tool(arm: str, mounted: MountedPsm, base: Vector) -> Tool:
             probe["scissors"] = {"left": left, "right": right, "hinge": jaw.hinge}
         elif jaw is not None:
             probe["grasp"] = {}
-        probe |= {"energy": {"mode": mounted.tool.energy}} if mounted.tool.energy else {}
+        probe |= {"energy": _energy(mounted)} if mounted.tool.energy else {}
         if clip := mounted.tool.clip:
             probe["clip"] = {"length": clip.length, "diameters": clip.diameters}
     return Tool(

@@ -70,7 +70,10 @@ def test_an_unknown_instrument_is_refused_with_what_is_near(word, meant):
 
 
 def test_a_hook_touches_from_heel_to_tip_and_a_spatula_along_its_end():
-    hook, spatula = instrument("400183").spheres, instrument("400184").spheres
+    hook, spatula = (
+        [sphere for sphere in instrument(number).spheres if sphere.name.startswith("electrode")]
+        for number in ("400183", "400184")
+    )
     places = np.array([sphere.position for sphere in hook])
     assert np.ptp(places[:, 2]) == pytest.approx(0.003 - 2 * hook[0].radius)
     assert np.ptp(places[:, :2], axis=0) == pytest.approx([0, 0], abs=1e-12)
@@ -79,6 +82,18 @@ def test_a_hook_touches_from_heel_to_tip_and_a_spatula_along_its_end():
     for spheres in (hook, spatula):
         ends = [np.linalg.norm(np.array(sphere.position)[:2]) + sphere.radius for sphere in spheres]
         assert max(ends) == pytest.approx(0.0155)
+
+
+@pytest.mark.parametrize("number", ["400183", "400184"])
+def test_the_stem_of_an_electrode_touches_without_gaps_from_its_bare_end_to_the_wrist(number):
+    spheres = instrument(number).spheres
+    ahead = [float(np.linalg.norm(sphere.position[:2])) for sphere in spheres]
+    stem = [way for way, sphere in zip(ahead, spheres, strict=True) if sphere.name.startswith("stem")]
+    radius = spheres[-1].radius
+    assert np.diff(stem) == pytest.approx(-2.0 * radius)
+    assert 0.0 <= stem[-1] < 2.0 * radius
+    bare = min(way for way, sphere in zip(ahead, spheres, strict=True) if "electrode" in sphere.name)
+    assert bare - stem[0] == pytest.approx(radius + spheres[0].radius, abs=2e-4)
 
 
 @pytest.mark.parametrize(

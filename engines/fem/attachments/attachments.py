@@ -11,7 +11,7 @@ from engines.fem.attachments.params import AttachmentParams
 from engines.fem.attachments.ties import find_ties
 from engines.fem.edges import Edges, Scissors
 from engines.fem.heat.heat import Heat
-from engines.fem.heat.tissue import BODY, BOILING
+from engines.fem.heat.tissue import BODY
 from engines.fem.organ import Organ
 from engines.fem.spheres import Spheres
 from engines.tissue.organs.anchors import AnchorParams
@@ -24,8 +24,8 @@ from schemas.vectors import Vector
 
 __all__ = ["Attachments", "attachment_ports"]
 
-_PARTING_RISE = BOILING - BODY
-"""Rise at which a tie is burnt, K: the water of thin connective tissue boils off at once."""
+_PARTING_RISE = 90.0 - BODY
+"""Rise at which a tie is burnt, K: thin tissue dries at 90 to 100 degrees C (FUSE manual)."""
 
 
 def attachment_ports(attachments: Mapping[str, AttachmentParams], period_ns: int) -> tuple[Port, ...]:

@@ -103,6 +103,7 @@ class Heat:
         self.rise[self._capacity == 0.0] = 0.0  # their elements have gone
         self.excess[self._volume == 0.0] = 0.0
         self._no_power = np.zeros(len(corners), np.float32)
+        self._no_bursts = np.zeros(len(corners), np.uint8)
 
     def _copy_nodes(self, corners: Indices) -> None:
         """Append the nodes with numbers beyond the present ones."""
@@ -126,9 +127,15 @@ class Heat:
         """Whether the whole body is at its own temperature, so that no step is needed."""
         return self.book[_HOTTEST] == 0.0
 
-    def advance(self, seconds: float, power: NDArray[np.float32] | None = None) -> float:
+    def advance(
+        self,
+        seconds: float,
+        power: NDArray[np.float32] | None = None,
+        bursts: NDArray[np.bool_] | None = None,
+    ) -> float:
         """Advance by `seconds` with a power (W) in every element, shape (m,); return the smoke, kg.
 
+        `bursts`: elements that steam takes away once the power has dried them, shape (m,); default: none.
         Smoke is steam, and the dry rest of vaporised elements.
         """
         if power is None and self.is_cold:
@@ -142,6 +149,7 @@ class Heat:
             self._volume,
             self._capacity,
             self._no_power if power is None else power,
+            self._no_bursts if bursts is None else bursts.view(np.uint8),
             self.rise,
             self.water,
             self.excess,

@@ -114,10 +114,14 @@ class Heating:
             return self.outputs
         seconds = float(self._elapsed[0])
         self._elapsed[:] = 0.0
-        power = self._power(seconds)
+        power, bursts = self._power(seconds)
         for i, heat in enumerate(self.heats):
             burnt = heat.kinds > 0
-            self._smoke[i] = 1e3 / seconds * heat.advance(seconds, power[i] if power else None)
+            self._smoke[i] = (
+                1e3
+                / seconds
+                * heat.advance(seconds, power[i] if power else None, bursts[i] if bursts else None)
+            )
             if not heat.is_cold:
                 self._burn(self._organs[i], heat, burnt)
         return self.outputs
@@ -173,9 +177,13 @@ class Heating:
             self.follow()
         organ.colour(heat.kinds)
 
-    def _power(self, seconds: float) -> list[NDArray[np.float32]]:
-        """Return the mean power (W) in every element of every organ, shapes (m,); empty: none."""
+    def _power(self, seconds: float) -> tuple[list[NDArray[np.float32]], list[NDArray[np.bool_]]]:
+        """Return the mean power (W) in every element of every organ, and where a current cuts.
+
+        Shapes (m,); empty: none.
+        """
         power: list[NDArray[np.float32]] = []
+        bursts: list[NDArray[np.bool_]] = []
         nodes: list[Vector] = []
         for instrument, probe in self._instruments:
             if not instrument.numbers[0]:
@@ -183,10 +191,13 @@ class Heating:
             nodes = nodes or [organ.solid.nodes for organ in self._organs]
             poles = instrument.poles(probe.positions, probe.touching | probe.held)
             given = instrument.deposit(self.heats, nodes, poles, self._edge)
+            if given and instrument.cuts:
+                cut = [heat > 0.0 for heat in given]
+                bursts = [one | other for one, other in zip(bursts, cut, strict=True)] if bursts else cut
             for i, heat in enumerate(given):
                 shares = (heat / np.float32(seconds)).astype(np.float32)
                 if len(power) > i:
                     power[i] += shares
                 else:
                     power.append(shares)
-        return power
+        return power, bursts

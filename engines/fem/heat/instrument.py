@@ -52,12 +52,15 @@ class EnergyInstrument:
     """
 
     def __init__(self, name: str, params: EnergyParams, radii: Vector) -> None:
-        self.name, self.reach = name, _REACH * float(radii.max())
+        self.name, self.reach = name, _REACH * float(radii[: params.bare].max())
         self.numbers: Vector = np.zeros(3)
         """Heat that waits for the next step of heat, and heat given since time 0, J; time with power
         since the last contact, s.
         """
         self._params, self._radii = params, radii
+        self.cuts = params.effect == "cut"
+        """Whether steam takes dried tissue away."""
+        self._conducts: NDArray[np.bool_] = np.arange(len(radii)) < (params.bare or len(radii))
 
     def listen(self, inputs: Inputs, seconds: float) -> None:
         """Collect the power of a step."""
@@ -70,8 +73,11 @@ class EnergyInstrument:
     def poles(self, centres: Vector, touching: NDArray[np.bool_]) -> Vector:
         """Return centre, radius and signed current of every pole, shape (p, 5).
 
+        Insulated spheres are none.
+
         No pole without contact, of a bipolar instrument without contact of both jaws.
         """
+        touching = touching & self._conducts
         current = touching / max(1, int(touching.sum()))
         if self._params.mode == "bipolar":
             first = np.arange(len(touching)) < len(touching) // 2

@@ -23,7 +23,7 @@ def parts(electrode: Electrode, _instrument: str, mount: Mount) -> Looks:
         wire = union(wire, rod((0.0, r, end), (0.0, r - electrode.foot, end), r))
     else:
         wire = union(wire, block((-0.5 * r, -2.0 * r, sleeve), (0.5 * r, 2.0 * r, electrode.length)))
-    insulation = rod((0.0, 0.0, 0.0), (0.0, 0.0, sleeve), 1.8 * r)
+    insulation = rod((0.0, 0.0, 0.0), (0.0, 0.0, sleeve), electrode.sleeve)
     solids = (("electrode", wire - insulation, STEEL), ("insulation", insulation, DARK))
     placed = tuple(
         part(name, place_solid(solid, pose[:3, :3], pose[:3, 3]), stuff) for name, solid, stuff in solids

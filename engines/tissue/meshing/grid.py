@@ -16,6 +16,9 @@ __all__ = ["FEWEST_NODES", "block", "block_cells", "grid_indices", "tetrahedra_o
 FEWEST_NODES = 18
 """Nodes of the smallest symmetric block, 2 x 2 x 1 cells."""
 
+_GROWTH, _MOST_GROWING = 1.5, 60
+"""Height of a row of cells over that of the row above, and most of such rows."""
+
 _COUNT_TOLERANCE = 0.05
 """Tolerance of the node count: among the grids within the tolerance, the grid with the most cubic cells is
 used.
@@ -29,19 +32,24 @@ _MIRRORED_CELL = (_CELL ^ 4)[:, [0, 2, 1, 3]]
 """The same, mirrored in x: neighbouring cells must alternate for their diagonals to meet."""
 
 
-def block(size: Vector, nodes: int, layers: Sequence[float] = ()) -> TetMesh:
+def block(size: Vector, nodes: int, layers: Sequence[float] = (), rows: Sequence[int | None] = ()) -> TetMesh:
     """Return a box of edge lengths `size` (m), shape (3,), with about `nodes` nodes.
 
     The origin is in the middle of the top face. The cells of a regular grid are cut into five tetrahedra
     each, the fewest possible, mirrored from cell to cell. With an even number of cells along x and y the mesh
     is symmetric in both, without a preferred diagonal. Layers from the top down, of these thicknesses (m),
     have whole rows of cells, one at least.
+
+    Where `rows` states the rows of a layer, the tissue below all layers is coarser from row to row.
     """
     cells = block_cells(size, nodes)
     heights = np.zeros(0)
     if layers:
-        heights = _row_heights(float(size[2]), cells[2], layers)
+        counts = [rows[i] if rows else None for i in range(len(layers))]
+        heights = _row_heights(float(size[2]), cells[2], layers, counts)
         cells = cells[0], cells[1], len(heights) - 1
+        if any(counts):
+            cells = *_cells_across(size, nodes / len(heights)), len(heights) - 1
     indices = grid_indices(cells[0] + 1, cells[1] + 1, cells[2] + 1)
     points = (indices / cells - [0.5, 0.5, 1.0]) * size
     if layers:
@@ -49,14 +57,38 @@ def block(size: Vector, nodes: int, layers: Sequence[float] = ()) -> TetMesh:
     return TetMesh(points, tetrahedra_of_cells(cells))
 
 
-def _row_heights(height: float, rows: int, layers: Sequence[float]) -> Vector:
-    """Return the heights (m, from -height to 0) of about so many rows of cells."""
-    parts = [height - plain_sum(layers), *reversed(layers)]
-    planes = [-height]
-    for part in parts:
-        count = max(1, round(rows * part / height))
+def _row_heights(height: float, rows: int, layers: Sequence[float], counts: Sequence[int | None]) -> Vector:
+    """Return the heights (m, from -height to 0) of about so many rows of cells.
+
+    `counts`: rows of the layers from the top down, where they are stated.
+    """
+    base = height - plain_sum(layers)
+    found = [count or max(1, round(rows * part / height)) for part, count in zip(layers, counts, strict=True)]
+    below = np.full(max(1, round(rows * base / height)), 1.0)
+    if any(counts):
+        below = _growing_rows(base, layers[-1] / found[-1])
+    planes = (-height + base * np.concatenate([[0.0], np.cumsum(below)]) / below.sum()).tolist()
+    for part, count in zip(reversed(layers), reversed(found), strict=True):
         planes += (planes[-1] + part * np.arange(1, count + 1) / count).tolist()
     return np.array([*planes[:-1], 0.0])
+
+
+def _growing_rows(height: float, least: float) -> Vector:
+    """Return the relative heights of rows from the lowest up, each coarser than the row above.
+
+    `least`: height of the row above all of them, m.
+    """
+    count = 1
+    while count < _MOST_GROWING and least * plain_sum(_GROWTH ** (k + 1) for k in range(count)) < height:
+        count += 1
+    return np.array([_GROWTH**k for k in range(count, 0, -1)])
+
+
+def _cells_across(size: Vector, nodes: float) -> tuple[int, int]:
+    """Return even numbers of about square cells along x and y, for so many nodes of a level."""
+    edge = float(np.sqrt(size[0] * size[1] / nodes))
+    x, y = (max(2, 2 * round(0.5 * float(length) / edge)) for length in size[:2])
+    return x, y
 
 
 def tetrahedra_of_cells(cells: tuple[int, int, int], *, closed: bool = False) -> Indices:

@@ -24,6 +24,15 @@ class LayerParams(BaseModel):
 
     name: Name
     thickness: Annotated[Length, Field(gt=0)]
+    rows: int | None = Field(
+        default=None,
+        ge=1,
+        le=20,
+        description=(
+            "rows of cells, for a finer mesh where heat acts; below the layers each row is then half as high"
+            " again as the row above; default: by the number of nodes"
+        ),
+    )
     material: str = Field(description="name of a material that `trocar organs` shows with its source")
     young_modulus: TissueModulus | None = Field(default=None, description="instead of that of the material")
 

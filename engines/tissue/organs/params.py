@@ -273,7 +273,8 @@ class OrganParams(BaseModel):
     def body(self) -> Shape:
         """The shape. Raises ValueError where the mesh file is unusable."""
         if self.size is not None:
-            return block_shape(self.size, tuple(layer.thickness for layer in self.layers))
+            layers = tuple(layer.thickness for layer in self.layers)
+            return block_shape(self.size, layers, tuple(layer.rows for layer in self.layers))
         if self.tube is not None:
             return tube_shape(self.tube)
         if self.mesh is not None:

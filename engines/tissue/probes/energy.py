@@ -23,6 +23,18 @@ class EnergyParams(BaseModel):
             " second half"
         ),
     )
+    effect: Literal["coag", "cut"] = Field(
+        default="coag",
+        description=(
+            "coag: tissue dries and chars, and goes at 500 degrees; cut: steam takes tissue away as soon as"
+            " the current has dried it, as arcs above 200 V do (Koninckx et al. 2024)"
+        ),
+    )
+    bare: int | None = Field(
+        default=None,
+        ge=1,
+        description="how many of the first spheres conduct, the others being insulated; default: all",
+    )
     power: Power = Field(
         default=60.0, gt=0, le=400, description="most power of the generator; a higher command is cut down"
     )

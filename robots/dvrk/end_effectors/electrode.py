@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +33,22 @@ class Electrode(EndEffector):
         """Return the electrode, in place of the wrist's last link."""
         return {mount.link: Inertia.of_steel_ball(mount.pose[:3, 3], PROBE_RADIUS)}
 
+    sleeve: float = 0.00108
+    """Radius of the insulated stem, m; assumed."""
+
     def spheres(self, tip: Vector, /) -> tuple[ContactSphere, ...]:
+        """Return the bare end, then the insulated stem from there backwards, without gaps."""
+        return *self.bare(tip), *self._stem(tip)
+
+    def _stem(self, tip: Vector) -> Iterator[ContactSphere]:
+        """Yield the spheres of the stem, up to the last joint's axis."""
+        first = self.length - (2.0 * self.radius if self.foot else 6.0 * self.radius) - self.sleeve
+        count = int(first / (2.0 * self.sleeve)) + 1
+        for i in range(count):
+            x, y, z = ((first - 2.0 * self.sleeve * i) * tip[:3, 2]).tolist()
+            yield ContactSphere(f"stem_{i + 1}", "wrist_yaw", (x, y, z), self.sleeve)
+
+    def bare(self, tip: Vector, /) -> tuple[ContactSphere, ...]:
         """Return the bare end: from heel to tip of a hook, else from the end backwards, without gaps."""
         end = (self.length - self.radius) * tip[:3, 2]
         along = np.array([0.0, 0.0, -1.0]) if self.foot else -tip[:3, 2]

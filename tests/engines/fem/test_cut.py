@@ -162,23 +162,69 @@ def test_elements_go_with_their_mass():
         solid.remove(np.array([10**6]))
 
 
-def test_tissue_stretched_beyond_its_limit_tears():
-    solid = strip()
+def pull_apart(solid, way, seconds=0.2, **limits):
+    """Lift the top of the strip by `way`; return when it began to tear, and how many faces have opened."""
     top = np.flatnonzero(STRIP.nodes[:, 2] > -1e-9)
     for node in top.tolist():
         solid.hold(node, 0)
-    lift = np.zeros((101, 1, 3))
-    lift[:, 0, 2] = np.linspace(0.0, 8e-3, 101)
-    torn = 0
-    for before, after in pairwise(lift):
+    lift = np.zeros((round(seconds / STEP) + 1, 1, 3))
+    lift[:, 0, 2] = np.linspace(0.0, way, len(lift))
+    began, torn = None, 0
+    for k, (before, after) in enumerate(pairwise(lift)):
         path = before + np.linspace(0.0, 1.0, solid.sub_steps(STEP) + 1)[:, None, None] * (after - before)
         solid.advance(STEP, SphereWay(path, np.full(1, 1e-3), np.zeros(1, np.uint8)), 0.0, 0.0)
-        torn += solid.tear(1.4)
+        opened = solid.tear(1.4, **limits) if k % 8 == 0 else 0
+        began, torn = k if opened and began is None else began, torn + opened
+    return began, torn
+
+
+def test_tissue_stretched_beyond_its_limit_tears():
+    solid = strip()
+    _, torn = pull_apart(solid, 8e-3)
     assert torn > 0
     assert np.isfinite(solid.displacement).all()
-    solid.let_go(int(top[0]))
-    assert solid.holder[top[0]] == -1
-    assert solid.inverse_mass[top[0]] > 0.0
+    top = int(np.flatnonzero(solid.holder >= 0)[0])
+    solid.let_go(top)
+    assert solid.holder[top] == -1
+    assert solid.inverse_mass[top] > 0.0
+
+
+def test_a_tear_runs_through_a_strip_as_a_surface_and_leaves_few_crumbs():
+    mesh = block(np.array([40e-3, 10e-3, 5e-3]), 900)
+    x = mesh.nodes[:, 0]
+    solid = Solid(mesh, x < x.min() + 1e-9, Material(50e3, 0.4, 1000.0, 1e-3), divisible=True)
+    for node in np.flatnonzero(x > x.max() - 1e-9).tolist():
+        solid.hold(node, 0)
+    for k, before in enumerate(np.arange(0.0, 26e-3, 0.02e-3).tolist()):
+        path = np.zeros((solid.sub_steps(STEP) + 1, 1, 3))
+        path[:, 0, 0] = np.linspace(before, before + 0.02e-3, len(path))
+        solid.advance(STEP, SphereWay(path, np.full(1, 1e-3), np.zeros(1, np.uint8)), 0.0, 0.0)
+        if k % 8 == 0:
+            solid.tear(1.6)
+    pieces = solid.pieces
+    sizes = np.sort(np.bincount(pieces[pieces >= 0]))[::-1]
+    assert len(sizes) > 1
+    assert sizes[:2].sum() > 0.99 * len(mesh.tetrahedra)
+
+
+def test_a_cut_runs_on_by_its_toughness_below_the_stretch_at_which_tears_begin():
+    def notched():
+        solid = strip()
+        middles = solid._middles.astype(float)
+        left = middles[:, 0] < middles[:, 0].min() + 0.3 * np.ptp(middles[:, 0])
+        below = middles[:, 2] < middles[:, 2].mean()
+        across = solid._across
+        other = np.where(across >= 0, across // 4, 0)
+        faces = (across >= 0) & left[:, None] & (below[:, None] != below[other])
+        assert solid.compiled.open(np.flatnonzero(faces.ravel()).astype(np.int32)) > 0
+        return solid
+
+    way = 0.2 * float(np.ptp(STRIP.nodes[:, 2]))
+    tough, weak = notched(), notched()
+    assert pull_apart(tough, way, toughness=1e4) == (None, 0)
+    began, torn = pull_apart(weak, way, toughness=0.5)
+    assert began is not None
+    assert torn > 0
 
 
 CUT = {

@@ -55,6 +55,21 @@ def test_layers_have_whole_rows_of_cells_and_their_volumes():
     assert found == pytest.approx(96e-6 * np.array([1.5e-3, 1.5e-3, 3e-3]))
 
 
+def test_stated_rows_are_fine_and_the_tissue_below_is_coarser_from_row_to_row():
+    layers = [FLAP["layers"][0] | {"rows": 3}, FLAP["layers"][1] | {"thickness": "0.5 mm", "rows": 1}]
+    organ = organ_params(layers=layers, nodes=600)
+    heights = np.unique(np.round(organ.local.nodes[:, 2], 9))[::-1]
+    rows = -np.diff(heights)
+    assert rows[:4] == pytest.approx([0.5e-3] * 4)
+    assert rows[4:].sum() == pytest.approx(4e-3)
+    assert rows[5:] / rows[4:-1] == pytest.approx(1.5, rel=1e-4)
+    assert 0.6 < rows[4] / 0.75e-3 < 1.5
+    assert len(organ.local.nodes) == pytest.approx(600, rel=0.25)
+    numbers = organ.layer_numbers(organ.local.tetrahedra)
+    found = np.bincount(numbers, volumes(organ.local.nodes, organ.local.tetrahedra))
+    assert found == pytest.approx(96e-6 * np.array([1.5e-3, 0.5e-3, 4e-3]))
+
+
 def test_every_layer_has_the_mass_and_the_stiffness_of_its_material():
     with FlapRig() as rig:
         solid, layers = rig.organ.solid, rig.organ.layers

@@ -111,6 +111,18 @@ def test_a_body_at_its_own_temperature_takes_no_damage_and_no_time():
     assert not heat.damage.any()
 
 
+def test_a_cutting_current_takes_tissue_as_soon_as_it_is_dry():
+    heat = heat_of(grid((2, 2, 2), 1e-3))
+    volume, power = 8e-9, everywhere(heat, 2.0)
+    bursts = np.ones(len(power), np.bool_)
+    while len(heat.vaporised()) < len(heat.stage):
+        heat.advance(1e-2, power, bursts)
+    needed = volume * (LIVER.capacity * 63.0 + LATENT)
+    assert heat.book[0] == pytest.approx(needed, rel=0.02)
+    assert needed / volume == pytest.approx(2.0e9, rel=0.05)  # 1.9 to 2.1 J/mm^3
+    assert heat.imbalance == pytest.approx(0.0, abs=1e-5 * heat.book[0])
+
+
 def test_water_boils_off_at_100_degrees_with_its_latent_heat():
     heat = heat_of(grid((2, 2, 2), 1e-3))
     volume, watts = 8e-9, 2.0

@@ -105,6 +105,27 @@ def test_heat_is_that_of_point_currents_in_an_infinite_body(mode):
     assert len(alone) == (0 if mode == "bipolar" else 1)
 
 
+def test_insulated_spheres_conduct_nothing_and_press_all_the_same():
+    instrument = EnergyInstrument("hook", EnergyParams(bare=2), np.array([0.6e-3, 0.6e-3, 1.1e-3]))
+    poles = instrument.poles(np.zeros((3, 3)), np.ones(3, bool))
+    assert poles[:, 3:].tolist() == [[0.6e-3, 0.5], [0.6e-3, 0.5]]
+    assert len(instrument.poles(np.zeros((3, 3)), np.array([False, False, True]))) == 0
+    assert instrument.reach == pytest.approx(4.0 * 0.6e-3)
+
+
+def test_a_cutting_current_takes_more_tissue_away_and_leaves_less_of_it_hot():
+    gone, hottest = [], []
+    for effect in ("coag", "cut"):
+        with CauteryRig({**SLAB, "cutting": {}}, effect=effect, power=150.0, efficiency=1.0) as rig:
+            rig.watts[:] = 150.0
+            rig.move((-3e-3, 0.0, ON_SLAB[2]), 0.6)
+            gone.append(rig.heat.book[3])
+            hottest.append(rig.number("block/hottest"))
+            assert abs(rig.heat.imbalance) < 1e-3 * rig.heat.book[0]
+    assert gone[1] > gone[0] > 0.0
+    assert hottest[1] < hottest[0]
+
+
 def test_power_without_contact_heats_nothing_and_is_said_once(caplog):
     with CauteryRig(start=(0.0, 0.0, 0.02)) as rig, caplog.at_level(logging.WARNING):
         rig.watts[:] = 30.0
