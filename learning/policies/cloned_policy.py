@@ -20,7 +20,7 @@ from schemas.vectors import Vector
 
 __all__ = ["ClonedPolicy"]
 
-EXECUTED = 2
+EXECUTED = 3
 """Number of predicted actions to be executed."""
 
 

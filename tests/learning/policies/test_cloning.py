@@ -82,19 +82,20 @@ def test_a_clone_without_its_network_says_how_to_train(tmp_path, monkeypatch):
     assert "python -m learning.policies" in row["error"]
 
 
-def test_two_predicted_actions_are_executed_with_a_jaw_open_or_closed(tmp_path, monkeypatch):
+def test_predicted_actions_are_executed_with_a_jaw_open_or_closed(tmp_path, monkeypatch):
     env = make_environment(TRIAL, {})
     observation, _ = env.reset(seed=0)
     numbers = len(StateFeatures(env)(observation))
-    rows = np.array([[0.4, 0.0, 0.0, 0.0, -0.2], [0.1, 0.0, 0.0, 0.0, 1.0]])  # now, and in a step
-    Network(np.zeros(numbers), np.ones(numbers), [np.zeros((10, numbers))], [rows.ravel()], 2).save(
+    rows = np.zeros((4, 5))
+    rows[:, 0], rows[:, 4] = [0.4, 0.3, 0.2, 0.1], [-0.2, 0.9, -0.9, 0.1]
+    Network(np.zeros(numbers), np.ones(numbers), [np.zeros((20, numbers))], [rows.ravel()], 4).save(
         tmp_path / "NeedlePick.npz"
     )
     monkeypatch.setattr(ClonedPolicy, "directory", tmp_path)
     policy = ClonedPolicy()
     policy.begin(env, 0)
-    acted = [policy.act(observation)[[0, 4]] for _ in range(3)]
-    assert np.array(acted) == pytest.approx(np.array([[0.4, -1.0], [0.1, 1.0], [0.4, -1.0]]))
+    acted = [policy.act(observation)[[0, 4]] for _ in range(4)]
+    assert np.array(acted) == pytest.approx(np.array([[0.4, -1.0], [0.3, 1.0], [0.2, -1.0], [0.4, -1.0]]))
     env.close()
 
 
