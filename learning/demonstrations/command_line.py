@@ -104,7 +104,7 @@ def _plain(settings: dict[str, Any]) -> Any:
     """Return settings as JSON reads them back."""
     import json
 
-    return json.loads(json.dumps(settings))
+    return json.loads(json.dumps(settings, default=sorted))
 
 
 def _check(order: Order) -> None:
