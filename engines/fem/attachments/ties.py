@@ -31,7 +31,7 @@ class Ties:
     shares: Vector
     """Shares of the nodes of this face in the tied point, shape (t, 3)."""
     offsets: Vector
-    """From the point to the node in the frame of the face, m, shape (t, 3)."""
+    """Vector to the node from the tied point, in the frame of the face, m, shape (t, 3)."""
     areas: Vector
     """Tied area, m^2, shape (t,)."""
 
