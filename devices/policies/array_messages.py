@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from io import BytesIO
 from math import prod
+from tokenize import TokenError
 from typing import Any, cast
 
 import numpy as np
@@ -108,6 +109,9 @@ def _saved_array(data: bytes) -> NDArray[Any]:
     """Return the array of a .npy file, sizes checked before anything is allocated."""
     file = BytesIO(data)
     read_header = _HEADERS[np.lib.format.read_magic(file)]
-    shape, is_fortran, dtype = read_header(file)
+    try:
+        shape, is_fortran, dtype = read_header(file)
+    except (SyntaxError, TokenError) as error:  # the header is a dictionary in Python's notation
+        raise ValueError(f"no header of a .npy file: {error}") from error
     array = _array(data[file.tell() :], dtype, shape[::-1] if is_fortran else shape)
     return array.T if is_fortran else array

@@ -67,7 +67,10 @@ class I4hPolicy:
     def _open(self) -> zenoh.Session:
         """Open a peer that connects and does not listen: to the endpoint, or to whoever is found."""
         config = zenoh.Config()
-        settings: dict[str, Any] = {"listen/endpoints": []}
+        settings: dict[str, Any] = {
+            "listen/endpoints": [],
+            "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
+        }
         if self._endpoint:
             settings |= {
                 "mode": "client",

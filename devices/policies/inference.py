@@ -26,6 +26,7 @@ class Inference:
         self._connect, self._episode = connect, episode
         self._policy: Policy | None = None
         self._away, self._retry_s = "", 0.0
+        self._ended = False
 
     def open(self) -> str:
         """Try to reach the policy; return why it is away, empty if it is there.
@@ -40,6 +41,9 @@ class Inference:
             self._away, self._retry_s = str(error), monotonic() + _RETRY_S
             return self._away
         self._policy = policy
+        if self._ended:  # meanwhile, by another thread
+            self._release()
+            return self._away
         try:
             policy.reset(self._episode)
         except TrocarError as error:
@@ -72,6 +76,8 @@ class Inference:
     def _ask(self, question: Observation | str) -> Vector:
         if isinstance(question, str):
             raise MessageError(question)
+        if self._ended:
+            raise MessageError("the policy is not asked any more")
         if self._policy is None and monotonic() >= self._retry_s:
             self._away = ""
             self.open()
@@ -81,11 +87,15 @@ class Inference:
 
     def _drop(self, reason: str) -> None:
         """Close a policy that has failed; it is opened again at a later question."""
-        self.close()
+        self._release()
         self._away, self._retry_s = reason, monotonic() + _RETRY_S
 
     def close(self) -> None:
-        """Close the policy."""
+        """Close the policy for good."""
+        self._ended = True
+        self._release()
+
+    def _release(self) -> None:
         policy, self._policy = self._policy, None
         if policy is not None:
             policy.close()

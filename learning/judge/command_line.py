@@ -54,6 +54,9 @@ def judge(
         ),
     ] = "nominal",
     seeds: Annotated[int, typer.Option(min=1, help="Episodes of each exercise and difficulty.")] = 50,
+    first_seed: Annotated[
+        int, typer.Option(min=0, help="Seed of the first episode, where a policy has seen the first seeds.")
+    ] = 0,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -99,7 +102,7 @@ def judge(
     address = PolicyAddress(policy, _stated(contract), execute)
     open_policy(address)
     verdict = Verdict(
-        address, exercises_of(suite), difficulties_of(difficulty), seeds, output, recorded=record
+        address, exercises_of(suite), difficulties_of(difficulty), seeds, output, first_seed, recorded=record
     )
     with claim_directory(output, "verdict"):
         verdict.open()

@@ -42,8 +42,9 @@ class Verdict:
     exercises: tuple[str, ...]
     difficulties: tuple[str, ...]
     seeds: int
-    """Number of episodes of each exercise at each difficulty: seeds 0, 1, ..."""
+    """Number of episodes of each exercise at each difficulty."""
     directory: Path
+    first_seed: int = 0
     recorded: bool = True
 
     @property
@@ -53,7 +54,7 @@ class Verdict:
             Trial(exercise, difficulty, seed)
             for exercise in self.exercises
             for difficulty in self.difficulties
-            for seed in range(self.seeds)
+            for seed in range(self.first_seed, self.first_seed + self.seeds)
         ]
 
     def open(self) -> None:
@@ -105,6 +106,7 @@ class Verdict:
             "exercises": list(self.exercises),
             "difficulties": list(self.difficulties),
             "seeds": self.seeds,
+            "first_seed": self.first_seed,
             "recorded": self.recorded,
             "trocar": version("trocar"),
         }

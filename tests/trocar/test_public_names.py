@@ -84,6 +84,7 @@ def test_the_public_names_are_these() -> None:
         "environments",
         "haptics",
         "messages",
+        "policies",
         "programs",
         "quantities",
         "records",

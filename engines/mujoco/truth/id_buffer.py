@@ -6,6 +6,7 @@ that exactly. Depth, normals and motion are computed from the triangle afterward
 
 from __future__ import annotations
 
+from ctypes import c_void_p
 from importlib import import_module
 from typing import Any
 
@@ -28,6 +29,8 @@ class IdBuffer:
         self._context: Any = opengl.context(gl, *size)
         self._context.make_current()
         self._gl: Any = import_module("OpenGL.GL")
+        # PyOpenGL's own forms look for the context with the window system that it was first imported for
+        self._raw: Any = import_module("OpenGL.raw.GL.VERSION.GL_1_1")
         self._make_target()
 
     def _make_target(self) -> None:
@@ -75,8 +78,8 @@ class IdBuffer:
         numbers = np.arange(1, len(corners) + 1, dtype="<u4").repeat(3).view(np.uint8)
         gl.glEnableClientState(gl.GL_VERTEX_ARRAY)
         gl.glEnableClientState(gl.GL_COLOR_ARRAY)
-        gl.glVertexPointer(3, gl.GL_FLOAT, 0, positions)
-        gl.glColorPointer(4, gl.GL_UNSIGNED_BYTE, 0, numbers)
+        self._raw.glVertexPointer(3, gl.GL_FLOAT, 0, positions.ctypes.data_as(c_void_p))
+        self._raw.glColorPointer(4, gl.GL_UNSIGNED_BYTE, 0, numbers.ctypes.data_as(c_void_p))
         gl.glDrawArrays(gl.GL_TRIANGLES, 0, 3 * len(corners))
         pixels = gl.glReadPixels(0, 0, self._width, self._height, gl.GL_RGBA, gl.GL_UNSIGNED_BYTE)
         found = np.frombuffer(pixels, "<u4").reshape(self._height, self._width)

@@ -39,6 +39,7 @@ def process(answer):
         "mode": "router",
         "listen/endpoints": [f"tcp/{endpoint}"],
         "scouting/multicast/enabled": False,
+        "transport/shared_memory/enabled": False,
     }.items():
         config.insert_json5(key, json.dumps(value))
     states, pictures = [], []

@@ -98,7 +98,10 @@ class HdWorld:
         """Wait until `device` gives no force: the motors are at zero, or process `owner` has ended, which
         closes it. Return when, s of CLOCK_MONOTONIC. Raises TimeoutError after `patience_s`.
         """
-        handle = os.pidfd_open(owner)
+        try:
+            handle = os.pidfd_open(owner)
+        except ProcessLookupError:  # it has ended, and its parent has seen so
+            return monotonic()
         try:
             ended = select.poll()
             ended.register(handle, select.POLLIN)

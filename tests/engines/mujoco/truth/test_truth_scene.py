@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -281,3 +283,25 @@ def test_a_hook_is_the_working_end_of_its_instrument(gl: str) -> None:
     u, v = np.rint(points["wrist_yaw_end"].pixel).astype(int)
     assert SceneClass.JAW in sight.classes[v - 1 : v + 2, u - 1 : u + 2]
     scene.close()
+
+
+_SCREEN_FIRST = """
+import OpenGL.GL  # before the choice of an OpenGL without a screen
+import numpy as np
+from engines.mujoco.truth.id_buffer import IdBuffer
+corners = np.array([[[-1.0, -1.0, 1.0], [1.0, -1.0, 1.0], [0.0, 1.0, 1.0]]])
+intrinsics = np.array([[8.0, 0.0, 7.5], [0.0, 8.0, 7.5], [0.0, 0.0, 1.0]])
+buffer = IdBuffer({gl!r}, (16, 16))
+for order in (corners, corners[:, ::-1]):
+    print(sorted(set(buffer.draw(order, intrinsics, (0.1, 10.0)).ravel().tolist())))
+"""
+
+
+def test_it_draws_where_something_else_has_imported_opengl(gl: str) -> None:
+    if gl != "egl":
+        pytest.skip("PyOpenGL loads the functions of EGL and GLX from one library, of OSMesa from another")
+    done = subprocess.run(
+        [sys.executable, "-c", _SCREEN_FIRST.format(gl=gl)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert sorted(done.stdout.splitlines()) == ["[-1, 0]", "[-1]"]
