@@ -142,7 +142,7 @@ def test_the_hosts_of_a_killed_hub_end_by_themselves_and_its_recording_is_recove
 
 def test_a_failed_session_is_exit_code_1(hub):
     code, errors = hub(FAILING).end()
-    assert code == 1
+    assert code == 1, errors
     assert "participant 'here' failed at step 5: ArithmeticError: the rope is torn" in errors
 
 
