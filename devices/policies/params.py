@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
 from devices.policies.policy import BACKENDS, check_backend
+from devices.scene_arms import SceneArms
 from hub.participant import Params
 from robots.dvrk.crtk import Mounting
-from robots.dvrk.mounted import MountedEcm, MountedPsm
-from robots.dvrk.setup_joints import CartArm
 from robots.policies.contract import Contract
 from robots.policies.terms import Terms
 from schemas.quantity import Duration
@@ -19,32 +17,12 @@ from schemas.quantity import Duration
 __all__ = ["PolicyParams"]
 
 
-class _Arms(Params):
-    """The arms of the scene, for the names of their joints and frames."""
-
-    PSM1: MountedPsm | None = None
-    PSM2: MountedPsm | None = None
-    PSM3: MountedPsm | None = None
-    ECM: MountedEcm | None = None
-
-    @property
-    def present_arms(self) -> Mapping[CartArm, MountedPsm | MountedEcm]:
-        """Arms by name."""
-        named: dict[CartArm, MountedPsm | MountedEcm | None] = {
-            "PSM1": self.PSM1,
-            "PSM2": self.PSM2,
-            "PSM3": self.PSM3,
-            "ECM": self.ECM,
-        }
-        return {name: arm for name, arm in named.items() if arm is not None}
-
-
 class PolicyParams(Params):
     """Where the policy is, and the contract with it."""
 
     native_code = ("backend", "python")
 
-    arms: _Arms
+    arms: SceneArms
     mounting: Mounting = "free"
     contract: Contract = Contract()
     backend: Annotated[str, AfterValidator(check_backend)] = Field(

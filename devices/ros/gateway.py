@@ -194,7 +194,7 @@ class Gateway(Device):
 
     def _service_handler(self, row: Row) -> ServiceHandler:
         """Return the counting handler of an arm's service."""
-        arm, count = self.params.arms.shown[cast("CartArm", row.owner)], self._counters[row]
+        arm, count = self.params.arms.present_arms[cast("CartArm", row.owner)], self._counters[row]
         handle = kinematics_handler(row, arm.chain, self._states[f"SUJ/{row.owner}/measured_cp"])
 
         def count_payload(payload: bytes) -> bytes:

@@ -2,42 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from devices.scene_arms import SceneArms
 from hub.participant import Params
 from robots.dvrk.crtk import Mounting, Reference
-from robots.dvrk.mounted import MountedEcm, MountedPsm
-from robots.dvrk.setup_joints import CartArm
 from schemas.files import find_file
 from schemas.quantity import Duration
 
-__all__ = ["Arms", "GatewayParams", "Real", "TopicParams"]
+__all__ = ["GatewayParams", "Real", "TopicParams"]
 
 Real = Literal["PSM1", "PSM2", "PSM3", "ECM", "MTML", "MTMR", "footpedals"]
-
-
-class Arms(Params):
-    """The simulated arms visible to ROS programs."""
-
-    PSM1: MountedPsm | None = None
-    PSM2: MountedPsm | None = None
-    PSM3: MountedPsm | None = None
-    ECM: MountedEcm | None = None
-
-    @property
-    def shown(self) -> Mapping[CartArm, MountedPsm | MountedEcm]:
-        """The arms of the scenario, by name."""
-        named: dict[CartArm, MountedPsm | MountedEcm | None] = {
-            "PSM1": self.PSM1,
-            "PSM2": self.PSM2,
-            "PSM3": self.PSM3,
-            "ECM": self.ECM,
-        }
-        return {name: arm for name, arm in named.items() if arm is not None}
 
 
 class TopicParams(Params):
@@ -50,7 +28,9 @@ class TopicParams(Params):
             " `vrep` stands"
         ),
     )
-    arms: Arms = Field(default=Arms(), description="the simulated arms, as in the motion controller")
+    arms: SceneArms = Field(
+        default=SceneArms(), description="the simulated arms, as in the motion controller"
+    )
     listen: tuple[Real, ...] = Field(
         default=(),
         description=(
@@ -71,7 +51,7 @@ class TopicParams(Params):
 
     @model_validator(mode="after")
     def _shown_or_listened_to(self) -> Self:
-        both = sorted(set(self.arms.shown) & set(self.listen))
+        both = sorted(set(self.arms.present_arms) & set(self.listen))
         if both:
             raise ValueError(
                 f"{', '.join(both)}: an arm is either simulated (`arms`) or real (`listen`); for both take"

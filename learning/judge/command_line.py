@@ -31,7 +31,7 @@ def judge(
         str | None,
         typer.Option(
             metavar="POLICY",
-            help="expert, random, hold, a backend's address such as openpi://HOST:8000, or MODULE:NAME of a"
+            help="expert, random, a backend's address such as openpi://HOST:8000, or MODULE:NAME of a"
             " class of your own.",
         ),
     ] = None,

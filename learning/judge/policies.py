@@ -4,7 +4,6 @@
 |---|---|
 | `expert` | the exercise's oracle |
 | `random` | uniform actions, seeded by the episode: the floor |
-| `hold` | no motion, jaws open |
 | `openpi://HOST:PORT`, ... | a policy behind a contract: the backends of kind `policy` |
 | `MODULE:NAME` | a class or function without arguments, for an object with `begin` and `act` |
 """
@@ -75,21 +74,7 @@ class RandomActions:
         return self._rng.uniform(-1.0, 1.0, self._shape)
 
 
-class Hold:
-    """No motion."""
-
-    environment: Mapping[str, Any] = MappingProxyType({})
-
-    def begin(self, env: Environment, seed: int) -> None:  # noqa: ARG002
-        """Know the number of hands."""
-        self._shape = env.action_space.shape
-
-    def act(self, observation: Observation) -> NDArray[Any]:  # noqa: ARG002
-        """Stay, with open jaws."""
-        return np.zeros(self._shape or ())
-
-
-_OWN: dict[str, Callable[[], JudgedPolicy]] = {"expert": Expert, "random": RandomActions, "hold": Hold}
+_OWN: dict[str, Callable[[], JudgedPolicy]] = {"expert": Expert, "random": RandomActions}
 
 
 class PolicyAddress(NamedTuple):

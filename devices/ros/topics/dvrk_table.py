@@ -66,11 +66,11 @@ def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
     Ports are named like their topics, without namespace and leading slash.
     """
     rows: list[Row] = []
-    for name, arm in params.arms.shown.items():
+    for name, arm in params.arms.present_arms.items():
         rows += _simulated_arm(name, arm, _reference_frame(name, params))
     for carried in get_args(CartArm):
         rows += _setup_joints(
-            carried, _reference_frame(carried, params) if carried in params.arms.shown else ""
+            carried, _reference_frame(carried, params) if carried in params.arms.present_arms else ""
         )
     for part, topics in PARTS.items():
         if part not in params.listen:
@@ -99,7 +99,7 @@ def _reference_frame(arm: CartArm, params: GatewayParams) -> str:
 
     The plan refuses a scenario with another frame in the motion controller.
     """
-    return crtk.reference_frame(arm, params.arms.shown, params.mounting, params.reference)
+    return crtk.reference_frame(arm, params.arms.present_arms, params.mounting, params.reference)
 
 
 def _state(owner: str, name: str, type_: str, **fields: Unpack[SignalFields]) -> Row:

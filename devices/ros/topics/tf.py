@@ -35,7 +35,7 @@ class TransformTree:
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
         """`states`: by the names of their ports."""
         self._edges: list[_Edge] = []
-        for name, arm in params.arms.shown.items():
+        for name, arm in params.arms.present_arms.items():
             self._edges += [
                 _base(name, arm, params, states),
                 (f"{name}_base", name, _newest(states[f"{name}/local/measured_cp"])),

@@ -50,7 +50,7 @@ _FILTER = {"kalmanOutput": PoseStamped.ros_type, "Tcn_hat": Float64MultiArray.ro
 def vrep_table(params: GatewayParams) -> tuple[Row, ...]:
     """Return every row for the arms of `params`."""
     return (
-        *(row for name, arm in params.arms.shown.items() for row in _arm(name, arm)),
+        *(row for name, arm in params.arms.present_arms.items() for row in _arm(name, arm)),
         _state("dvrk/setup_joint", "state_joint_current", size=_SETUP_JOINTS),
         _event("dvrk/setup_joint", "robot_state", _STRING),
         *(row for eye in ("left", "right") for row in _camera(eye)),

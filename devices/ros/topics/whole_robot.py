@@ -39,7 +39,7 @@ def inputs_of_all(params: GatewayParams) -> frozenset[str]:
     poses = ("{}/local/measured_cp", "SUJ/{}/measured_cp", "SUJ/{}/local/measured_cp")
     joints = (f"{{}}/{part}measured_js" for part in _PARTS)
     names = (*poses, *joints)
-    return frozenset(name.format(arm) for arm in params.arms.shown for name in names)
+    return frozenset(name.format(arm) for arm in params.arms.present_arms for name in names)
 
 
 def periods_between(name: str, period_ns: int) -> int:
@@ -70,7 +70,9 @@ class _JointStates:
 
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
         found = (
-            (arm, states.get(f"{arm}/{part}measured_js")) for arm in params.arms.shown for part in _PARTS
+            (arm, states.get(f"{arm}/{part}measured_js"))
+            for arm in params.arms.present_arms
+            for part in _PARTS
         )
         self._parts = [(arm, state) for arm, state in found if state is not None]
         self._known: list[State] = []

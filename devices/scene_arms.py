@@ -1,0 +1,31 @@
+"""The simulated arms of a scene, as devices know them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from hub.participant import Params
+from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.setup_joints import CartArm
+
+__all__ = ["SceneArms"]
+
+
+class SceneArms(Params):
+    """Arms of the patient cart, by name."""
+
+    PSM1: MountedPsm | None = None
+    PSM2: MountedPsm | None = None
+    PSM3: MountedPsm | None = None
+    ECM: MountedEcm | None = None
+
+    @property
+    def present_arms(self) -> Mapping[CartArm, MountedPsm | MountedEcm]:
+        """The arms of the scene."""
+        named: dict[CartArm, MountedPsm | MountedEcm | None] = {
+            "PSM1": self.PSM1,
+            "PSM2": self.PSM2,
+            "PSM3": self.PSM3,
+            "ECM": self.ECM,
+        }
+        return {name: arm for name, arm in named.items() if arm is not None}
