@@ -231,7 +231,7 @@ def _read(gateway: Gateway, wanted: set[str], timeout_s: float) -> dict[str, Sam
 def check_served(gateway: Gateway, peer: Peer, rows: Sequence[Row]) -> None:
     """Services answer as the kinematics does."""
     for row in (row for row in rows if row.way == "serve"):
-        arm = gateway.params.arms.shown[row.owner]  # pyright: ignore[reportArgumentType]
+        arm = gateway.params.arms.present_arms[row.owner]  # pyright: ignore[reportArgumentType]
         queries, home = KinematicsQueries(arm.chain), np.array(arm.start)
         base = (
             None
