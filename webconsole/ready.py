@@ -21,10 +21,12 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 from time import sleep
 
-__all__ = ["ReadyProcess", "main"]
+__all__ = ["END_S", "ReadyProcess", "main"]
 
-_PATIENCE_S = 10.0
-"""Time for a session to close the recording and end the hosts, s."""
+END_S = 60.0
+"""Longest time for a session to close the recording and end the hosts, s: generous, for a busy machine, as a
+killed hub leaves its secret behind.
+"""
 
 
 class ReadyProcess:
@@ -96,7 +98,7 @@ def _end_with_pipe(pipe: int) -> None:
         pass
     # a shell lets a program in the background, and so what that starts, ignore SIGINT
     os.kill(os.getpid(), signal.SIGTERM)
-    sleep(_PATIENCE_S)
+    sleep(END_S)
     os._exit(1)
 
 

@@ -23,7 +23,7 @@ from schemas.errors import ConnectError, MessageError
 from schemas.keys import Keys
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import SessionStatus
-from webconsole.ready import ReadyProcess
+from webconsole.ready import END_S, ReadyProcess
 from webconsole.stage import GROUP
 
 __all__ = ["Started", "StartedSession", "new_recording_path", "page_devices"]
@@ -228,7 +228,7 @@ def new_recording_path(parent: Path, stem: str) -> Path:
 
 def _wait(process: subprocess.Popen[bytes]) -> None:
     try:
-        process.wait(_PATIENCE_S)
+        process.wait(END_S)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
