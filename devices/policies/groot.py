@@ -44,12 +44,13 @@ class GrootPolicy:
         self._socket: Any = cast("Any", zmq.Context.instance()).socket(zmq.REQ)
         for option, value in (
             (zmq.LINGER, 0),
+            (zmq.IPV6, int(":" in (address.hostname or ""))),
             (zmq.SNDTIMEO, round(1e3 * timeout_s)),
             (zmq.MAXMSGSIZE, MOST_BYTES),
         ):
             self._socket.setsockopt(option, value)
         try:
-            self._socket.connect(f"tcp://{address.hostname}:{address.port}")
+            self._socket.connect(f"tcp://{address.netloc}")
             self._metadata = self._modalities()
             self._task_key = next(iter(self._metadata.get("language", {}).get("keys", ())), "task")
             if misfits := list(self._misfits()):

@@ -65,13 +65,13 @@ class I4hPolicy:
         )
 
     def _open(self) -> zenoh.Session:
-        """Open a peer that connects and does not listen: to the endpoint, or to whoever is found."""
+        """Open a peer that connects and does not listen: to the endpoint, or by multicast."""
         config = zenoh.Config()
         settings: dict[str, Any] = {
             "listen/endpoints": [],
             "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
         }
-        if self._endpoint:
+        if self._endpoint != "multicast":
             settings |= {
                 "mode": "client",
                 "connect/endpoints": [f"tcp/{self._endpoint}"],

@@ -44,7 +44,7 @@ class OpenPiPolicy:
         address = urlsplit(backend)
         try:
             connecting = connect(
-                f"ws://{address.hostname}:{address.port}",
+                f"ws://{address.netloc}",
                 compression=None,
                 max_size=MOST_BYTES,
                 open_timeout=timeout_s,

@@ -9,9 +9,11 @@ A session's device and a loop without a session use the same backends.
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Any, Protocol, cast
 from urllib.parse import urlsplit
@@ -25,15 +27,20 @@ from schemas.vectors import Vector
 
 __all__ = ["BACKENDS", "Observation", "Policy", "check_actions", "check_backend", "open_policy"]
 
+log = logging.getLogger(__name__)
+
 BACKENDS = {
     "openpi": "openpi://HOST:PORT, a websocket server of openpi",
     "groot": "groot://HOST:PORT, a ZeroMQ server of GR00T",
-    "i4h": "i4h:ENVIRONMENT or i4h:ENVIRONMENT@HOST:PORT, a process of Isaac for Healthcare (Zenoh)",
+    "i4h": (
+        "i4h:ENVIRONMENT@HOST:PORT or i4h:ENVIRONMENT@multicast, a process of Isaac for Healthcare (Zenoh)"
+    ),
     "onnx": "onnx:FILE.onnx, a model in a process of its own",
     "lerobot": "lerobot:DIRECTORY, a checkpoint of LeRobot in a process of its own",
     "python": "python:FILE.py:NAME or python:MODULE:NAME, a function or a class in a process of its own",
 }
 """Prefixes of a backend's address, and the form of each."""
+_NETWORK_BACKENDS = ("openpi", "groot", "i4h")
 
 
 @dataclass(frozen=True)
@@ -86,7 +93,7 @@ def check_backend(backend: str) -> str:
         "openpi": _is_address(backend),
         "groot": _is_address(backend),
         "python": all(rest.rpartition(":")[::2]),
-        "i4h": re.fullmatch(r"[A-Za-z0-9_-]+(@[^/*$?#@]+:[0-9]+)?", rest) is not None,
+        "i4h": re.fullmatch(r"[A-Za-z0-9_-]+@(multicast|[^/*$?#@]+:[0-9]+)", rest) is not None,
     }
     if not is_complete.get(prefix, bool(rest)):
         raise ValueError(f"'{backend}' is incomplete, expected {BACKENDS[prefix]}")
@@ -125,6 +132,7 @@ def open_policy(
         check_backend(backend)
     except ValueError as error:
         raise DeviceError(str(error)) from error
+    _warn_of_clear_text(backend)
     prefix = backend.partition(":")[0]
     if prefix == "openpi":
         from devices.policies.openpi import OpenPiPolicy
@@ -141,6 +149,27 @@ def open_policy(
     from devices.policies.child import ChildPolicy
 
     return ChildPolicy(backend, terms, timeout_s, directory or Path.cwd(), python)
+
+
+def _warn_of_clear_text(backend: str) -> None:
+    """Log a warning for a policy on another machine: none of the protocols encrypts."""
+    prefix, _, rest = backend.partition(":")
+    if prefix not in _NETWORK_BACKENDS:
+        return
+    host = urlsplit(f"//{rest.rpartition('@')[2]}" if prefix == "i4h" else backend).hostname or ""
+    if not _is_loopback(host):
+        log.warning(
+            "policy '%s' is reached in the clear: others in the network can read pictures and send commands;"
+            " lead a tunnel there (ssh -L), and state its end on this machine",
+            backend,
+        )
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:  # a name
+        return False
 
 
 def check_actions(answer: object, terms: Terms) -> Vector:

@@ -1,7 +1,7 @@
 """A policy process of Isaac for Healthcare, played by a Zenoh peer with the messages of its workflow."""
 
 import json
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def terms(**contract):
         "horizon": 2,
         "cameras": {"wrist": {"width": 32, "height": 16}},
     }
-    given = {"arms": {"PSM1": {"instrument": "400006"}}, "backend": "i4h:reach_psm"}
+    given = {"arms": {"PSM1": {"instrument": "400006"}}, "backend": "i4h:reach_psm@multicast"}
     return PolicyParams.model_validate({**given, "contract": {**own, **contract}}).terms
 
 
@@ -138,4 +138,20 @@ def test_a_payload_that_is_no_map_is_named():
 
 def test_a_contract_with_poses_is_refused():
     with pytest.raises(ScenarioError, match="the contract needs state and action 'joint'"):
-        ask("i4h:reach_psm", action="open-h-dvrk")
+        ask("i4h:reach_psm@127.0.0.1:1", action="open-h-dvrk")
+
+
+@pytest.mark.parametrize(
+    ("backend", "is_warned"),
+    [
+        ("i4h:reach_psm@192.0.2.1:7447", True),
+        ("openpi://[2001:db8::1]:8000", True),
+        ("groot://gpu.example:5555/", True),
+        ("i4h:reach_psm@127.0.0.1:1", False),
+        ("openpi://[::1]:1", False),
+    ],
+)
+def test_a_policy_on_another_machine_is_reached_in_the_clear_with_a_warning(caplog, backend, is_warned):
+    with suppress(DeviceError, ScenarioError):
+        open_policy(backend, terms(), timeout_s=0.05).close()
+    assert ("in the clear" in caplog.text) == is_warned
