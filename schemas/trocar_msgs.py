@@ -56,6 +56,7 @@ __all__ = [
     "TaskEvent",
     "TissueEvent",
     "TissueGrasp",
+    "TubeLine",
 ]
 
 
@@ -195,6 +196,26 @@ class SurfaceFilm(Message):
     """Wet nodes, ascending."""
     thickness: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
     """Thickness of the film at each of these nodes, in steps of 10 um; 255: 2.55 mm or more."""
+
+
+class TubeLine(Message):
+    """Middle line of an organ with a lumen, from its left end to its right: a row for each ring of nodes."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/TubeLine"
+    header: Header
+    body: String
+    points_m: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Present middle of each ring in `header.frame_id`: x, y, z, one after the other."""
+    along_m: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Distance of each ring from the first ring along the line at rest."""
+    areas_m2: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Present open cross-section of each ring, 0 under a clip, m^2."""
+    diameters_m: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Outer diameter of each ring at rest."""
+    shut: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
+    """1: a clip shuts the ring."""
+    parted: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
+    """1: the tube is parted between this ring and the next."""
 
 
 class ShownMarkers(Message):

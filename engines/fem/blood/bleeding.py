@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from engines.fem.blood.clips import Clips
 from engines.fem.blood.film import BILE, BLOOD, QUANTUM, Film
 from engines.fem.blood.lumen import Lumen
+from engines.fem.blood.tube_line import tube_line
 from engines.fem.heat.tissue import tissue_of
 from engines.fem.organ import Organ
 from engines.tissue.organs.params import OrganParams
 from schemas.ros import Header, Time
 from schemas.soft_surface import FILM_STEP_M, FaceKind
-from schemas.trocar_msgs import SurfaceFilm
+from schemas.trocar_msgs import SurfaceFilm, TubeLine
 from schemas.vectors import Vector
 
 __all__ = ["Bleeding"]
@@ -131,6 +132,13 @@ class Bleeding:
             return self._dry
         self._follow()
         return self._picture(t, self.film.thickness(self.organ.surface.faces, self.organ.nodes, FILM_STEP_M))
+
+    def line(self, t: int) -> TubeLine | None:
+        """Return the middle line of a tube at `t` ns; None: the organ has no lumen."""
+        if self.lumen is None:
+            return None
+        self._follow()
+        return tube_line(self.organ.name, self.lumen, t)
 
     def _picture(self, t: int, wet: NDArray[np.uint8]) -> SurfaceFilm:
         nodes = np.flatnonzero(wet)

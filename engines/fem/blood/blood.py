@@ -12,6 +12,7 @@ from engines.fem.blood.bleeding import Bleeding
 from engines.fem.blood.clip import ClipApplier, clip_ports
 from engines.fem.blood.clip_markers import clip_markers
 from engines.fem.blood.suction import Suction, suction_ports
+from engines.fem.blood.tube_line import line_port
 from engines.fem.organ import Organ
 from engines.fem.probe import Probe
 from engines.tissue.organs.params import OrganParams
@@ -30,8 +31,10 @@ def blood_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
         return ()
     suctions = [name for name, probe in params.probes.items() if probe.suction]
     clips = [name for name, probe in params.probes.items() if probe.clip]
+    tubes = [name for name, organ in params.organs.items() if organ.lumen]
     return (
         *(port for organ in organs for port in _organ_ports(organ, params.node_period)),
+        *(line_port(organ, params.node_period) for organ in tubes),
         *(port for name in suctions for port in suction_ports(name)),
         *(port for name in clips for port in clip_ports(name)),
         *((_clip_bodies(params.node_period),) if clips else ()),
@@ -107,9 +110,12 @@ class Blood:
         return self.outputs
 
     def pictures(self, t: int) -> dict[str, Value]:
-        """Return the films, and the clips, at `t` ns."""
-        films: dict[str, Value] = {f"{one.organ.name}/film": one.picture(t) for one in self.bleedings}
-        return films | {"clips": self._clip_bodies(t)} if self._appliers else films
+        """Return the films, the middle lines of tubes, and the clips, at `t` ns."""
+        found: dict[str, Value] = {f"{one.organ.name}/film": one.picture(t) for one in self.bleedings}
+        for one in self.bleedings:
+            if (line := one.line(t)) is not None:
+                found[f"{one.organ.name}/line"] = line
+        return found | {"clips": self._clip_bodies(t)} if self._appliers else found
 
     def _clip_bodies(self, t: int) -> ShownMarkers:
         """Return the clips on all tubes; the same object as long as there is none."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.fem.blood.film import Liquid
+from engines.fem.blood.partings import Parting, find_partings
 from engines.fem.organ import Organ
 from engines.tissue.organs.inner_wall import InnerWall
 from engines.tissue.organs.lumen import LumenParams
@@ -61,6 +62,9 @@ class Lumen:
         self._params, self._liquid, self._organ = params, liquid, organ
         self._rings, self._ring_of, self._sector_of = wall.rings, wall.ring_of, wall.sector_of
         self._station, self.diameters = wall.stations, wall.diameters
+        along = wall.stations[wall.rings].mean(axis=1)
+        self.along: Vector = along - along[0]
+        """Distance of each ring from the first along the line at rest, m, shape (r,)."""
         self.shut: NDArray[np.bool_] = np.zeros(len(self._rings), np.bool_)
         """Rings that a clip has shut, shape (r,)."""
         points = organ.mesh.nodes[self._rings]
@@ -69,6 +73,8 @@ class Lumen:
         """Thickness of the wall at each ring, m, shape (r,)."""
         self._area = float(self.areas(organ.mesh.nodes).mean())
         self._openings: list[_Opening] = []
+        self.partings: list[Parting] = []
+        """Places where the tube is parted, from the left end to the right."""
 
     def areas(self, nodes: Vector) -> Vector:
         """Return the cross-section at every ring as of a round tube through its nodes, m^2, shape (r,)."""
@@ -77,6 +83,11 @@ class Lumen:
         spans = np.cross(arms, np.roll(arms, -1, axis=1)).sum(axis=1)
         turn = 2.0 * pi / self._rings.shape[1]
         return 0.5 * turn / sin(turn) * np.linalg.norm(spans, axis=1)
+
+    @property
+    def open_areas(self) -> Vector:
+        """Present cross-section at every ring, 0 where a clip shuts it, m^2, shape (r,)."""
+        return np.where(self.shut, 0.0, self.areas(self._organ.nodes))
 
     def nearest(self, point: Vector) -> tuple[int, Vector]:
         """Return the ring nearest to a point (m, in `world`), and the way from the point to its middle, m."""
@@ -138,12 +149,20 @@ class Lumen:
         marks[ring[is_open]] = True
         elements = self._station[solid.origin[solid.tetrahedra[solid.owners[slots]]]].mean(axis=1)
         is_left = elements < self._station[origins].mean(axis=1)
-        self._openings = []
+        self._openings, self.partings = [], find_partings(self._ring_pieces(), self.along)
         for first, last in _runs(marks):
             sectors = int(opened[first : last + 1].any(axis=0).sum())
             here = ((ring >= first) & (ring <= last)).any(axis=1)
             share = max(1, sectors) / self._rings.shape[1]
             self._openings.append(_Opening(first, last, share, slots[here], is_left[here]))
+
+    def _ring_pieces(self) -> NDArray[np.int64]:
+        """Return the piece of the organ to which each node of the rings belongs, -1: none, shape (r, a)."""
+        solid, pieces = self._organ.solid, self._organ.solid.pieces
+        piece_of: NDArray[np.int64] = np.full(len(solid.origin), -1)
+        present = pieces >= 0
+        piece_of[solid.tetrahedra[present]] = pieces[present, None]
+        return piece_of[self._rings]
 
     def _opened_edges(
         self, origins: NDArray[np.int32]
