@@ -30,11 +30,21 @@ _PARTING_RISE = 90.0 - BODY
 
 def attachment_ports(attachments: Mapping[str, AttachmentParams], period_ns: int) -> tuple[Port, ...]:
     """Return the ports of all attachments."""
-    return tuple(
+    thirds = tuple(
+        signal_out(
+            f"{name}/lower_third",
+            description="share that has parted of the third of the area nearest to the lower end",
+            period_ns=period_ns,
+        )
+        for name, params in attachments.items()
+        if params.lower_end is not None
+    )
+    return thirds + tuple(
         port
         for name, params in attachments.items()
         for port in (
             signal_out(f"{name}/freed", description="area that has parted", unit="m^2", period_ns=period_ns),
+            signal_out(f"{name}/tied", description="area that is tied", unit="m^2", period_ns=period_ns),
             signal_out(
                 f"{name}/force",
                 description=f"force on '{params.organs[0]}', mean of a step",
@@ -60,6 +70,9 @@ class Attachments:
         self._organs, self._names = organs, list(attachments)
         numbers = {organ.name: i for i, organ in enumerate(organs)}
         rows: list[Vector] = []
+        self._lower: dict[str, NDArray[np.intp]] = {}
+        """Ties of the lower third of each attachment with a lower end."""
+        opened: list[NDArray[np.intp]] = []
         for k, (name, given) in enumerate(attachments.items()):
             one, other = (numbers[organ] for organ in given.organs)
             chosen = np.ones(len(organs[one].mesh.nodes), np.bool_)
@@ -70,6 +83,12 @@ class Attachments:
             except ValueError as error:
                 raise ScenarioError(f"attachment '{name}': {error}") from error
             count = len(ties.areas)
+            if given.lower_end is not None:
+                begun = sum(map(len, rows))
+                nodes = organs[one].mesh.nodes[organs[one].solid.tetrahedra[ties.elements, ties.corners]]
+                order, shares = _from_end(nodes, ties.areas, np.array(given.lower_end))
+                self._lower[name] = begun + order[shares < 1.0 / 3.0]
+                opened.append(begun + order[shares < given.opened])
             common = [np.full(count, number) for number in (k, one, other)]
             law = given.strength * ties.areas, np.full(count, 2.0 * given.toughness / given.strength)
             columns = (*common, ties.elements, ties.corners, ties.own_slots, ties.slots, ties.areas, *law)
@@ -87,9 +106,11 @@ class Attachments:
         """Strength (N) and last opening (m), shape (t, 2); place at rest, shape (t, 6)."""
         self.widest: Vector = np.zeros(len(table))
         """Widest opening, m; infinite of a tie that has parted, shape (t,)."""
+        for ties in opened:
+            self.widest[ties] = np.inf
         self.force: Vector = np.zeros((len(table), 3))
         """Mean force on the first organ in the last step, N, shape (t, 3)."""
-        self._known: NDArray[np.bool_] = np.zeros(len(table), np.bool_)
+        self._known: NDArray[np.bool_] = np.isinf(self.widest)
         """Ties whose parting has been noted, shape (t,)."""
         self._edges: Edges | None = None
         self._before: Vector = np.zeros((0, 2, 3))
@@ -119,11 +140,14 @@ class Attachments:
         count, parted = len(self._names), np.isinf(self.widest)
         lost: Vector = np.where(parted, self._area, 0.0)
         freed = np.bincount(self._number, lost, count).astype(np.float64)
+        tied = np.bincount(self._number, self._area - lost, count).astype(np.float64)
         forces = [np.bincount(self._number, self.force[:, i], count) for i in range(3)]
         found: dict[str, Vector] = {}
         for k, name in enumerate(self._names):
-            found[f"{name}/freed"] = freed[k : k + 1]
+            found[f"{name}/freed"], found[f"{name}/tied"] = freed[k : k + 1], tied[k : k + 1]
             found[f"{name}/force"] = np.array([one[k] for one in forces])
+        for name, ties in self._lower.items():
+            found[f"{name}/lower_third"] = lost[ties].sum(keepdims=True) / self._area[ties].sum()
         return found
 
     def restore(self, widest: Vector) -> None:
@@ -193,6 +217,16 @@ class Attachments:
             rises = np.where(faces < 0, 0.0, heat.rise[faces])  # of a face that has gone: none
             found[its] |= (rises * self.rest[its, :3]).sum(axis=1) >= _PARTING_RISE
         return found
+
+
+def _from_end(points: Vector, areas: Vector, end: Vector) -> tuple[NDArray[np.intp], Vector]:
+    """Return ties in the order of their distance from a point, and the share of the area before each.
+
+    points: places of the ties, m, shape (t, 3). areas: m^2, shape (t,).
+    """
+    order = np.argsort(np.linalg.norm(points - end, axis=1), kind="stable")
+    before: Vector = np.cumsum(areas[order]) - areas[order]
+    return order, before / areas.sum()
 
 
 def _crosses(ways: Vector, a: Vector, b: Vector, c: Vector) -> NDArray[np.bool_]:

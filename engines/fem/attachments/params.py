@@ -44,6 +44,26 @@ class AttachmentParams(BaseModel):
         ),
     )
 
+    lower_end: tuple[Length, Length, Length] | None = Field(
+        default=None,
+        description=(
+            "point in `world` near which dissection begins; with it there is an output"
+            " `<attachment>/lower_third`: share that is free of the third of the area nearest to it"
+        ),
+    )
+    opened: float = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="share of the area, from lower_end on, free from the beginning: dissected already",
+    )
+
+    @model_validator(mode="after")
+    def _opened_from_an_end(self) -> Self:
+        if self.opened and self.lower_end is None:
+            raise ValueError("opened counts from an end: state lower_end")
+        return self
+
     @model_validator(mode="after")
     def _two_organs(self) -> Self:
         if self.organs[0] == self.organs[1]:

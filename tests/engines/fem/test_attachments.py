@@ -191,3 +191,21 @@ def test_organs_that_are_far_apart_cannot_be_attached():
 def test_attachments_need_contact_of_organs():
     with pytest.raises(ValueError, match="leave organ_contact on"):
         given(organ_contact=False)
+
+
+def test_the_lower_third_may_be_open_from_the_beginning():
+    plate = PLATE | {"lower_end": ["-5 mm", 0.0, 0.0]}
+    with PlateRig(plate=plate | {"opened": 0.5}) as rig, PlateRig(plate=plate) as whole:
+        rig.hold(0.02)
+        assert rig.freed == pytest.approx(0.5 * AREA, rel=0.1)
+        assert rig.freed + float(rig.outputs["plate/tied"][0]) == pytest.approx(AREA, rel=1e-6)
+        assert rig.outputs["plate/lower_third"][0] == 1.0
+        assert not rig.said
+        whole.hold(0.02)
+        assert whole.outputs["plate/lower_third"][0] == 0.0
+        at = whole.flap.mesh.nodes[:, 0]
+        number = whole.ties._lower["plate"]
+        nodes = whole.flap.solid.tetrahedra[whole.ties._element, whole.ties._corner][number]
+        assert at[nodes].max() < np.median(at)
+    with pytest.raises(ValueError, match="state lower_end"):
+        given(PLATE | {"opened": 0.5})
