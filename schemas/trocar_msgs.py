@@ -297,14 +297,15 @@ class TaskEvent(Message):
     event: String
     """`grasped`, `lifted`, `handed over`, `placed`, `dropped`, `out of workspace`, `out of view` or
     `collision`; of a needle in a phantom also `entered`, `exited`, `stitched` (or, from the tissue itself,
-    `pulled out`) and `withdrawn`; of tissue `cut`, `torn` and `burnt`.
+    `pulled out`) and `withdrawn`; of tissue `cut`, `torn` and `burnt`; of an operation phases, goals and
+    errors (docs/scores.md).
     """
     object: String = ""
     """Name of the object; empty: none."""
     arm: String = ""
     """Name of the acting arm, after a hand-over of the receiving arm; empty: none."""
     place: String = ""
-    """Place where an object was put."""
+    """Place where an object was put; of an operation the organ, or the phase that begins."""
     value: Float64 = 0.0
     """Height of a lift or a drop, or impulse of a collision, in `unit`."""
     unit: String = ""

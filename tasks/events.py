@@ -22,6 +22,35 @@ EventKind = Literal[
     "cut",
     "torn",
     "burnt",
+    "phase",
+    "gallbladder grasped",
+    "duct clipped",
+    "duct cut",
+    "artery clipped",
+    "artery cut",
+    "triangle cleared",
+    "plate opened",
+    "gallbladder freed",
+    "clip closed",
+    "cut without clip",
+    "cut with too few clips",
+    "cut beside clips",
+    "cut with short cuff",
+    "clipped after cut",
+    "wrong structure clipped",
+    "wrong structure hurt",
+    "clip too near",
+    "clip oblique",
+    "clip not across",
+    "clip slipped",
+    "clip pulled off",
+    "tube torn",
+    "gallbladder perforated",
+    "grasp torn off",
+    "target burnt",
+    "energy in the air",
+    "energy on an instrument",
+    "exchanged while holding",
 ]
 
 
@@ -33,7 +62,7 @@ class Event(NamedTuple):
     arm: int = -1
     """Acting arm; after a hand-over the receiving arm."""
     place: int = -1
-    """Where the object was placed."""
+    """Place of an object, or organ of an operation."""
     value: float = 0.0
     """How much, in `unit`: the height of a lift or drop, the impulse of a collision, the area of a cut."""
     unit: str = ""

@@ -100,9 +100,7 @@ class Reader:
     def __init__(self, params: TaskParams, connected: Set[str]) -> None:
         """`connected`: inputs with a source."""
         arms, things = params.psms, tuple(params.objects)
-        ecm: CartArm | None = next(
-            (name for name, arm in params.arms.items() if isinstance(arm, MountedEcm)), None
-        )
+        ecm = params.ecm
         self.watched = Watched(
             arms,
             things,

@@ -79,6 +79,11 @@ class TaskParams(Params):
         return tuple(name for name, arm in self.arms.items() if isinstance(arm, MountedPsm))
 
     @property
+    def ecm(self) -> CartArm | None:
+        """The arm with the endoscope; None: none."""
+        return next((name for name, arm in self.arms.items() if isinstance(arm, MountedEcm)), None)
+
+    @property
     def camera(self) -> StereoCamera:
         """The two cameras of the endoscope."""
         return StereoCamera(self.width, self.height, self.field_of_view, self.baseline)

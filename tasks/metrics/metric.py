@@ -11,7 +11,7 @@ from schemas.trocar_msgs import ScoreValue
 from tasks.events import Event
 from tasks.instant import Instant
 
-__all__ = ["NO_CAMERA", "AnyMetric", "Metric", "missing"]
+__all__ = ["NO_CAMERA", "AnyMetric", "Metric", "S", "missing"]
 
 NO_CAMERA = "no endoscope: state an ECM in the scene and connect or record ECM/measured_cp"
 

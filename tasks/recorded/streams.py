@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from hub.participant import Inputs, Setup
 from schemas.message import Message
+from schemas.ports import Port
 from schemas.trocar_msgs import ScoreCard, TaskEvent
-from schemas.vectors import VectorCodec, has_vector
+from schemas.vectors import Vector, VectorCodec, has_vector
 from tasks.task import Task
 
 __all__ = ["Scored", "Stream", "score"]
@@ -44,11 +45,7 @@ def score(task: Task, streams: Mapping[str, Stream], period_ns: int) -> Scored:
     Begins once every signal without a start value has a value; ends with the last value.
     """
     inputs_of = [port for port in task.ports if port.causality == "input"]
-    values: dict[str, Any] = {
-        port.name: VectorCodec(port).neutral if port.start is None else np.array(port.start)
-        for port in inputs_of
-        if has_vector(port.type)
-    }
+    values: dict[str, Any] = {port.name: _value_before(port) for port in inputs_of}
     names = [port.name for port in inputs_of if port.name in streams and len(streams[port.name].times_ns)]
     known = {name: streams[name] for name in names}
     needed = [port.name for port in inputs_of if port.variability != "event" and port.start is None]
@@ -71,3 +68,10 @@ def score(task: Task, streams: Mapping[str, Stream], period_ns: int) -> Scored:
         outputs = task.step(t - begin_ns, period_ns, inputs)
         events += cast("tuple[TaskEvent, ...]", outputs["events"])
     return Scored(cast("ScoreCard", outputs["score"]), events)
+
+
+def _value_before(port: Port) -> Vector | None:
+    """Return the value of an input before the first recorded one; None: a message without a vector form."""
+    if not has_vector(port.type):
+        return None
+    return VectorCodec(port).neutral if port.start is None else np.array(port.start)
