@@ -5,6 +5,9 @@ A tie bears any push, and a pull or shear up to its strength. Pulled harder it o
 opened the less it bears: nothing at twice its work over its strength. Below its widest opening it bears in proportion
 to its opening. So the work of separation is the work of the tie. Impulses by projected Gauss and Seidel, as in
 `_touch.c`: any sub-step will do. Work is taken and none given back, but for the recovery of an opening.
+
+Where one of two bodies pushes every so many sub-steps, its push comes in one of them: strength bounds the impulse of a
+tie over all of these, its cycle.
 */
 
 #include "_solid.h"
@@ -12,8 +15,7 @@ to its opening. So the work of separation is the work of the tie. Impulses by pr
 
 #define ITERATIONS 8   /* at most */
 #define SETTLED 1e-5   /* square of a pass's impulses over those of the first: enough */
-#define RECOVERY 0.2   /* share of an opening that is undone in a sub-step */
-#define FASTEST 0.1    /* m/s: of the recovery */
+#define RECOVERY 0.01  /* s: time in which an opening is undone; its speed is energy that was not there before */
 #define AT_LIMIT 0.999
 #define INTACT 0.05    /* of the last opening: below, an opening is the play of the method */
 
@@ -21,7 +23,10 @@ typedef struct {
     const Body *body, *other;
     int32_t node;
     const int32_t *face; /* nodes */
-    double mass, normal[3], open[3], opening, most, pushed[3];
+    int cycle; /* sub-steps */
+    int is_whole;
+    double normal[3], turn[3][3]; /* how a motion of each node of the face along the normal turns the normal */
+    double mass[9], open[3], opening, most, pushed[3];
 } Tie;
 
 struct Attach {
@@ -29,7 +34,7 @@ struct Attach {
     Body *const *body;
     const double *middle;  /* (bodies, 3): origins of their frames */
     const int32_t *place;  /* (count, 4): body, element times 4 plus corner, other body, slot of its face */
-    const double *rest;    /* (count, 6): shares of the face's nodes; from there to the node, in the frame of the face */
+    const double *rest;    /* (count, 4): shares of the face's nodes; from there to the node, along the normal */
     const double *law;     /* (count, 2): strength, N; opening at which the tie bears nothing, m */
     double *widest;        /* (count,): opening, m; infinite: has parted */
     double *force;         /* (count, 3): mean force on the node in a step, N */
@@ -83,10 +88,11 @@ void begin_attach(Attach *attach, int bodies)
             attach->body[b]->flags[i] &= (uint8_t)~TIED;
     for (int k = 0; k < attach->count; k++)
         if (find_nodes(attach, k)) {
-            const Tie *tie = attach->tie + k;
+            Tie *tie = attach->tie + k;
             tie->body->flags[tie->node] |= TIED;
             for (int a = 0; a < 3; a++)
                 tie->other->flags[tie->face[a]] |= TIED;
+            tie->cycle = tie->body->every > tie->other->every ? tie->body->every : tie->other->every;
         }
 }
 
@@ -97,13 +103,46 @@ static void place_of(const Attach *attach, int body, int32_t node, double x[3])
         x[i] = attach->middle[3 * body + i] + (double)own->rest[4 * node + i] + (double)own->displacement[4 * node + i];
 }
 
+/* Invert a symmetric matrix; return 0 for one that is singular. */
+static int invert(const double m[9], double out[9])
+{
+    double a = m[4] * m[8] - m[5] * m[5], b = m[2] * m[5] - m[1] * m[8], c = m[1] * m[5] - m[2] * m[4];
+    double whole = m[0] * a + m[1] * b + m[2] * c;
+    if (!(whole > 0.0))
+        return 0;
+    out[0] = a / whole, out[1] = out[3] = b / whole, out[2] = out[6] = c / whole;
+    out[4] = (m[0] * m[8] - m[2] * m[2]) / whole, out[5] = out[7] = (m[1] * m[2] - m[0] * m[5]) / whole;
+    out[8] = (m[0] * m[4] - m[1] * m[1]) / whole;
+    return 1;
+}
+
+/* Set how the normal of a face turns, and the mass of a tie: a shear across a gap turns the face as well. */
+static int weigh(Tie *tie, const double *rest, double corner[3][3], double twice)
+{
+    double inverse[9] = {0.0}, own = (double)tie->body->inverse_mass[tie->node];
+    inverse[0] = inverse[4] = inverse[8] = own;
+    for (int a = 0; a < 3; a++) {
+        double edge[3], its = (double)tie->other->inverse_mass[tie->face[a]], *turn = tie->turn[a];
+        for (int i = 0; i < 3; i++)
+            edge[i] = (corner[(a + 2) % 3][i] - corner[(a + 1) % 3][i]) / twice;
+        cross(tie->normal, edge, turn);
+        for (int i = 0; i < 3; i++)
+            turn[i] *= rest[3];
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++)
+                inverse[3 * i + j] += its * ((i == j ? rest[a] * rest[a] : 0.0) + turn[i] * turn[j] -
+                                             rest[a] * (turn[i] * tie->normal[j] + tie->normal[i] * turn[j]));
+    }
+    return invert(inverse, tie->mass);
+}
+
 /* Opening and strength of a tie now; return 0 for one that bears nothing. */
 static int open_tie(const Attach *attach, int k, double seconds)
 {
     const int32_t *place = attach->place + 4 * k;
-    const double *rest = attach->rest + 6 * k;
+    const double *rest = attach->rest + 4 * k;
     Tie *tie = attach->tie + k;
-    double corner[3][3], x[3], u[3], v[3], w[3], inverse;
+    double corner[3][3], x[3], u[3], v[3];
     if (!find_nodes(attach, k))
         return 0;
     place_of(attach, place[0], tie->node, x);
@@ -112,23 +151,18 @@ static int open_tie(const Attach *attach, int k, double seconds)
     for (int i = 0; i < 3; i++)
         u[i] = corner[1][i] - corner[0][i], v[i] = corner[2][i] - corner[0][i];
     cross(u, v, tie->normal);
-    if (!normalise(tie->normal) || !normalise(u))
+    double twice = sqrt(dot(tie->normal, tie->normal));
+    if (!normalise(tie->normal) || !weigh(tie, rest, corner, twice))
         return 0;
-    cross(tie->normal, u, w);
     for (int i = 0; i < 3; i++)
         tie->open[i] = x[i] - rest[0] * corner[0][i] - rest[1] * corner[1][i] - rest[2] * corner[2][i] -
-                       (rest[3] * u[i] + rest[4] * w[i] + rest[5] * tie->normal[i]);
+                       rest[3] * tie->normal[i];
     double push = dot(tie->open, tie->normal);
     tie->opening = sqrt(fmax(0.0, dot(tie->open, tie->open) - (push < 0.0 ? push * push : 0.0)));
-    inverse = (double)tie->body->inverse_mass[tie->node];
-    for (int a = 0; a < 3; a++)
-        inverse += rest[a] * rest[a] * (double)tie->other->inverse_mass[tie->face[a]];
-    tie->mass = inverse > 0.0 ? 1.0 / inverse : 0.0;
     double last = attach->law[2 * k + 1], widest = attach->widest[k], bears = 1.0 - widest / last;
     if (widest > INTACT * last && tie->opening < widest)
         bears *= tie->opening / widest;
-    tie->most = seconds * attach->law[2 * k] * bears;
-    memset(tie->pushed, 0, sizeof tie->pushed);
+    tie->most = seconds * tie->cycle * attach->law[2 * k] * bears;
     return 1;
 }
 
@@ -139,52 +173,77 @@ static double pull_of(const Tie *tie, const double impulse[3])
     return sqrt(square > 0.0 ? square : 0.0);
 }
 
-/* Change the velocities of node and face towards no opening; return the square of the impulse. */
-static double resolve(const Attach *attach, int k, double seconds)
+/* Speed at which a tie opens. */
+static void opening_speed(const Tie *tie, const double *rest, double speed[3])
 {
-    const double *rest = attach->rest + 6 * k;
-    Tie *tie = attach->tie + k;
-    float *velocity = tie->body->velocity + 4 * tie->node;
-    double wanted[3], change[3], size = sqrt(dot(tie->open, tie->open));
-    double rate = RECOVERY / seconds * size > FASTEST ? FASTEST / size : RECOVERY / seconds;
-    for (int i = 0; i < 3; i++) {
-        double apart = (double)velocity[i];
-        for (int a = 0; a < 3; a++)
-            apart -= rest[a] * (double)tie->other->velocity[4 * tie->face[a] + i];
-        wanted[i] = tie->pushed[i] - tie->mass * (rate * tie->open[i] + apart);
+    for (int i = 0; i < 3; i++)
+        speed[i] = (double)tie->body->velocity[4 * tie->node + i];
+    for (int a = 0; a < 3; a++) {
+        const float *v = tie->other->velocity + 4 * tie->face[a];
+        double along = (double)v[0] * tie->normal[0] + (double)v[1] * tie->normal[1] + (double)v[2] * tie->normal[2];
+        for (int i = 0; i < 3; i++)
+            speed[i] += along * tie->turn[a][i] - rest[a] * (double)v[i];
     }
+}
+
+/* Change the velocities by an impulse on the node, and against it on the face. */
+static void strike(const Tie *tie, const double *rest, const double impulse[3])
+{
+    float *velocity = tie->body->velocity + 4 * tie->node;
+    double own = (double)tie->body->inverse_mass[tie->node];
+    for (int i = 0; i < 3; i++)
+        velocity[i] = (float)((double)velocity[i] + own * impulse[i]);
+    for (int a = 0; a < 3; a++) {
+        float *against = tie->other->velocity + 4 * tie->face[a];
+        double its = (double)tie->other->inverse_mass[tie->face[a]], turning = dot(tie->turn[a], impulse);
+        for (int i = 0; i < 3; i++)
+            against[i] = (float)((double)against[i] + its * (turning * tie->normal[i] - rest[a] * impulse[i]));
+    }
+}
+
+/* Change the velocities of node and face towards no opening; return the square of the impulse. */
+static double resolve(const Attach *attach, int k)
+{
+    const double *rest = attach->rest + 4 * k;
+    Tie *tie = attach->tie + k;
+    double wanted[3], change[3], speed[3];
+    opening_speed(tie, rest, speed);
+    for (int i = 0; i < 3; i++)
+        speed[i] += tie->open[i] / RECOVERY;
+    for (int i = 0; i < 3; i++)
+        wanted[i] = tie->pushed[i] - dot(tie->mass + 3 * i, speed);
     double along = dot(wanted, tie->normal), push = along > 0.0 ? along : 0.0, pull = pull_of(tie, wanted);
     double kept = pull > tie->most ? tie->most / pull : 1.0;
     for (int i = 0; i < 3; i++) {
         double impulse = push * tie->normal[i] + kept * (wanted[i] - push * tie->normal[i]);
         change[i] = impulse - tie->pushed[i];
         tie->pushed[i] = impulse;
-        velocity[i] = (float)((double)velocity[i] + (double)tie->body->inverse_mass[tie->node] * change[i]);
-        for (int a = 0; a < 3; a++) {
-            float *against = tie->other->velocity + 4 * tie->face[a] + i;
-            double inverse = (double)tie->other->inverse_mass[tie->face[a]];
-            *against = (float)((double)*against - rest[a] * inverse * change[i]);
-        }
     }
+    strike(tie, rest, change);
     return dot(change, change);
 }
 
 /* Hold the bodies together in a sub-step, a `share` of the step. */
-void hold_together(Attach *attach, double seconds, double share)
+void hold_together(Attach *attach, int sub_step, double seconds, double share)
 {
     double first = 0.0, change = INFINITY;
-    for (int k = 0; k < attach->count; k++)
-        if (!open_tie(attach, k, seconds))
-            attach->tie[k].mass = 0.0;
+    for (int k = 0; k < attach->count; k++) {
+        Tie *tie = attach->tie + k;
+        tie->is_whole = open_tie(attach, k, seconds);
+        if (!tie->is_whole)
+            continue;
+        if (sub_step % tie->cycle == 0)
+            memset(tie->pushed, 0, sizeof tie->pushed);
+    }
     for (int pass = 0; pass < ITERATIONS && change > SETTLED * first; pass++) {
         change = 0.0;
         for (int k = 0; k < attach->count; k++)
-            change += attach->tie[k].mass > 0.0 ? resolve(attach, k, seconds) : 0.0;
+            change += attach->tie[k].is_whole ? resolve(attach, k) : 0.0;
         first = pass ? first : change;
     }
     for (int k = 0; k < attach->count; k++) {
         const Tie *tie = attach->tie + k;
-        if (tie->mass == 0.0)
+        if (!tie->is_whole || (sub_step + 1) % tie->cycle)
             continue;
         if (tie->opening > attach->widest[k] && pull_of(tie, tie->pushed) >= AT_LIMIT * tie->most)
             attach->widest[k] = tie->opening < attach->law[2 * k + 1] ? tie->opening : INFINITY;

@@ -11,9 +11,9 @@ int read_way(Solid *self, PyObject *args, Way *way, Course *course)
 {
     Py_buffer *held = way->held;
     memset(way, 0, sizeof *way);
-    if (!PyArg_ParseTuple(args, "y*y*y*y*w*ffiffy*y*w*w*w*w*", held, held + 10, held + 1, held + 2, held + 3,
+    if (!PyArg_ParseTuple(args, "y*y*y*y*w*ffiffiy*y*w*w*w*w*", held, held + 10, held + 1, held + 2, held + 3,
                           &way->spheres.friction, &course->seconds, &course->sub_steps, &course->gravity, &way->drag,
-                          held + 4, held + 9, held + 5, held + 6, held + 7, held + 8))
+                          &way->every, held + 4, held + 9, held + 5, held + 6, held + 7, held + 8))
         return -1;
     Spheres *spheres = &way->spheres;
     Edges *edges = &way->edges;
@@ -25,10 +25,11 @@ int read_way(Solid *self, PyObject *args, Way *way, Course *course)
     edges->samples = edges->count ? (int)(held[5].len / 4) / edges->count : 0;
     edges->ends = held[4].buf, edges->element = held[5].buf, edges->front = held[6].buf, edges->ahead = held[7].buf;
     edges->area = held[8].buf, edges->toughness = held[9].buf;
-    if (edges->samples <= MOST_SAMPLES)
+    if (edges->samples <= MOST_SAMPLES && way->every > 0 && course->sub_steps % way->every == 0)
         return 0;
     release_way(way);
-    PyErr_Format(PyExc_ValueError, "at most %d samples along an edge", MOST_SAMPLES);
+    PyErr_Format(PyExc_ValueError, "at most %d samples along an edge, and forces every whole part of the sub-steps",
+                 MOST_SAMPLES);
     return -1;
 }
 
@@ -38,10 +39,11 @@ void release_way(Way *way)
         PyBuffer_Release(way->held + k);
 }
 
-PyDoc_STRVAR(advance_doc, "advance(path, middle, radius, free, force, friction, seconds, sub_steps, gravity, drag, ends, \
-toughness, element, front, ahead, area)\n--\n\n\
+PyDoc_STRVAR(advance_doc, "advance(path, middle, radius, free, force, friction, seconds, sub_steps, gravity, drag, every, \
+ends, toughness, element, front, ahead, area)\n--\n\n\
 Advance by sub-steps of `seconds` while spheres go along `path`, shape (sub_steps + 1, n, 3), m, in the frame in which\n\
-`middle` is the body's; write the force on each sphere to `force`, shape (sub_steps, n, 3), N. The last arguments are edges of blades: `ends`, shape (e, 2), are\n\
+`middle` is the body's; write the force on each sphere to `force`, shape (sub_steps, n, 3), N. The elements push `every` so many\n\
+sub-steps. The last arguments are edges of blades: `ends`, shape (e, 2), are\n\
 spheres; `toughness`, shape (e,), J/m^2, infinite of a blunt edge, negative of one that passes through; `element`,\n\
 shape (e, samples), `front` and `ahead`, shape (e, samples, 3), and `area` are their state.\n\
 Return how many faces have been cut open.");

@@ -18,6 +18,7 @@ is at 4 k + l. Face 4 e + k of element e is opposite to its corner k.
 typedef struct {
     int nodes, blocks, faces, branches;
     int changes;                 /* of the mesh since the start */
+    int every;                   /* sub-steps between its elastic forces in this step */
     int node_room;               /* a body that may be cut has room for a node of its own at every corner */
     int skin;                    /* faces of the uncut mesh */
     float *rest;                 /* (nodes, 4) */
@@ -44,7 +45,8 @@ typedef struct {
     const float *middles;        /* (4 blocks, 3): of the elements of the uncut mesh */
     int ties;                    /* most pairs of tied nodes */
     int32_t *tied;               /* (ties, 2): nodes; -1 after the last pair */
-    const float *limits;         /* (4,): lambda; largest sharpness, bulk rate and edge (m) of the uncut mesh */
+    const float *limits;         /* (5,): lambda; largest sharpness, bulk rate and edge (m) of the uncut mesh; weight over
+                                    mass and gravity */
     int boxes;                   /* that do not move */
     const double *box;           /* (boxes, 16): middle, axes row by row, half edges, friction */
     double *support;             /* (boxes, 3): mean force of the body on each in a step, N */
@@ -86,6 +88,7 @@ typedef struct {
     Spheres spheres;
     Edges edges;
     float drag;        /* damping over mass, 1/s */
+    int every;         /* sub-steps between the elastic forces */
     const double *middle; /* of the body, in the frame in which the path is given */
     double *path;      /* in the frame of the body */
     int *near;         /* faces near the spheres */
@@ -161,7 +164,7 @@ Attach *new_attach(int count, Body *const *body, const double *middle, const int
                    const double *law, double *widest, double *force);
 void free_attach(Attach *attach);
 void begin_attach(Attach *attach, int bodies);
-void hold_together(Attach *attach, double seconds, double share);
+void hold_together(Attach *attach, int sub_step, double seconds, double share);
 
 int find_stars(const Body *body, int32_t *place, Stars *stars);
 void free_stars(Stars *stars);

@@ -19,6 +19,7 @@ from engines.fem.organ import Organ, relaxation
 from engines.fem.params import FemParams
 from engines.fem.probe import Probe
 from engines.fem.spheres import MOST_CONTACTS, Spheres, near_faces
+from engines.fem.sub_steps import common_sub_steps, own_sub_steps
 from engines.fem.tissue_events import change_ports
 from engines.fem.together import Together
 from engines.tissue.elasticity.body_yield import BodyYield
@@ -89,15 +90,31 @@ class FemEngine(Stepped):
         for name, organ in self.params.organs.items():
             self._organs.append(Organ(name, organ, boxes, is_carried=is_carried))
         self._settle()
-        self._sub_steps = max(organ.solid.sub_steps(setup.period_ns * 1e-9) for organ in self._organs)
-        if self.params.timestep is not None:
-            self._sub_steps = max(self._sub_steps, -(-setup.period_ns // self.params.timestep))
+        timestep = self.params.timestep
+        fewest = 1 if timestep is None else -(-setup.period_ns // timestep)
+        self._sub_steps = self._plan(setup.period_ns * 1e-9, fewest)
         if any(self.params.has_series(name) for name in setup.bonds):
             self._surfaces = [
                 Surface(organ, self.params.organs[organ.name].relaxed, BodyYield) for organ in self._organs
             ]
         self._bonded = dict(setup.bonds)
         return self._begin()
+
+    def _plan(self, seconds: float, fewest: int = 1) -> int:
+        """Set the sub-steps of all organs in a step of `seconds`, `fewest` at least; return their number."""
+        longest = [organ.solid.longest_step for organ in self._organs]
+        plan = common_sub_steps(seconds, longest, fewest)
+        if self.params.own_sub_steps:
+            names, nodes = (
+                [organ.name for organ in self._organs],
+                [len(organ.nodes) for organ in self._organs],
+            )
+            pairs = (attachment.organs for attachment in self.params.attachments.values())
+            tied = [(names.index(one), names.index(other)) for one, other in pairs]
+            plan = own_sub_steps(seconds, longest, plan.count, nodes, tied)
+        for organ, every in zip(self._organs, plan.every, strict=True):
+            organ.every = every
+        return plan.count
 
     def _settle(self) -> None:
         """Let the organs come to rest, side by side where they touch."""
@@ -106,7 +123,7 @@ class FemEngine(Stepped):
             if self.params.attachments:
                 self._attachments = Attachments(self.params.attachments, self._organs, self.params.organs)
                 self._together.attach(self._attachments)
-            self._together.settle(self.params.gravity)
+            self._together.settle(self.params.gravity, self._plan)
         else:
             for organ in self._organs:
                 organ.settle(self.params.gravity)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from math import sqrt
 from typing import Any
 
@@ -73,12 +74,15 @@ class Organ:
         )
         self.mean_edge = float(np.linalg.norm(edges, axis=2).mean())
         self.friction = params.contact_friction
-        material = params.relaxed
+        heavy = tuple(replace(one, density=params.inertia * one.density) for one in params.materials)
+        material = heavy[-1]
         branches = [Branch(_VISCOUS_SHARE, material.damping)] if material.damping else []
         branches += relaxation(params)
+        self.every = 1
+        """Sub-steps between the forces of the elements."""
         self._cutting = params.cutting
         divisible = params.cutting is not None
-        layering = Layering(params.materials, params.layer_numbers(self.mesh.tetrahedra))
+        layering = Layering(heavy, params.layer_numbers(self.mesh.tetrahedra))
         self.solid = Solid(
             self.mesh,
             self._anchored,
@@ -88,6 +92,7 @@ class Organ:
             layering=layering,
             boxes=boxes,
             most_ties=0 if params.inner_wall is None else params.inner_wall.rings.size,
+            weight_share=1.0 / params.inertia,
         )
         self.layers = params.layer_numbers(self.solid.tetrahedra)
         """Number of the layer of every element, shape (m,)."""
@@ -99,6 +104,8 @@ class Organ:
         self._edges = NO_EDGES
         self._reach = float(np.linalg.norm(np.ptp(self.mesh.nodes, axis=0)))
         self._slowest = params.frequencies[1]
+        if self._slowest is not None:
+            self._slowest /= sqrt(params.inertia)
         if self._slowest is None and is_carried:
             self._slowest = _slowest_on_a_bed(material, self._reach)
         self._presses = self._free = np.ones(0, np.uint8)
@@ -166,7 +173,7 @@ class Organ:
 
     def arguments(self, seconds: float, gravity: float) -> tuple[Any, ...]:
         """Return the arguments of `_solid.c` for a step of `seconds`, the same objects for every step."""
-        return self.solid.arguments(seconds, self.way, self.forces, self.friction, gravity, 0.0)
+        return self.solid.arguments(seconds, self.way, self.forces, self.friction, gravity, 0.0, self.every)
 
     def sharpen(self, seconds: float) -> None:
         """Let scissors cut that close in a step of `seconds`."""

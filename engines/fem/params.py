@@ -28,6 +28,14 @@ class FemParams(PressedOrgansParams):
         description="longest sub-step; the mesh may need shorter ones, which the engine works out",
     )
 
+    own_sub_steps: bool = Field(
+        default=False,
+        description=(
+            "whether soft organs have longer sub-steps than stiff ones beside them, by powers of two: cheaper"
+            " where small stiff tubes lie beside large organs"
+        ),
+    )
+
     organ_contact: bool = Field(
         default=True,
         description=(

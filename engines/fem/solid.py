@@ -94,6 +94,7 @@ class Solid:
         layering: Layering | None = None,
         boxes: Vector = NO_BOXES,
         most_ties: int = 0,
+        weight_share: float = 1.0,
     ) -> None:
         """Build the body at rest.
 
@@ -106,6 +107,7 @@ class Solid:
             layering: other materials; the largest Lame's lambda is that of all.
             boxes: rigid parts, rows of `box_rows`.
             most_ties: room for pairs of nodes that are tied to each other.
+            weight_share: weight over mass and gravity, of tissue with added mass.
         """
         try:
             from engines.fem._solid import Solid as Compiled
@@ -128,7 +130,7 @@ class Solid:
         faces = Faces(mesh, tetrahedra[volume > 0.0], len(volume))
         self._across, self._surface, self._owner = faces.across, faces.surface, faces.owner
         longest = float(np.linalg.norm(_edges_of(mesh), axis=1).max())
-        self._limits = aligned_floats(np.array([lambda_, 0.0, 0.0, longest]))
+        self._limits = aligned_floats(np.array([lambda_, 0.0, 0.0, longest, weight_share]))
         self._boxes = boxes - np.pad(self.middle, (0, boxes.shape[1] - 3))
         self.support: Vector = np.zeros((len(boxes), 3))
         """Mean force of the body on each box in the last step, N, shape (b, 3)."""
@@ -304,18 +306,32 @@ class Solid:
         return ceil(seconds / self.longest_step)
 
     def advance(
-        self, seconds: float, way: SphereWay, friction: float, gravity: float, drag: float = 0.0
+        self,
+        seconds: float,
+        way: SphereWay,
+        friction: float,
+        gravity: float,
+        drag: float = 0.0,
+        every: int = 1,
     ) -> Vector:
         """Advance by `seconds`; return the force on each sphere in each sub-step, N, shape (k, n, 3).
 
-        gravity: along -z, m/s^2. drag: damping over mass, 1/s.
+        gravity: along -z, m/s^2. drag: damping over mass, 1/s. every: sub-steps between the forces of the
+        elements.
         """
         forces = way.no_forces()
-        self.compiled.advance(*self.arguments(seconds, way, forces, friction, gravity, drag))
+        self.compiled.advance(*self.arguments(seconds, way, forces, friction, gravity, drag, every))
         return forces
 
     def arguments(
-        self, seconds: float, way: SphereWay, forces: Vector, friction: float, gravity: float, drag: float
+        self,
+        seconds: float,
+        way: SphereWay,
+        forces: Vector,
+        friction: float,
+        gravity: float,
+        drag: float,
+        every: int = 1,
     ) -> tuple[Any, ...]:
         """Return the arguments of `_solid.c` for `advance`, which writes `forces`, shape (k, n, 3)."""
         sub_steps, edges = len(way.path) - 1, way.edges
@@ -330,6 +346,7 @@ class Solid:
             sub_steps,
             gravity,
             drag,
+            every,
             *(edges.ends, edges.toughness, edges.element, edges.front, edges.ahead, edges.swept),
         )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,15 +47,20 @@ class Together:
             attachments.place, attachments.rest, attachments.law, attachments.widest, attachments.force
         )
 
-    def settle(self, gravity: float) -> None:
-        """Let the organs come to rest under their weight (m/s^2, along -z)."""
+    def settle(self, gravity: float, plan: Callable[[float], int]) -> None:
+        """Let the organs come to rest under their weight (m/s^2, along -z).
+
+        plan: sets the sub-steps of all organs in a time (s) and returns their number.
+        """
         seconds = max(organ.settling_s for organ in self._organs)
         if not seconds:
             return
-        way = still_way(max(organ.solid.sub_steps(seconds) for organ in self._organs))
+        way = still_way(plan(seconds))
         self._compiled.advance(
             tuple(
-                organ.solid.arguments(seconds, way, way.no_forces(), 0.0, gravity, organ.settling_drag)
+                organ.solid.arguments(
+                    seconds, way, way.no_forces(), 0.0, gravity, organ.settling_drag, organ.every
+                )
                 for organ in self._organs
             )
         )

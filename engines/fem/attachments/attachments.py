@@ -92,7 +92,7 @@ class Attachments:
             common = [np.full(count, number) for number in (k, one, other)]
             law = given.strength * ties.areas, np.full(count, 2.0 * given.toughness / given.strength)
             columns = (*common, ties.elements, ties.corners, ties.own_slots, ties.slots, ties.areas, *law)
-            rows.append(np.column_stack([*columns, ties.shares, ties.offsets]))
+            rows.append(np.column_stack([*columns, ties.shares, ties.gaps]))
         table = np.concatenate(rows)
         whole = table[:, :7].astype(np.int32)
         self._number, self._one, self._other, self._element, corner, self._own_slot, self._slot = whole.T
@@ -103,7 +103,8 @@ class Attachments:
         )
         """First organ, corner of an element, second organ, slot of a face, shape (t, 4)."""
         self.law, self.rest = (np.ascontiguousarray(part) for part in (table[:, 8:10], table[:, 10:]))
-        """Strength (N) and last opening (m), shape (t, 2); place at rest, shape (t, 6)."""
+        """Strength (N) and last opening (m), shape (t, 2); place at rest: shares of the face's nodes and
+        distance along its normal (m), shape (t, 4)."""
         self.widest: Vector = np.zeros(len(table))
         """Widest opening, m; infinite of a tie that has parted, shape (t,)."""
         for ties in opened:

@@ -29,9 +29,9 @@ class Ties:
     slots: NDArray[np.int32]
     """Face of the second organ, by slot, shape (t,)."""
     shares: Vector
-    """Shares of the nodes of this face in the tied point, shape (t, 3)."""
-    offsets: Vector
-    """Vector to the node from the tied point, in the frame of the face, m, shape (t, 3)."""
+    """Shares of the nodes of this face in the tied point, the foot of the node on its plane, shape (t, 3)."""
+    gaps: Vector
+    """Distance of the node from the tied point along the normal of the face, m, shape (t,)."""
     areas: Vector
     """Tied area, m^2, shape (t,)."""
 
@@ -45,7 +45,7 @@ def find_ties(one: Organ, other: Organ, chosen: NDArray[np.bool_], within: float
     faces, nodes = one.mesh.triangles, one.mesh.nodes
     candidates = np.unique(faces)
     candidates = candidates[chosen[candidates]]
-    slot, shares = _nearest_faces(nodes[candidates], other, within)
+    slot = _nearest_faces(nodes[candidates], other, within)
     tied: NDArray[np.int64] = np.full(len(nodes), -1)
     tied[candidates] = np.where(slot >= 0, np.arange(len(candidates)), -1)
     whole = np.flatnonzero((tied[faces] >= 0).all(axis=1))
@@ -60,35 +60,32 @@ def find_ties(one: Organ, other: Organ, chosen: NDArray[np.bool_], within: float
         )
     number: NDArray[np.int64] = tied[faces[whole]].ravel()
     kept, first = np.unique(number, return_index=True)
-    slots, shares = slot[kept], shares[kept]
+    slots = slot[kept]
     owners = one.solid.owners[whole[first // 3]]
     corners = (one.solid.tetrahedra[owners] == candidates[kept, None]).argmax(axis=1)
-    corner_places = other.mesh.nodes[other.mesh.triangles[slots]]
-    away = nodes[candidates[kept]] - (shares[:, :, None] * corner_places).sum(axis=1)
+    shares, gaps = _feet(nodes[candidates[kept]], other.mesh.nodes[other.mesh.triangles[slots]])
     return Ties(
         elements=owners.astype(np.int32),
         corners=corners.astype(np.int32),
         own_slots=whole[first // 3].astype(np.int32),
         slots=slots.astype(np.int32),
         shares=shares,
-        offsets=np.einsum("tij,tj->ti", _frames(corner_places), away),
+        gaps=gaps,
         areas=np.bincount(number, np.repeat(areas / 3.0, 3))[kept].astype(np.float64),
     )
 
 
-def _nearest_faces(points: Vector, other: Organ, within: float) -> tuple[Indices, Vector]:
-    """Return the slot of the nearest face of each point, -1 beyond `within`, and shares of its nodes."""
+def _nearest_faces(points: Vector, other: Organ, within: float) -> Indices:
+    """Return the slot of the nearest face of each point, -1 beyond `within`."""
     triangles = other.mesh.triangles
     slots: Indices = np.full(len(points), -1)
-    shares: Vector = np.zeros((len(points), 3))
     near = near_faces(points, np.full(len(points), within), other.mesh.nodes, triangles)
     order = np.lexsort((near.distances, near.spheres))
     found, first = np.unique(near.spheres[order], return_index=True)
     best = order[first]
     number = {tuple(face): slot for slot, face in enumerate(triangles.tolist())}
     slots[found] = [number[tuple(face)] for face in near.faces[best].tolist()]
-    shares[found] = near.weights[best]
-    return slots, shares
+    return slots
 
 
 def _normals(corners: Vector) -> tuple[Vector, Vector]:
@@ -98,9 +95,13 @@ def _normals(corners: Vector) -> tuple[Vector, Vector]:
     return normals / sizes[:, None], 0.5 * sizes
 
 
-def _frames(corners: Vector) -> Vector:
-    """Return the axes of faces: along the first edge, across it, and the normal; shape (f, 3, 3)."""
-    along = corners[:, 1] - corners[:, 0]
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    normals, _ = _normals(corners)
-    return np.stack([along, cross(normals, along), normals], axis=1)
+def _feet(points: Vector, corners: Vector) -> tuple[Vector, Vector]:
+    """Return shares of the corners in the foot of each point on the plane of its face, and its distance, m.
+
+    corners: shape (t, 3, 3). A foot beyond an edge has negative shares.
+    """
+    normals, areas = _normals(corners)
+    away = points[:, None] - corners
+    across = cross(np.roll(away, -1, axis=1), np.roll(away, 1, axis=1))
+    shares = (across * normals[:, None]).sum(axis=2) / (2.0 * areas[:, None])
+    return shares, (away[:, 0] * normals).sum(axis=1)

@@ -128,6 +128,15 @@ class OrganParams(BaseModel):
         ),
     )
     friction: float = Field(default=0.3, ge=0, le=2, description="Coulomb coefficient against probes")
+    inertia: float = Field(
+        default=1.0,
+        ge=1,
+        le=100,
+        description=(
+            "mass for motion over that for weight, kind fem alone: small stiff organs move more slowly and"
+            " allow sub-steps longer by its square root"
+        ),
+    )
     cutting: CuttingParams | None = Field(
         default=None, description="lets blades cut the tissue, and pulls tear it; kind fem alone"
     )

@@ -20,7 +20,7 @@ def test_the_line_of_a_resting_tube_is_its_axis_from_left_to_right():
         line = rig.outputs["block/line"]
         axis = np.linspace([-20e-3, 0.0, 0.0], [20e-3, 0.0, 0.0], len(line.along_m))
         assert np.abs(points(line) - axis).max() < 1e-6
-        assert line.along_m == pytest.approx(np.linspace(0.0, 40e-3, len(line.along_m)))
+        assert line.along_m == pytest.approx(np.linspace(0.0, 40e-3, len(line.along_m)), abs=1e-6)
         assert line.areas_m2 == pytest.approx(np.full(len(line.along_m), pi * 1.5e-3**2), rel=0.05)
         assert line.diameters_m == pytest.approx(np.full(len(line.along_m), 5e-3))
         assert not line.shut.any()
