@@ -277,8 +277,9 @@ class TissueEvent(Message):
     kind: String
     """`cut` or `torn`, with the area of the opened faces; `burnt` (coagulated, charred or vaporised), with
     the volume; `bleeding`, with its flow, and `bleeding stopped`, with the volume lost by then, of bile
-    `leaking` and `leaking stopped`; `clipped`, with the width of the clip, `clip slipped`, with the diameter
-    of the tube, and `clip pulled off`, with the force; `detached` from another organ, with the area.
+    `leaking` and `leaking stopped`; `clipped`, with the width of the clip, `clip slipped` and
+    `clip not across`, with the diameter of the tube, and `clip pulled off`, with the force; `detached` from
+    another organ, with the area.
     """
     instrument: String = ""
     """Name of the probe; empty: none."""

@@ -19,7 +19,7 @@ from schemas.vectors import Vector
 
 __all__ = ["ClipApplier", "clip_ports"]
 
-CLIPPED, SLIPPED = "clipped", "clip slipped"
+CLIPPED, SLIPPED, NOT_ACROSS = "clipped", "clip slipped", "clip not across"
 
 
 def clip_ports(probe: str) -> tuple[Port, ...]:
@@ -45,13 +45,16 @@ class ClipApplier:
         if not tubes:
             return self._warn("there is no tube to be clipped")
         bleeding, ring, offset = min(tubes, key=lambda tube: float(np.linalg.norm(tube[2])))
-        problem = self._misfit(bleeding, ring, jaws, offset)
+        problem, kind = self._misfit(bleeding, ring, jaws, offset), SLIPPED
+        if not problem and not self._spans(bleeding, ring, jaws, offset):
+            problem = f"organ '{bleeding.organ.name}' is not wholly between the jaws"
+            kind = NOT_ACROSS
         if not problem and bleeding.clips is not None:
             if bleeding.clips.put(ring, jaws[1] - jaws[0], self._params):
                 bleeding.organ.events.say(CLIPPED, self._probe.name, middle, self._params.width, "m")
                 return None
             problem = f"organ '{bleeding.organ.name}' has {MOST_CLIPS} clips already"
-        bleeding.organ.events.say(SLIPPED, self._probe.name, middle, self._diameter(bleeding, ring), "m")
+        bleeding.organ.events.say(kind, self._probe.name, middle, self._diameter(bleeding, ring), "m")
         return self._warn(problem)
 
     def _diameter(self, bleeding: Bleeding, ring: int) -> float:
@@ -71,16 +74,20 @@ class ClipApplier:
                 f" {1e3 * least:.3g} mm or more"
             )
         flat = 0.5 * pi * diameter
-        closing = (jaws[1] - jaws[0]) / max(spread, 1e-9)
-        aside = offset - float((offset * closing).sum()) * closing
         if diameter > most or flat > self._params.length:
             return (
                 f"organ '{name}' of {1e3 * diameter:.3g} mm, flat {1e3 * flat:.3g} mm, is too much for a clip"
                 f" of {1e3 * self._params.length:.3g} mm for {1e3 * most:.3g} mm at most"
             )
-        if float(np.linalg.norm(aside)) + 0.5 * flat > 0.5 * self._params.length + 0.5 * diameter:
-            return f"organ '{name}' is not wholly between the jaws"
         return ""
+
+    def _spans(self, bleeding: Bleeding, ring: int, jaws: Vector, offset: Vector) -> bool:
+        """Return whether a clip reaches across a flattened ring, with a slack of half its diameter."""
+        diameter = self._diameter(bleeding, ring)
+        closing = (jaws[1] - jaws[0]) / max(float(np.linalg.norm(jaws[1] - jaws[0])), 1e-9)
+        aside = offset - float((offset * closing).sum()) * closing
+        half = 0.25 * pi * diameter
+        return float(np.linalg.norm(aside)) + half <= 0.5 * self._params.length + 0.5 * diameter
 
     def _warn(self, problem: str) -> None:
         warn_once(f"probe '{self._probe.name}': a clip slipped: {problem}")
