@@ -25,6 +25,8 @@ class GraspingState(Record):
     """Time with tissue in the jaws, s."""
     pull = array("arms")
     """Largest pull, N."""
+    exchanges = array("arms")
+    """Number of exchanges of the instrument."""
 
 
 class Grasping(Watch[GraspingState]):
@@ -40,6 +42,9 @@ class Grasping(Watch[GraspingState]):
         for i, arm in enumerate(self._seen.arms):
             state.time[i] += now.period_s * arm.held
             state.pull[i] = max(float(state.pull[i]), arm.pull)
+            state.exchanges[i] += arm.exchanges
+            if arm.exchanges and arm.held:
+                yield Event("exchanged while holding", arm=i)
             kinds = {grasp.event for grasp in arm.grasps}
             state.grasps[i] += "grasped" in kinds  # a grasp of two organs is one
             state.torn[i] += "torn" in kinds
@@ -65,3 +70,6 @@ class Grasping(Watch[GraspingState]):
                     f"no grasp of tissue: connect or record tissue/{arm.name}/held of a probe with `grasp`"
                 )
                 yield value_or_reason(full, value, unit, "" if arm.has_grasp else reason)
+        for arm, value in zip(self._seen.arms, self.state.exchanges.tolist(), strict=True):
+            reason = f"no commands: connect or record {arm.name}/set_tool_type"
+            yield value_or_reason(f"{arm.name}/exchanges", value, "", "" if arm.can_exchange else reason)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from hub.participant import event_in, signal_in, signal_out
 from schemas.ports import Port
-from schemas.ros import Float64Message
+from schemas.ros import Float64Message, StringMessage
 from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeLine
 from tasks.cholecystectomy.organs import BOWEL, FAT_BED, JOINTS, LIVER, ORGANS, PLATE, TUBES
 
@@ -55,6 +55,7 @@ def _arm_inputs(arm: str) -> Iterator[Port]:
         f"tissue/{arm}/pull", description=pull, size=3, unit="N", frame="world", start=(0.0, 0.0, 0.0)
     )
     yield event_in(f"tissue/{arm}/events", TissueGrasp, "grasped, released, torn")
+    yield event_in(f"{arm}/set_tool_type", StringMessage, "command to exchange the instrument")
 
 
 def operation_outputs() -> Iterator[Port]:

@@ -65,6 +65,10 @@ class ArmSeen:
     """Pull on the tissue that is held, N."""
     grasps: tuple[TissueGrasp, ...] = ()
     """Since the last instant."""
+    exchanges: int = 0
+    """Number of commands since the last instant to exchange the instrument."""
+    can_exchange: bool = False
+    """Whether these commands are connected."""
 
 
 class TissueSeen:
@@ -89,6 +93,7 @@ class TissueSeen:
             organ.has_line = f"tissue/{name}/line" in connected
         for arm in self.arms:
             arm.has_energy = {f"{arm.name}/energy", f"tissue/{arm.name}/delivered"} <= connected
+            arm.can_exchange = f"{arm.name}/set_tool_type" in connected
             arm.has_grasp = f"tissue/{arm.name}/held" in connected
         known = [name for name in (PLATE, FAT_BED, *JOINTS) if f"tissue/{name}/freed" in connected]
         self.freed, self.shares = dict.fromkeys(known, 0.0), dict.fromkeys(known, 0.0)
@@ -124,11 +129,13 @@ class TissueSeen:
         arm.delivered = float(inputs[f"tissue/{arm.name}/delivered"][0])
         arm.held = bool(inputs[f"tissue/{arm.name}/held"][0] > 0.0)
         arm.pull = float(np.linalg.norm(inputs[f"tissue/{arm.name}/pull"]))
+        arm.exchanges = len(inputs.events(f"{arm.name}/set_tool_type"))
         arm.grasps = cast("tuple[TissueGrasp, ...]", inputs.events(f"tissue/{arm.name}/events"))
 
     def arm_index(self, instrument: str) -> int:
-        """Return the index of the arm with this probe, -1: none."""
-        return next((i for i, arm in enumerate(self.arms) if arm.name == instrument), -1)
+        """Return the index of the arm with this probe, `PSM1` or a spare `PSM1/...`; -1: none."""
+        owner = instrument.partition("/")[0]
+        return next((i for i, arm in enumerate(self.arms) if arm.name == owner), -1)
 
     def has_parted(self, attachment: str) -> bool:
         """Return whether a part of an attachment has come off."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from schemas.ros import StringMessage
 from tests.tasks.theatre import BLADE, CLIPS, GRASPER, HEIGHTS, HOOK, Theatre, tube
 
 DUCT, ARTERY, COMMON, GALLBLADDER = "cystic_duct", "cystic_artery", "common_bile_duct", "gallbladder"
@@ -109,7 +110,32 @@ def test_a_clip_too_near_the_common_duct_and_another_clip():
         assert theatre.metric("duct/distance_from_common_duct") < 5e-3
 
 
-@pytest.mark.parametrize(("beside", "kind"), [(False, "energy in the air"), (True, "energy on an instrument")])
+def test_an_instrument_that_is_exchanged_while_it_holds_tears_loose():
+    block = {
+        "size": ["16 mm", "12 mm", "8 mm"],
+        "young_modulus": "20 kPa",
+        "nodes": 75,
+        "position": [0, 0, 0],
+    }
+    grasper = GRASPER | {"grasp": {"hold": "0.4 N", "reach": "3 mm"}}
+    with Theatre({GALLBLADDER: block}, {"PSM2": grasper}) as theatre:
+        theatre.put("PSM2", [[-3e-3, 0.0, 1.0e-3], [3e-3, 0.0, 1.0e-3]]).wait(0.02)
+        theatre.lead("PSM2", [[-1.6e-3, 0.0, 0.5e-3], [1.6e-3, 0.0, 0.5e-3]], 0.3)
+        assert ("gallbladder grasped", GALLBLADDER, "PSM2") in theatre.said
+        theatre.driver.send("PSM2/set_tool_type", StringMessage(data="PROGRASP_FORCEPS:400093"))
+        theatre.lead("PSM2", theatre.at["PSM2"] + [0.0, 0.0, 0.03], 0.5)
+        assert "torn" in theatre.tissue
+        assert theatre.number("PSM2/held") == 0.0
+        assert ("exchanged while holding", "", "PSM2") in theatre.said
+        assert ("grasp torn off", GALLBLADDER, "PSM2") in theatre.said
+        assert theatre.metric("errors/exchanged_while_holding") == 1.0
+        assert theatre.metric("PSM2/grasps_torn_off") == 1.0
+        assert theatre.metric("PSM2/peak_pull") > 0.3
+
+
+@pytest.mark.parametrize(
+    ("beside", "kind"), [(False, "energy in the air"), (True, "energy on an instrument")]
+)
 def test_power_without_tissue_heats_nothing(beside, kind):
     with Theatre([DUCT], {"PSM1": HOOK}) as theatre:
         theatre.wait(0.05)

@@ -1,4 +1,4 @@
-"""Tissue of kind fem, instruments led by a test, and the cholecystectomy task, step for step as in a session."""
+"""Tissue of kind fem, instruments led by a test, and the cholecystectomy task, in steps of a session."""
 
 from pathlib import Path
 
@@ -55,7 +55,10 @@ class Theatre:
         self.at = {name: np.full((probe["spheres"], 3), FAR) for name, probe in probes.items()}
         self.values, self.commands = {}, {}
         for name, centres in self.at.items():
-            self.values |= {f"{name}/position": centres.reshape(-1), f"{name}/velocity": np.zeros(centres.size)}
+            self.values |= {
+                f"{name}/position": centres.reshape(-1),
+                f"{name}/velocity": np.zeros(centres.size),
+            }
             if probes[name].get("energy"):
                 self.values[f"{name}/energy"] = np.zeros(1)
         self.inputs = Inputs(self.values, events=self.commands)
