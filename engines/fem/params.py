@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from anatomy.params import AnatomyParams
+from engines.fem.anatomy import add_anatomy
 from engines.fem.attachments.params import AttachmentParams
 from engines.tissue.elasticity.body_yield import MOST_NODES
+from engines.tissue.organs.params import OrganParams
 from engines.tissue.params import PressedOrgansParams
 from schemas.errors import did_you_mean
 from schemas.quantity import Duration
@@ -21,6 +24,15 @@ class FemParams(PressedOrgansParams):
     """Tissue in explicit dynamics."""
 
     most_corrected_nodes: ClassVar[int] = MOST_NODES
+
+    anatomy: AnatomyParams | None = Field(
+        default=None,
+        description=(
+            "a patient, whose organs and attachments are added; `organs` and `attachments` of the same names"
+            " change single fields"
+        ),
+    )
+    organs: dict[Name, OrganParams] = Field(default_factory=dict[Name, OrganParams])
 
     timestep: Duration | None = Field(
         default=None,
@@ -50,6 +62,17 @@ class FemParams(PressedOrgansParams):
             "connective tissue between organs, with outputs `<attachment>/freed` and `<attachment>/force`"
         ),
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _add_anatomy(cls, given: Any) -> Any:
+        return add_anatomy(given)
+
+    @model_validator(mode="after")
+    def _has_organs(self) -> Self:
+        if not self.organs:
+            raise ValueError("tissue has organs: state `organs`, or a patient's `anatomy`")
+        return self
 
     @model_validator(mode="after")
     def _organs_to_attach(self) -> Self:

@@ -19,7 +19,18 @@ import trocar.tasks
 from schemas.message import Message
 
 ROOT = Path(__file__).resolve().parents[2]
-PRIVATE = {"schemas", "robots", "hub", "engines", "controllers", "devices", "configs", "tasks", "webconsole"}
+PRIVATE = {
+    "schemas",
+    "anatomy",
+    "robots",
+    "hub",
+    "engines",
+    "controllers",
+    "devices",
+    "configs",
+    "tasks",
+    "webconsole",
+}
 PUBLIC = [
     "BondPlan",
     "BondSide",

@@ -11,7 +11,7 @@ from engines.tissue.meshing.tet_mesh import Indices, TetMesh
 from robots.vector3 import cross
 from schemas.vectors import Vector
 
-__all__ = ["InnerWall", "wall_around", "wall_of_rings"]
+__all__ = ["InnerWall", "wall_along", "wall_around", "wall_of_rings"]
 
 _LOOKS_IN = 0.5
 """Cosine of the largest angle between the normal of the inner wall and the way to the centre line."""
@@ -44,13 +44,18 @@ class InnerWall:
 
 def wall_of_rings(mesh: TetMesh, rings: Indices, diameter: float) -> InnerWall:
     """Return the inner wall of a straight tube whose nodes are known, shape (r, a)."""
-    r, a = np.indices(rings.shape)
-    ring_of, sector_of = (np.full(len(mesh.nodes), -1) for _ in range(2))
-    ring_of[rings], sector_of[rings] = r, a
     middles = mesh.nodes[rings].mean(axis=1)
     way: Vector = middles[-1] - middles[0]
     stations: Vector = (mesh.nodes * (way / np.linalg.norm(way))).sum(axis=1)
-    return InnerWall(rings, ring_of, sector_of, stations, np.full(len(rings), diameter))
+    return wall_along(mesh, rings, stations, np.full(len(rings), diameter))
+
+
+def wall_along(mesh: TetMesh, rings: Indices, stations: Vector, diameters: Vector) -> InnerWall:
+    """Return the inner wall of a tube whose nodes and their places along it are known."""
+    r, a = np.indices(rings.shape)
+    ring_of, sector_of = (np.full(len(mesh.nodes), -1) for _ in range(2))
+    ring_of[rings], sector_of[rings] = r, a
+    return InnerWall(rings, ring_of, sector_of, stations, diameters)
 
 
 def wall_around(mesh: TetMesh, line: Vector) -> InnerWall:

@@ -22,7 +22,7 @@ from engines.tissue.organs.anchors import AnchorParams, Edges
 from engines.tissue.organs.bleeding import BleedingParams
 from engines.tissue.organs.catalogue import SHAPES, block_shape
 from engines.tissue.organs.cutting import CuttingParams
-from engines.tissue.organs.inner_wall import InnerWall, wall_around, wall_of_rings
+from engines.tissue.organs.inner_wall import InnerWall, wall_around
 from engines.tissue.organs.layers import LayerParams
 from engines.tissue.organs.lumen import LumenParams
 from engines.tissue.organs.material_file import MaterialFile
@@ -32,6 +32,7 @@ from engines.tissue.organs.prony import PronySeries, PronyTerm
 from engines.tissue.organs.shape import Shape
 from engines.tissue.organs.surface_mesh import mesh_surface
 from engines.tissue.organs.tube import TubeParams, tube_shape
+from engines.tissue.organs.visceral_face import VisceralFaceParams, visceral_shape
 from robots import rotation
 from robots.dvrk.parameters import UnitQuaternion
 from schemas.files import find_file
@@ -71,7 +72,10 @@ class OrganParams(BaseModel):
             " closed surface (.stl, .obj, .ply, .glb, .gltf); a relative path starts at the scenario"
         ),
     )
-    tube: TubeParams | None = Field(default=None, description="instead: a duct or a vessel")
+    tube: TubeParams | None = Field(default=None, description="instead: a duct, a vessel or a pouch")
+    visceral_face: VisceralFaceParams | None = Field(
+        default=None, description="instead: the part of a liver about the gallbladder"
+    )
     unit: Literal["m", "mm"] | None = Field(
         default=None, description="of the file of tetrahedra or of a surface; default: m"
     )
@@ -155,10 +159,11 @@ class OrganParams(BaseModel):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Self:
-        if sum(part is not None for part in (self.size, self.shape, self.mesh, self.tube)) != 1:
+        forms = self.size, self.shape, self.mesh, self.tube, self.visceral_face
+        if sum(form is not None for form in forms) != 1:
             raise ValueError(
-                f"an organ has a size (a block), a shape ({', '.join(SHAPES)}), a mesh (a file) or a tube,"
-                " one of them"
+                f"an organ has a size (a block), a shape ({', '.join(SHAPES)}), a mesh (a file), a tube or a"
+                " visceral_face, one of them"
             )
         if self.lumen is not None and (self.tube is None) != bool(self.lumen.line):
             raise ValueError(
@@ -286,6 +291,8 @@ class OrganParams(BaseModel):
             return block_shape(self.size, layers, tuple(layer.rows for layer in self.layers))
         if self.tube is not None:
             return tube_shape(self.tube)
+        if self.visceral_face is not None:
+            return visceral_shape(self.visceral_face)
         if self.mesh is not None:
             return _from_file(self.mesh, _UNITS[self.unit or "m"], self.nodes or _NODES)
         return SHAPES[self.shape or ""]
@@ -296,7 +303,7 @@ class OrganParams(BaseModel):
         if self.lumen is None:
             return None
         if self.tube is not None:
-            return wall_of_rings(self.local, self.tube.rings(self.nodes or _NODES), self.tube.diameter)
+            return self.tube.inner_wall(self.local, self.nodes or _NODES)
         return wall_around(self.local, np.array(self.lumen.line))
 
     @cached_property

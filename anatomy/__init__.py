@@ -1,0 +1,1 @@
+"""Patients of a cholecystectomy: sizes, stiffness, variations, and the places of their organs."""

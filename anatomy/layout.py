@@ -1,0 +1,132 @@
+"""The centre lines of a patient's tubes in `world`: x to the patient's left, y cranial, z anterior.
+
+The origin lies in the middle of Calot's triangle. By eye, after pictures of the operation; only lengths and
+diameters are the patient's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anatomy.patient import DUCT_WALL, HEPATIC_ARTERY_DIAMETER, Patient
+
+__all__ = ["Layout", "Line"]
+
+Line = NDArray[np.float64]
+"""Points of a centre line, m, shape (k, 3)."""
+
+_CONFLUENCE_Y = -0.014
+_COMMON = np.array(
+    [[0.020, -0.050, -0.010], [0.0205, -0.028, -0.007], [0.020, -0.008, -0.007], [0.019, 0.012, -0.009]]
+)
+"""Common bile duct and common hepatic duct, caudal to cranial, below their last point."""
+_HILUM = np.array([[0.017, 0.024, -0.0125], [0.013, 0.031, -0.016]])
+_SLACK = 0.95
+"""Distance of the ends of the cystic duct over its length, before it is pulled."""
+_EMBEDDED = 0.0004
+"""How far an end lies inside the wall that it joins, m."""
+_DUCT_WAY = np.array([-0.82, 0.48, 0.32])
+"""Direction of the cystic duct from the common bile duct to the gallbladder."""
+_ARTERY_WAY = np.array([0.76, 0.30, -0.57])
+"""Direction of the cystic artery from the gallbladder to the right hepatic artery."""
+
+
+def _unit(vector: Line) -> Line:
+    return vector / np.linalg.norm(vector)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Centre lines of a patient."""
+
+    patient: Patient
+
+    @cached_property
+    def common_duct(self) -> Line:
+        """Common bile duct and common hepatic duct, caudal end first."""
+        return np.concatenate([_COMMON, _HILUM])
+
+    @cached_property
+    def confluence(self) -> Line:
+        """Where the cystic duct ends, inside the wall of the common bile duct, shape (3,)."""
+        share = np.interp(_CONFLUENCE_Y, _COMMON[:, 1], np.arange(len(_COMMON), dtype=np.float64))
+        low = int(share)
+        middle = _COMMON[low] + (share - low) * (_COMMON[low + 1] - _COMMON[low])
+        radius = 0.5 * self.patient.common_duct_diameter
+        return middle + _unit(_DUCT_WAY) * (radius - _EMBEDDED)
+
+    @cached_property
+    def neck(self) -> Line:
+        """Where the gallbladder ends and the cystic duct begins, shape (3,)."""
+        return self.confluence + _unit(_DUCT_WAY) * _SLACK * self.patient.duct_length
+
+    @cached_property
+    def cystic_duct(self) -> Line:
+        """From the neck to the common bile duct, in a shallow bow."""
+        start, end, length = self.neck, self.confluence, self.patient.duct_length
+        bow = _unit(np.array([-0.35, -0.75, 0.55])) * 0.10 * length
+        shares = np.array([0.0, 0.12, 0.35, 0.65, 0.88, 1.0])
+        weights = np.array([0.0, 0.2, 0.8, 0.8, 0.2, 0.0])
+        return start + shares[:, None] * (end - start) + weights[:, None] * bow
+
+    @cached_property
+    def gallbladder(self) -> Line:
+        """From the neck over infundibulum and body to the fundus."""
+        length = self.patient.gallbladder_length
+        beside = np.array([0.0, -4.0, -9.0, -13.0, -15.0, -15.0, -13.0]) * 1e-3
+        along = np.array([0.0, 0.045, 0.12, 0.28, 0.50, 0.72, 0.90]) * length
+        above = np.array([0.0, 1.0, 3.0, 4.5, 4.5, 5.0, 6.5]) * 1e-3
+        return self.neck + np.stack([beside, along, above], axis=1)
+
+    @cached_property
+    def gallbladder_diameters(self) -> Line:
+        """Outer diameter at each point of the gallbladder's line, m."""
+        shares = np.array([0.0, 0.42, 0.68, 0.86, 1.0, 1.0, 0.94])
+        found = shares * self.patient.gallbladder_width
+        found[0] = self.patient.duct_diameter + 0.0015
+        return found
+
+    @cached_property
+    def gallbladder_walls(self) -> Line:
+        """Thickness of the wall at each point of the gallbladder's line, m."""
+        wall = self.patient.gallbladder_wall
+        neck = DUCT_WALL + 0.0004
+        return np.array([neck, min(wall, 0.0022), wall, wall, wall, wall, wall])
+
+    @cached_property
+    def _artery_end(self) -> tuple[Line, Line]:
+        """Place on the gallbladder where the cystic artery ends, and the outward normal there, shapes (3,)."""
+        low, high = self.gallbladder[1:3]
+        radius = 0.25 * float(self.gallbladder_diameters[1:3].sum())
+        along = _unit(high - low)
+        outward = {
+            "cranial": np.array([0.9, 0.3, -0.25]),
+            "front": np.array([0.35, -0.3, 0.9]),
+            "behind": np.array([0.6, -0.1, -0.8]),
+        }[self.patient.artery]
+        outward = _unit(outward - float((outward * along).sum()) * along)
+        return 0.5 * (low + high) + outward * (radius - _EMBEDDED), outward
+
+    @cached_property
+    def artery_origin(self) -> Line:
+        """Where the cystic artery begins, on the right hepatic artery, shape (3,)."""
+        return self._artery_end[0] + _unit(_ARTERY_WAY) * _SLACK * self.patient.artery_length
+
+    @cached_property
+    def cystic_artery(self) -> Line:
+        """From the gallbladder to the right hepatic artery."""
+        (start, outward), end = self._artery_end, self.artery_origin
+        lead, arrive = 0.3 * self.patient.artery_length, _unit(_ARTERY_WAY)
+        return np.stack([start, start + outward * lead, end - arrive * lead, end])
+
+    @cached_property
+    def hepatic_artery(self) -> Line:
+        """The right hepatic artery: from behind the common hepatic duct to the liver."""
+        over = self.artery_origin + _unit(_ARTERY_WAY) * (0.5 * HEPATIC_ARTERY_DIAMETER - _EMBEDDED)
+        behind = np.array([0.022, over[1] - 0.005, min(over[2] - 0.007, -0.0155)])
+        left = np.array([0.038, over[1] - 0.014, -0.0165])
+        return np.stack([left, behind, over, over + np.array([-0.009, 0.010, -0.006])])

@@ -1,0 +1,186 @@
+"""A patient's organs and attachments, as a scenario states them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from anatomy.layout import Layout, Line
+from anatomy.patient import (
+    ARTERY_WALL,
+    COMMON_DUCT_WALL,
+    DUCT_WALL,
+    HEPATIC_ARTERY_DIAMETER,
+    HEPATIC_ARTERY_WALL,
+    Patient,
+)
+
+__all__ = ["attachments_of", "organs_of"]
+
+_DIGITS = 6
+_LIVER_SIZE = 0.120, 0.118, 0.032
+_LIVER_MIDDLE = np.array([-0.010, 0.028, 0.0])
+_DEPTH_IN_FOSSA = 0.45
+"""Height of the liver's face over the gallbladder's centre line, below it, over its radius."""
+_CLEARANCE_FREED, _CLEARANCE = 0.004, 0.0006
+"""Width of the gap between liver and gallbladder where it has been freed, and elsewhere, m."""
+_MMHG = 133.322
+
+_SOFT: dict[str, Any] = {"poisson_ratio": 0.45, "friction": 0.2}
+_DUCT_CUTTING: dict[str, Any] = {"toughness": 300.0}
+"""Between a sharp cut of aorta (290 J/m^2) and a tear (1.7 kJ/m^2); estimated."""
+_BILE: dict[str, Any] = {"liquid": "bile", "pressure": 10.0 * _MMHG, "supply": ["right"]}
+_JOINT: dict[str, Any] = {"strength": 1e6, "toughness": 1000.0}
+"""As a duct or vessel itself; assumed."""
+
+
+def organs_of(patient: Patient) -> dict[str, dict[str, Any]]:
+    """Return the organs by name."""
+    layout = Layout(patient)
+    makers: dict[str, Callable[[Patient, Layout], dict[str, Any]]] = {
+        "liver": _liver,
+        "gallbladder": _gallbladder,
+        "cystic_duct": _cystic_duct,
+        "cystic_artery": _cystic_artery,
+        "common_bile_duct": _common_bile_duct,
+        "hepatic_artery": _hepatic_artery,
+    }
+    return {name: make(patient, layout) for name, make in makers.items()}
+
+
+def attachments_of(patient: Patient) -> dict[str, dict[str, Any]]:
+    """Return the attachments by name, for a triangle that has been dissected."""
+    touching = 0.25 * patient.common_duct_diameter + 0.001
+    return {
+        "cystic_plate": {"organs": ["gallbladder", "liver"], "surface": "bed-upper", "within": 0.004},
+        "neck_duct": {"organs": ["cystic_duct", "gallbladder"], "surface": "left", "within": 0.002, **_JOINT},
+        "duct_confluence": {
+            "organs": ["cystic_duct", "common_bile_duct"],
+            "surface": "right",
+            "within": touching,
+            **_JOINT,
+        },
+        "neck_artery": {
+            "organs": ["cystic_artery", "gallbladder"],
+            "surface": "left",
+            "within": 0.003,
+            **_JOINT,
+        },
+        "artery_origin": {
+            "organs": ["cystic_artery", "hepatic_artery"],
+            "surface": "right",
+            "within": 0.003,
+            **_JOINT,
+        },
+    }
+
+
+def _points(line: Line) -> list[list[float]]:
+    return np.round(line, _DIGITS).tolist()
+
+
+def _liver(patient: Patient, layout: Layout) -> dict[str, Any]:
+    line, radii = layout.gallbladder, 0.5 * layout.gallbladder_diameters
+    body = 4  # the widest point of the body
+    position = _LIVER_MIDDLE + [layout.neck[0], 0.0, line[body, 2] - _DEPTH_IN_FOSSA * radii[body]]
+    gap = np.where(np.arange(len(line)) < 3, _CLEARANCE_FREED, _CLEARANCE)
+    lies = line[1:] - position
+    return {
+        "visceral_face": {
+            "size": _LIVER_SIZE,
+            "porta": 0.019,
+            "fossa": _points(lies),
+            "diameters": np.round(2.0 * (radii + gap)[1:], _DIGITS).tolist(),
+        },
+        "nodes": 900,
+        "position": np.round(position, _DIGITS).tolist(),
+        "young_modulus": patient.liver_modulus,
+        "density": 1060.0,
+        **_SOFT,
+        "anchors": [{"surface": "back"}],
+    }
+
+
+def _gallbladder(patient: Patient, layout: Layout) -> dict[str, Any]:
+    return {
+        "tube": {
+            "path": _points(layout.gallbladder),
+            "diameters": np.round(layout.gallbladder_diameters, _DIGITS).tolist(),
+            "wall": np.round(layout.gallbladder_walls, _DIGITS).tolist(),
+            "closed": "right",
+        },
+        "nodes": 480,
+        "young_modulus": patient.gallbladder_modulus,
+        **_SOFT,
+        "anchors": [{"surface": "right"}],
+        "cutting": _DUCT_CUTTING,
+        "lumen": _BILE,
+    }
+
+
+def _cystic_duct(patient: Patient, layout: Layout) -> dict[str, Any]:
+    wide = patient.duct_diameter + 0.0012
+    diameters = [wide, patient.duct_diameter + 0.0003, *[patient.duct_diameter] * 4]
+    return {
+        "tube": {
+            "path": _points(layout.cystic_duct),
+            "diameters": np.round(diameters, _DIGITS).tolist(),
+            "wall": DUCT_WALL,
+        },
+        "nodes": 180 if patient.short_duct else 240,
+        "young_modulus": patient.duct_modulus,
+        **_SOFT,
+        "anchors": [],
+        "cutting": _DUCT_CUTTING,
+        "lumen": {**_BILE, "supply": ["left", "right"]},
+    }
+
+
+def _cystic_artery(patient: Patient, layout: Layout) -> dict[str, Any]:
+    return {
+        "tube": {
+            "path": _points(layout.cystic_artery),
+            "diameter": round(patient.artery_diameter, _DIGITS),
+            "wall": ARTERY_WALL,
+        },
+        "nodes": 160,
+        "young_modulus": patient.artery_modulus,
+        **_SOFT,
+        "anchors": [],
+        "cutting": _DUCT_CUTTING,
+        "lumen": {"supply": ["right"]},
+    }
+
+
+def _common_bile_duct(patient: Patient, layout: Layout) -> dict[str, Any]:
+    return {
+        "tube": {
+            "path": _points(layout.common_duct),
+            "diameter": round(patient.common_duct_diameter, _DIGITS),
+            "wall": COMMON_DUCT_WALL,
+        },
+        "nodes": 300,
+        "young_modulus": patient.duct_modulus,
+        **_SOFT,
+        "anchors": [{"surface": "left"}, {"surface": "right"}, {"surface": "bed"}],
+        "cutting": _DUCT_CUTTING,
+        "lumen": {**_BILE, "supply": ["left", "right"]},
+    }
+
+
+def _hepatic_artery(patient: Patient, layout: Layout) -> dict[str, Any]:
+    return {
+        "tube": {
+            "path": _points(layout.hepatic_artery),
+            "diameter": HEPATIC_ARTERY_DIAMETER,
+            "wall": HEPATIC_ARTERY_WALL,
+        },
+        "nodes": 140,
+        "young_modulus": patient.artery_modulus,
+        **_SOFT,
+        "anchors": [{"surface": "left"}, {"surface": "right"}, {"surface": "bed"}],
+        "cutting": _DUCT_CUTTING,
+        "lumen": {"supply": ["left"]},
+    }

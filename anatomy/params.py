@@ -1,0 +1,48 @@
+"""Parameters of a patient in a scenario."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from anatomy.organs import attachments_of, organs_of
+from anatomy.patient import Patient, Variations, draw_patient
+
+__all__ = ["AnatomyParams"]
+
+
+class AnatomyParams(BaseModel):
+    """A patient, and how far the operation has gone."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    patient: int = Field(default=0, ge=0, le=2**53, description="seed of sizes, stiffness and variations")
+    phase: Literal["clip-and-cut"] = Field(
+        default="clip-and-cut",
+        description="clip-and-cut: the triangle is dissected, the lower third of the cystic plate is free",
+    )
+    artery: Literal["cranial", "front", "behind"] | None = Field(
+        default=None, description="course of the cystic artery about the duct; default: as the seed draws it"
+    )
+    short_duct: bool | None = Field(
+        default=None, description="a cystic duct of 8 to 14 mm; default: as the seed draws it"
+    )
+    thick_wall: bool | None = Field(
+        default=None, description="an inflamed gallbladder; default: as the seed draws it"
+    )
+
+    @property
+    def drawn(self) -> Patient:
+        """The patient."""
+        return draw_patient(self.patient, Variations(self.artery, self.short_duct, self.thick_wall))
+
+    @property
+    def organs(self) -> dict[str, dict[str, Any]]:
+        """The organs by name, as a scenario states them."""
+        return organs_of(self.drawn)
+
+    @property
+    def attachments(self) -> dict[str, dict[str, Any]]:
+        """The attachments by name, as a scenario states them."""
+        return attachments_of(self.drawn)
