@@ -31,8 +31,12 @@ _EMBEDDED = 0.0004
 """How far an end lies inside the wall that it joins, m."""
 _DUCT_WAY = np.array([-0.82, 0.48, 0.32])
 """Direction of the cystic duct from the common bile duct to the gallbladder."""
-_ARTERY_WAY = np.array([0.76, 0.30, -0.57])
-"""Direction of the cystic artery from the gallbladder to the right hepatic artery."""
+_MEDIAL = np.array([0.9, 0.3, -0.25])
+"""Side of the infundibulum where a straight cystic artery ends."""
+_ROOM = 0.001
+"""Gap between the cystic duct and an artery that crosses it, m."""
+_TOWARDS = np.array([0.013, 0.020, -0.006])
+"""Place near which a straight cystic artery leaves the right hepatic artery."""
 
 
 def _unit(vector: Line) -> Line:
@@ -97,36 +101,36 @@ class Layout:
         neck = DUCT_WALL + 0.0004
         return np.array([neck, min(wall, 0.0022), wall, wall, wall, wall, wall])
 
-    @cached_property
-    def _artery_end(self) -> tuple[Line, Line]:
-        """Place on the gallbladder where the cystic artery ends, and the outward normal there, shapes (3,)."""
+    def _on_infundibulum(self, outward: Line) -> tuple[Line, Line]:
+        """Return a place on the wall of the infundibulum in a direction, and the normal there."""
         low, high = self.gallbladder[1:3]
         radius = 0.25 * float(self.gallbladder_diameters[1:3].sum())
         along = _unit(high - low)
-        outward = {
-            "cranial": np.array([0.9, 0.3, -0.25]),
-            "front": np.array([0.35, -0.3, 0.9]),
-            "behind": np.array([0.6, -0.1, -0.8]),
-        }[self.patient.artery]
-        outward = _unit(outward - float((outward * along).sum()) * along)
-        return 0.5 * (low + high) + outward * (radius - _EMBEDDED), outward
-
-    @cached_property
-    def artery_origin(self) -> Line:
-        """Where the cystic artery begins, on the right hepatic artery, shape (3,)."""
-        return self._artery_end[0] + _unit(_ARTERY_WAY) * _SLACK * self.patient.artery_length
+        normal = _unit(outward - float((outward * along).sum()) * along)
+        return 0.5 * (low + high) + normal * (radius - _EMBEDDED), normal
 
     @cached_property
     def cystic_artery(self) -> Line:
-        """From the gallbladder to the right hepatic artery."""
-        (start, outward), end = self._artery_end, self.artery_origin
-        lead, arrive = 0.3 * self.patient.artery_length, _unit(_ARTERY_WAY)
-        return np.stack([start, start + outward * lead, end - arrive * lead, end])
+        """From the gallbladder to the right hepatic artery, straight or across the cystic duct."""
+        if self.patient.artery == "cranial":
+            (start, outward), length = self._on_infundibulum(_MEDIAL), self.patient.artery_length
+            way = _unit(_TOWARDS - start)
+            end = start + way * _SLACK * length
+            return np.stack([start, start + outward * 0.3 * length, end - way * 0.3 * length, end])
+        side = 1.0 if self.patient.artery == "front" else -1.0
+        start, _ = self._on_infundibulum(np.array([0.65, -0.45, 0.6 * side]))
+        apart = 0.5 * (self.patient.duct_diameter + self.patient.artery_diameter) + _ROOM
+        crossing = self.cystic_duct[1:3].mean(axis=0) + np.array([0.0, -0.001, side * apart])
+        end = np.array([crossing[0] + 0.007, -0.024, -0.0105])
+        shares = np.array([0.0, 0.35, 0.68, 1.0])[:, None]
+        return np.concatenate([[start], crossing + shares * (end - crossing)])
 
     @cached_property
     def hepatic_artery(self) -> Line:
-        """The right hepatic artery: from behind the common hepatic duct to the liver."""
-        over = self.artery_origin + _unit(_ARTERY_WAY) * (0.5 * HEPATIC_ARTERY_DIAMETER - _EMBEDDED)
-        behind = np.array([0.022, over[1] - 0.005, min(over[2] - 0.007, -0.0155)])
-        left = np.array([0.038, over[1] - 0.014, -0.0165])
-        return np.stack([left, behind, over, over + np.array([-0.009, 0.010, -0.006])])
+        """The right hepatic artery, behind the common hepatic duct or, ascending, behind the bile duct."""
+        line = self.cystic_artery
+        over = line[-1] + _unit(line[-1] - line[-2]) * (0.5 * HEPATIC_ARTERY_DIAMETER - _EMBEDDED)
+        left = np.array([0.038, over[1] - 0.013, -0.0185])
+        behind = np.array([0.023, over[1] - 0.005, -0.0175])
+        onwards = [-0.009, 0.009, -0.005] if self.patient.artery == "cranial" else [-0.010, 0.005, -0.004]
+        return np.stack([left, behind, over, over + np.array(onwards)])

@@ -26,6 +26,8 @@ _DEPTH_IN_FOSSA = 0.45
 """Height of the liver's face over the gallbladder's centre line, below it, over its radius."""
 _CLEARANCE_FREED, _CLEARANCE = 0.004, 0.0006
 """Width of the gap between liver and gallbladder where it has been freed, and elsewhere, m."""
+_OPENED = 0.36
+"""Share of the cystic plate that is free in the critical view of safety: a little more than a third."""
 _MMHG = 133.322
 
 _SOFT: dict[str, Any] = {"poisson_ratio": 0.45, "friction": 0.2}
@@ -54,7 +56,13 @@ def attachments_of(patient: Patient) -> dict[str, dict[str, Any]]:
     """Return the attachments by name, for a triangle that has been dissected."""
     touching = 0.25 * patient.common_duct_diameter + 0.001
     return {
-        "cystic_plate": {"organs": ["gallbladder", "liver"], "surface": "bed-upper", "within": 0.004},
+        "cystic_plate": {
+            "organs": ["gallbladder", "liver"],
+            "surface": "bed",
+            "within": 0.006,
+            "lower_end": np.round(Layout(patient).neck, _DIGITS).tolist(),
+            "opened": _OPENED,
+        },
         "neck_duct": {"organs": ["cystic_duct", "gallbladder"], "surface": "left", "within": 0.002, **_JOINT},
         "duct_confluence": {
             "organs": ["cystic_duct", "common_bile_duct"],
@@ -84,13 +92,13 @@ def _points(line: Line) -> list[list[float]]:
 def _liver(patient: Patient, layout: Layout) -> dict[str, Any]:
     line, radii = layout.gallbladder, 0.5 * layout.gallbladder_diameters
     body = 4  # the widest point of the body
-    position = _LIVER_MIDDLE + [layout.neck[0], 0.0, line[body, 2] - _DEPTH_IN_FOSSA * radii[body]]
+    position = _LIVER_MIDDLE + np.array([layout.neck[0], 0.0, line[body, 2] - _DEPTH_IN_FOSSA * radii[body]])
     gap = np.where(np.arange(len(line)) < 3, _CLEARANCE_FREED, _CLEARANCE)
     lies = line[1:] - position
     return {
         "visceral_face": {
             "size": _LIVER_SIZE,
-            "porta": 0.019,
+            "porta": 0.022,
             "fossa": _points(lies),
             "diameters": np.round(2.0 * (radii + gap)[1:], _DIGITS).tolist(),
         },

@@ -48,8 +48,8 @@ HEPATIC_ARTERY_WALL = 0.0011
 LIVER_MODULUS = Spread(6400.0, 840.0, 4110.0, 7980.0)
 """Three times the shear modulus of 2.14 +- 0.28 kPa, 1.37 to 2.66 kPa found (Obrzut et al. 2019)."""
 GALLBLADDER_MODULUS = Spread(40e3, 6e3, 30e3, 55e3)
-"""Assumed, soft enough for real time: steep parts of human walls have 255 to 641 kPa (Karimi et al. 2017, from
-memory), walls of pigs 9 MPa at 500 %/s (Johnson et al. 2020).
+"""Assumed, soft enough for real time: steep parts of human walls have 255 to 641 kPa (Karimi et al. 2017,
+from memory), walls of pigs 9 MPa at 500 %/s (Johnson et al. 2020).
 """
 DUCT_MODULUS = Spread(60e3, 8e3, 45e3, 75e3)
 """Small strains of the porcine common bile duct along its length: some 46 kPa, as it is 25 % longer at 5 kPa

@@ -11,8 +11,8 @@ units), in `trocar.programs` (programs that lead arms), in `trocar.policies` (po
 `trocar.records` (state with named fields), in `trocar.tasks` (training tasks), in `trocar.haptics` (haptic
 devices), in `trocar.testing` (a driver of one participant) and in `trocar.environments` (environments for
 Gymnasium; the former name `learning.environments` works in this release) is public. All other modules of the
-distribution (`schemas`, `anatomy`, `robots`, `hub`, `engines`, `controllers`, `devices`, `tasks`, `learning`, `configs`)
-are private, and may change in any release.
+distribution (`schemas`, `anatomy`, `robots`, `hub`, `engines`, `controllers`, `devices`, `tasks`, `learning`,
+`configs`) are private, and may change in any release.
 `python -m trocar` is the command line.
 
 Sessions          `run`, `verify`, `fork`, `load_scenario`, `run_in_process`, `SteppedSession`

@@ -26,7 +26,7 @@ def add_anatomy(given: Any) -> Any:
         return tree
     anatomy = AnatomyParams.model_validate(tree["anatomy"])
     for key, made in (("organs", anatomy.organs), ("attachments", anatomy.attachments)):
-        own = tree.get(key) or {}
+        own: Any = tree.get(key) or {}
         if isinstance(own, Mapping):
             stated = cast("Mapping[str, Any]", own)
             tree[key] = made | {name: _change(made.get(name), fields) for name, fields in stated.items()}

@@ -28,7 +28,7 @@ def smooth_through(points: Vector) -> Vector:
     return np.concatenate([*parts, points[-1:]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CentreLine:
     """A polyline with arc length."""
 

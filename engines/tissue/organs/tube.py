@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Annotated, Literal, Self
 
@@ -12,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from engines.tissue.meshing.grid import grid_indices, tetrahedra_of_cells
 from engines.tissue.meshing.tet_mesh import Indices, TetMesh
-from engines.tissue.organs.centre_line import CentreLine, smooth_through
 from engines.tissue.organs.inner_wall import InnerWall, wall_along, wall_of_rings
+from engines.tissue.organs.outline import Outline, outline_along, path_mesh
 from engines.tissue.organs.picks import Point
 from engines.tissue.organs.shape import ROUNDING_DIGITS, Shape
 from schemas.quantity import Length
@@ -26,14 +25,10 @@ _LAYOUTS = [
 ]
 """Numbers of cells; an even number around, so that the diagonals meet."""
 _NANOMETRE = 1e-9
-_STEP = 2e-4
-"""Half of the way along the wall over which its slope is taken, m."""
 _END = 3e-4
 """Largest distance of the nodes of an end from its plane, m."""
 _BED = 0.5
 """Cosine of the half angle of a tube's bed about -z."""
-_LOWER = 1.0 / 3.0
-"""Share of the line that belongs to the lower bed."""
 
 
 Wall = Annotated[Length, Field(gt=0, le=0.05)]
@@ -128,56 +123,11 @@ class TubeParams(BaseModel):
         outline = self.outline
         return float(outline.along[-1]), 2.0 * float(outline.radii.mean()), float(outline.walls.mean())
 
-    @cached_property
+    @property
     def outline(self) -> Outline:
         """Outer outline along the path."""
         assert self.path is not None
-        curve = smooth_through(np.column_stack([np.array(self.path), *map(np.array, self._sizes)]))
-        outline = Outline(CentreLine(curve[:, :3]), 0.5 * curve[:, 3], curve[:, 4])
-        return _closed(outline) if self.closed else outline
-
-
-@dataclass(frozen=True)
-class Outline:
-    """Outer radius along a line."""
-
-    line: CentreLine
-    radii: Vector
-    """Outer radius at each point of the line, m, shape (p,)."""
-    walls: Vector
-    """Thickness of the wall at each point of the line, m, shape (p,)."""
-    cap: float = 0.0
-    """Length of a round bottom at the right end, m."""
-
-    @cached_property
-    def along(self) -> Vector:
-        """Way along the wall to each point of the line, m, shape (p,)."""
-        ways = np.hypot(np.diff(self.line.stations), np.diff(self.radii))
-        return np.concatenate([[0.0], np.cumsum(ways)])
-
-    def even(self, cells: int) -> Vector:
-        """Return ways along the wall, m, of rings around so many cells, shape (cells + 1,)."""
-        return self.along[-1] * np.arange(cells + 1) / cells
-
-    def at(self, cells: int) -> tuple[Vector, Vector, Vector]:
-        """Return arc lengths, outer radii and walls of the rings around so many cells, shapes (cells + 1,)."""
-        ways = self.even(cells)
-        stations, radii, walls = (
-            np.interp(ways, self.along, values) for values in (self.line.stations, self.radii, self.walls)
-        )
-        return stations, radii, walls
-
-
-def _closed(outline: Outline) -> Outline:
-    """Return an outline with a round bottom at its right end, as long as the last radius."""
-    line, cap = outline.line, float(outline.radii[-1])
-    angles: Vector = 0.5 * np.pi * (np.arange(41) / 40.0)
-    body = line.stations < line.length - cap
-    stations = np.concatenate([line.stations[body], line.length - cap + cap * np.sin(angles)])
-    radii, walls = (np.interp(stations, line.stations, values) for values in (outline.radii, outline.walls))
-    shrink = np.concatenate([np.ones(int(body.sum())), np.cos(angles)])
-    shrink[-1] = 0.0
-    return Outline(CentreLine(line.at(stations)), radii * shrink, walls, cap)
+        return outline_along(self.path, *self._sizes, is_closed=self.closed is not None)
 
 
 @lru_cache(maxsize=16)
@@ -190,59 +140,6 @@ def _tube_mesh(length: float, diameter: float, wall: float, cells: tuple[int, in
         [length * (i / along - 0.5), -radius * np.sin(angle), -radius * np.cos(angle)], axis=1
     )
     return TetMesh(np.round(points, ROUNDING_DIGITS), tetrahedra_of_cells(cells, closed=True))
-
-
-@lru_cache(maxsize=64)
-def _path_mesh(tube: TubeParams, nodes: int) -> TetMesh:
-    """Return the mesh of a tube along a path: rings even along the wall, then the pole of a round bottom."""
-    along, around, layers = cells = tube.cells(nodes)
-    outline = tube.outline
-    line, stations = outline.line, outline.line.stations
-    ways = outline.even(along)
-    at, radii, walls = outline.at(along)
-    before, after = np.maximum(ways - _STEP, 0.0), np.minimum(ways + _STEP, outline.along[-1])
-    slope = [
-        (np.interp(after, outline.along, values) - np.interp(before, outline.along, values))
-        / (after - before)
-        for values in (stations, outline.radii)
-    ]
-    length = np.hypot(*slope)
-    slope[0][[0, -1]], slope[1][[0, -1]], length[[0, -1]] = 1.0, 0.0, 1.0  # ends are flat
-    if tube.closed:
-        slope[0][-1], slope[1][-1] = 0.0, -1.0
-    centres = line.at(at)
-    tangents, first, second = line.frames(at)
-    i, j, k = grid_indices(along + 1, around, layers + 1).T
-    inward = walls[i] * (1.0 - k / layers)
-    angle = 2.0 * np.pi * j / around
-    shift, radius = inward * (slope[1] / length)[i], radii[i] - inward * (slope[0] / length)[i]
-    arms = (radius * np.sin(angle))[:, None] * second[i] + (radius * np.cos(angle))[:, None] * first[i]
-    points: Vector = np.round(centres[i] + shift[:, None] * tangents[i] + arms, ROUNDING_DIGITS)
-    if tube.closed is None:
-        return TetMesh(points, tetrahedra_of_cells(cells, closed=True))
-    ring = around * (layers + 1)
-    poles = points[along * ring : along * ring + layers + 1]
-    body = tetrahedra_of_cells((along - 1, around, layers), closed=True)
-    tetrahedra = np.concatenate([body, _bottom(along - 1, around, layers)])
-    return TetMesh(np.concatenate([points[: along * ring], poles]), tetrahedra)
-
-
-def _bottom(last: int, around: int, layers: int) -> Indices:
-    """Return the tetrahedra between the ring `last` and the poles, three for each sector and layer.
-
-    Diagonals of the ring's faces join nodes with an odd sum of indices, as in `tetrahedra_of_cells`.
-    """
-    pole = (last + 1) * around * (layers + 1)
-    found: list[list[int]] = []
-    for j in range(around):
-        for k in range(layers):
-            a, b = ((last * around + s % around) * (layers + 1) + k for s in (j, j + 1))
-            p = pole + k
-            if (last + j + k) % 2:
-                found += [[a, p, b, b + 1], [a, p, b + 1, p + 1], [a, a + 1, p + 1, b + 1]]
-            else:
-                found += [[a, p, b, a + 1], [b, a + 1, p, p + 1], [b, b + 1, a + 1, p + 1]]
-    return np.array(found)
 
 
 def tube_shape(tube: TubeParams) -> Shape:
@@ -273,22 +170,19 @@ def _path_shape(tube: TubeParams) -> Shape:
             return line.nearest(nodes)[0] > whole - outline.cap
         return _at_end(nodes, line.points[-1], line.points[-2], float(outline.radii[-1]))
 
-    def on_bed(nodes: Vector, first: float = 0.0, last: float = 1.0) -> NDArray[np.bool_]:
+    def on_bed(nodes: Vector) -> NDArray[np.bool_]:
         stations, arms = line.nearest(nodes)
         lengths = np.linalg.norm(arms, axis=1)
         middle = np.interp(stations, line.stations, outline.radii - 0.5 * outline.walls)
-        is_here = (stations >= first * whole) & (stations <= last * whole)
-        return (lengths > middle) & is_here & (-arms[:, 2] > _BED * lengths)
+        return (lengths > middle) & (-arms[:, 2] > _BED * lengths)
 
     return Shape(
         description="a tube of the given size along its path",
-        mesh=lambda nodes: _path_mesh(tube, nodes),
+        mesh=lambda nodes: path_mesh(outline, tube.cells(nodes)),
         surfaces={
             "left": at_left,
             "right": at_right,
             "bed": on_bed,
-            "bed-lower": lambda nodes: on_bed(nodes, last=_LOWER),
-            "bed-upper": lambda nodes: on_bed(nodes, first=_LOWER),
         },
         anchors=("right",) if tube.closed else ("left", "right"),
         material=None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -25,7 +25,9 @@ _EDGE = 0.35
 """Thickness near the outline over that of the middle. By eye."""
 _DOME = 0.10
 """How far the face falls off towards its sides, over the breadth. By eye."""
-_PORTA = 0.40, 0.58
+_CARVED = 0.45
+"""Depth of the fossa over the thickness, at most."""
+_PORTA = 0.30, 0.62
 """Shares of the length, from the caudal end, between which the face rises from the porta. By eye."""
 
 
@@ -52,13 +54,6 @@ class VisceralFaceParams(BaseModel):
             )
         return self
 
-    @cached_property
-    def _fossa(self) -> Vector:
-        """Points and radii along the fossa, m, shape (p, 4)."""
-        if not self.fossa:
-            return np.zeros((0, 4))
-        return smooth_through(np.column_stack([np.array(self.fossa), 0.5 * np.array(self.diameters)]))
-
     def field(self, points: Vector) -> Vector:
         """Return the field of a flat body of this size, m, shape (n,)."""
         x, y, z = (2.0 * points / np.array(self.size)).T
@@ -73,7 +68,8 @@ class VisceralFaceParams(BaseModel):
         thinned = z * (_EDGE + (1.0 - _EDGE) * inner)
         height = self._face(x, y)
         above = np.clip(0.5 + z / self.size[2] / np.sqrt(np.maximum(inner, 0.05)), 0.0, 1.0)
-        carved = np.minimum(self._floor(x, y) - height, 0.0) * above * np.clip(4.0 * inner, 0.0, 1.0)
+        deepest = -_CARVED * self.size[2] * np.sqrt(inner) * (_EDGE + (1.0 - _EDGE) * inner)
+        carved = above * np.clip(self._floor(x, y) - height, deepest, 0.0)
         return np.stack([x, y, height - 0.5 * self.size[2] + thinned + carved], axis=1)
 
     def is_back(self, nodes: Vector) -> NDArray[np.bool_]:
@@ -90,18 +86,26 @@ class VisceralFaceParams(BaseModel):
     def _floor(self, x: Vector, y: Vector) -> Vector:
         """Return the height of the fossa's floor, m; infinite beside it."""
         found = np.full(len(x), np.inf)
-        for px, py, pz, radius in self._fossa.tolist():
+        for px, py, pz, radius in _fossa_line(self.fossa, self.diameters):
             square = radius * radius - (x - px) ** 2 - (y - py) ** 2
             depth = np.sqrt(np.maximum(square, 0.0))
             found = np.where(square > 0.0, np.minimum(found, pz - depth), found)
         return found
 
 
+@lru_cache(maxsize=16)
+def _fossa_line(points: tuple[Point, ...], diameters: tuple[float, ...]) -> list[list[float]]:
+    """Return x, y, z and radius along a fossa, m."""
+    if not points:
+        return []
+    return smooth_through(np.column_stack([np.array(points), 0.5 * np.array(diameters)])).tolist()
+
+
 def visceral_shape(params: VisceralFaceParams) -> Shape:
     """Return the shape; its surface `face` looks at +z, `back` at -z."""
     return Shape(
         description="the visceral part of a liver about the gallbladder: segments IV and V",
-        mesh=lambda nodes: _mesh(params, nodes),
+        mesh=lambda nodes: _mesh(params.size, params.porta, params.fossa, params.diameters, nodes),
         surfaces={"back": params.is_back},
         anchors=("back",),
         material="liver",
@@ -109,6 +113,13 @@ def visceral_shape(params: VisceralFaceParams) -> Shape:
 
 
 @lru_cache(maxsize=16)
-def _mesh(params: VisceralFaceParams, nodes: int) -> TetMesh:
-    x, y, z = (0.5 * edge for edge in params.size)
+def _mesh(
+    size: tuple[float, float, float],
+    porta: float,
+    fossa: tuple[Point, ...],
+    diameters: tuple[float, ...],
+    nodes: int,
+) -> TetMesh:
+    params = VisceralFaceParams(size=size, porta=porta, fossa=fossa, diameters=diameters)
+    x, y, z = (0.5 * edge for edge in size)
     return mesher(params.field, params.formed, low=(-x, -y, -z), high=(x, y, z))(nodes)

@@ -1,0 +1,161 @@
+"""Patients: sizes within published ranges, sound meshes, hollow tubes that join, the same everywhere."""
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from anatomy.layout import Layout
+from anatomy.params import AnatomyParams
+from anatomy.patient import (
+    ARTERY_LENGTH,
+    DUCT_LENGTH,
+    GALLBLADDER_LENGTH,
+    GALLBLADDER_WIDTH,
+    SHORT_DUCT_LENGTH,
+    THICK_WALL,
+    Variations,
+    draw_patient,
+)
+from engines.fem.attachments.ties import find_ties
+from engines.fem.organ import Organ
+from engines.fem.params import FemParams
+from engines.tissue.meshing.mesh_check import checked_mesh
+from engines.tissue.meshing.tet_mesh import shape_quality
+from engines.tissue.organs.anchors import AnchorParams
+
+SEEDS = st.integers(0, 2**53)
+JOINTS = {"neck_duct", "duct_confluence", "neck_artery", "artery_origin"}
+COURSES = "cranial", "front", "behind"
+
+
+def tissue(**anatomy):
+    return FemParams.model_validate({"anatomy": anatomy, "probes": {}})
+
+
+def length_of(line):
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+@given(SEEDS)
+def test_sizes_are_within_published_ranges(seed):
+    patient = draw_patient(seed, Variations())
+    assert GALLBLADDER_LENGTH.least <= patient.gallbladder_length <= GALLBLADDER_LENGTH.most
+    assert GALLBLADDER_WIDTH.least <= patient.gallbladder_width <= GALLBLADDER_WIDTH.most
+    duct = SHORT_DUCT_LENGTH if patient.short_duct else DUCT_LENGTH
+    assert duct.least <= patient.duct_length <= duct.most
+    assert 0.0035 <= patient.artery_diameter <= 0.007  # what a clip of medium-large size holds
+    assert 0.0035 <= patient.duct_diameter <= 0.007
+    assert patient.thick_wall == (patient.gallbladder_wall > 0.0032)
+    assert ARTERY_LENGTH.least <= patient.artery_length <= ARTERY_LENGTH.most
+
+
+@given(SEEDS, st.sampled_from(COURSES))
+def test_a_stated_variation_changes_nothing_that_it_does_not_concern(seed, course):
+    drawn = draw_patient(seed, Variations())
+    stated = draw_patient(seed, Variations(artery=course))
+    assert stated.artery == course
+    assert {**vars(stated), "artery": None} == {**vars(drawn), "artery": None}
+
+
+def test_twenty_patients_show_every_variation():
+    patients = [draw_patient(seed, Variations()) for seed in range(20)]
+    assert {one.artery for one in patients} == set(COURSES)
+    assert {one.short_duct for one in patients} == {one.thick_wall for one in patients} == {True, False}
+
+
+@given(SEEDS)
+def test_lines_have_the_lengths_of_the_patient(seed):
+    patient = draw_patient(seed, Variations())
+    layout = Layout(patient)
+    assert length_of(layout.cystic_duct) == pytest.approx(patient.duct_length, rel=0.1)
+    straight = Layout(replace(patient, artery="cranial"))
+    assert length_of(straight.cystic_artery) == pytest.approx(patient.artery_length, rel=0.15)
+    assert length_of(layout.cystic_artery) < 0.055  # the longest found
+    assert length_of(layout.gallbladder) == pytest.approx(patient.gallbladder_length, rel=0.1)
+
+
+@given(SEEDS)
+@example(0)
+def test_every_patient_has_sound_hollow_organs_that_hang_together(seed):
+    given = tissue(patient=seed)
+    organs = {}
+    for name, params in given.organs.items():
+        mesh = params.rest
+        checked_mesh(mesh.nodes, mesh.tetrahedra)  # closed, one piece, nothing inverted
+        assert shape_quality(mesh.nodes, mesh.tetrahedra).min() > 0.05
+        assert name == "liver" or params.inner_wall is not None
+        organs[name] = Organ(name, params, is_carried=True)
+        assert organs[name].solid.longest_step > 8e-6
+    for name, attachment in given.attachments.items():
+        one, other = (organs[organ] for organ in attachment.organs)
+        chosen = given.organs[one.name].surface(AnchorParams(surface=attachment.surface))
+        ties = find_ties(one, other, chosen, attachment.within)
+        assert len(ties.areas) >= (5 if name in JOINTS else 25)
+        assert np.linalg.norm(ties.offsets, axis=1).max() <= attachment.within
+
+
+@given(SEEDS, st.sampled_from(["cystic_duct", "cystic_artery"]))
+def test_tubes_begin_at_the_gallbladder_and_end_where_they_join(seed, name):
+    given = tissue(patient=seed)
+    tube, wall = given.organs[name].rest, given.organs[name].inner_wall
+    ends = {name: tube.nodes[wall.rings[k]].mean(axis=0) for name, k in (("left", 0), ("right", -1))}
+    joined = {"left": "gallbladder", "right": "common_bile_duct" if "duct" in name else "hepatic_artery"}
+    for end, place in ends.items():
+        nodes = given.organs[joined[end]].rest.nodes
+        assert np.linalg.norm(nodes - place, axis=1).min() < 0.004
+
+
+def test_a_thick_wall_is_thick_and_stiff():
+    well, ill = (draw_patient(3, Variations(thick_wall=thick)) for thick in (False, True))
+    assert ill.gallbladder_wall >= THICK_WALL.least > well.gallbladder_wall
+    assert ill.gallbladder_modulus > 1.3 * well.gallbladder_modulus
+
+
+def test_meshes_are_the_same_on_all_platforms():
+    digest = hashlib.sha256()
+    for params in tissue(patient=7).organs.values():
+        digest.update(np.round(1e6 * params.rest.nodes).astype(np.int64).tobytes())
+        digest.update(params.rest.tetrahedra.tobytes())
+    assert digest.hexdigest()[:16] == "e526d22935edb70f"
+
+
+def test_fields_of_an_organ_of_the_same_name_replace_those_of_the_patient():
+    given = FemParams.model_validate(
+        {
+            "anatomy": {"patient": 1},
+            "organs": {
+                "liver": {"material": "liver", "nodes": 300},
+                "bead": {"size": ["5 mm", "5 mm", "5 mm"], "material": "fat", "anchors": []},
+            },
+            "attachments": {"cystic_plate": {"strength": "9 kPa"}},
+            "probes": {},
+        }
+    )
+    assert given.organs["liver"].material_name == "liver"
+    assert len(given.organs["liver"].rest.nodes) < 400
+    assert given.organs["gallbladder"].lumen is not None
+    assert "bead" in given.organs
+    assert given.attachments["cystic_plate"].strength == 9e3
+    assert given.attachments["cystic_plate"].surface == "bed"
+
+
+def test_the_short_form_reads_back_as_the_same_organs():
+    given = tissue(patient=5)
+    again = FemParams.model_validate_json(given.model_dump_json())
+    assert again.organs == given.organs
+    assert again.attachments == given.attachments
+
+
+def test_tissue_without_organs_is_refused():
+    with pytest.raises(ValidationError, match="state `organs`, or a patient's `anatomy`"):
+        FemParams.model_validate({"probes": {}})
+
+
+def test_an_unknown_course_of_the_artery_is_refused():
+    with pytest.raises(ValidationError, match="cranial"):
+        AnatomyParams.model_validate({"artery": "left"})
