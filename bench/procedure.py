@@ -1,0 +1,33 @@
+"""Figures of the operation, part by part.
+
+python bench/procedure.py closed-forms    blood, cuts, tears, clips and attachments beside their closed forms
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from bench.closed_forms import closed_forms
+
+PARTS: Mapping[str, Callable[[], int]] = {"closed-forms": closed_forms}
+"""Parts by name; each returns the number of its figures that fall short."""
+
+
+def main() -> int:
+    """Run the parts asked for; return 1 if a figure falls short."""
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
+    parser.add_argument("parts", nargs="+", choices=PARTS)
+    short = 0
+    for part in parser.parse_args().parts:
+        short += PARTS[part]()
+    return int(short > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
