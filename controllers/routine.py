@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field
 
+from controllers.motion.equipment import tool_type
 from hub.participant import (
     Controller,
     Inputs,
@@ -28,7 +29,8 @@ from hub.participant import (
     signal_out,
 )
 from robots.dvrk.end_effectors.musha import HAND
-from robots.dvrk.parameters import UnitQuaternion
+from robots.dvrk.instruments import instrument
+from robots.dvrk.parameters import InstrumentName, UnitQuaternion
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import OperatingState, StringStamped
 from schemas.errors import SessionError
@@ -142,6 +144,17 @@ class CloseClip(_Command):
         return f"{self.arm}/clip", EmptyMessage()
 
 
+class ExchangeInstrument(_Command):
+    """Give the arm one of its spare instruments, or the mounted one again."""
+
+    do: Literal["exchange"]
+    instrument: InstrumentName = Field(description="name or number, such as 400183")
+
+    def message(self) -> tuple[str, Message]:
+        """Return port and message."""
+        return f"{self.arm}/set_tool_type", StringMessage(data=tool_type(instrument(self.instrument)))
+
+
 class SetPower(_Command):
     """Let the generator of an energy instrument give a power from now on, 0 to stop; done at once."""
 
@@ -179,6 +192,7 @@ Step = Annotated[
     | ChangeState
     | SetSpeed
     | CloseClip
+    | ExchangeInstrument
     | SetPower
     | Wait
     | Together,
@@ -319,7 +333,9 @@ class Routine(Controller):
 
 def _commands(
     step: Step,
-) -> Iterator[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | SetSpeed | CloseClip]:
+) -> Iterator[
+    MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | SetSpeed | CloseClip | ExchangeInstrument
+]:
     """Yield the commands of a step."""
     if isinstance(step, Together):
         yield from step.orders

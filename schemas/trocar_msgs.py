@@ -260,7 +260,9 @@ class TissueGrasp(Message):
     ros_type: ClassVar[str] = "trocar_msgs/msg/TissueGrasp"
     header: Header
     event: String
-    """`grasped`, `released` (the fingers opened) or `torn` (the pull was too strong)."""
+    """`grasped`, `released` (the fingers opened), `torn` (the pull was too strong), or `exchanged while
+    holding` (the instrument was taken out of the arm, and the tissue slid off).
+    """
     body: String
     nodes: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
     """Indices of the nodes held, or held until now."""

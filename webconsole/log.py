@@ -68,7 +68,7 @@ def _entries(outlet: Outlet, value: Value) -> Iterator[Entry]:
         text = f"{organ} {message.kind}{by}, {readable(message.size, message.unit)}"
         yield Entry(at, "warn" if message.kind == "torn" else "info", outlet.participant, text)
     elif isinstance(message, TissueGrasp):
-        torn = message.event == "torn"
+        torn = message.event in ("torn", "exchanged while holding")
         text = f"{message.body} {message.event}, pull {message.force_n:.2g} N"
         yield Entry(at, "warn" if torn else "info", outlet.name, text)
     elif isinstance(message, DiagnosticStatus):

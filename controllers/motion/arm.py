@@ -12,11 +12,12 @@ from controllers.motion.cartesian_commands import CartesianCommands
 from controllers.motion.commands import Commands
 from controllers.motion.drives import Drives
 from controllers.motion.equipment import Equipment
+from controllers.motion.exchange import Exchange
 from controllers.motion.frames import BaseFrame, base_in_world
 from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
 from controllers.motion.operating_state import State
-from controllers.motion.params import Gripper, MotionParams
+from controllers.motion.params import EcmParams, Gripper, MotionParams, PsmParams
 from controllers.motion.ports import EQUIPMENT_COMMANDS, event_names
 from controllers.motion.setpoint import Setpoint
 from controllers.motion.telemetry import KnownWeight, TelemetryRow
@@ -69,7 +70,6 @@ class Arm:
         arm = params.arms.present_arms[name]
         self._period = period
         self._messages = Messages(name, event_names(arm), outputs)
-        self._equipment = Equipment(*arm.equipment, self._messages)
         self._base = BaseFrame(name, params, camera)
         self._drives = Drives(arm, self._messages, lambda: self._base.pose)
         self.weight = KnownWeight(name, arm.chain, base_in_world(name, params))
@@ -85,6 +85,11 @@ class Arm:
             params.power_time * 1e-9,
             homed=params.initial_state == "homed",
         )
+        self._exchange = self._exchange_of(arm, params.exchange_time)
+        self.refitted = False
+        """Whether kinematics have changed; reset by the controller."""
+        names = [one.equipment[1] for one in arm.variants]
+        self._equipment = Equipment(arm.equipment[0], names, self._messages, self._exchange)
         self._commanded = self._commands_by_port(name, arm.gripper)
         self._now, self._modes = ArmState(), np.array(self._drives.modes, np.float64)
         self._condition: tuple[State, bool, bool] | None = None
@@ -99,7 +104,10 @@ class Arm:
             *self._lifecycle.records,
             self._messages.state,
             *self._drives.state,
+            *(() if self._exchange is None else (self._exchange.state,)),
         )
+        if self._exchange is not None:
+            outputs[f"drive/{name}/instrument"] = self._exchange.state.part("held")
         prefixes = [name] if arm.gripper is None else [name, f"{name}/{arm.gripper.name}"]
         groups = dict(zip(prefixes, self._drives.groups, strict=True))
         self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in groups.items()]
@@ -111,6 +119,19 @@ class Arm:
         self._gripper_setpoint = np.zeros(0 if arm.gripper is None else 3 * len(arm.gripper.joints))
         outputs[f"drive/{name}/control_mode"] = self._modes
         outputs |= self._joint_outputs(groups)
+
+    def _exchange_of(self, arm: PsmParams | EcmParams, time_ns: int) -> Exchange | None:
+        if not isinstance(arm, PsmParams) or len(arm.variants) == 1:
+            return None
+        drives, messages = self._drives, self._messages
+        return Exchange(arm.variants, drives, messages, time_ns * 1e-9, self._lifecycle.not_ready, self._fit)
+
+    def _fit(self) -> None:
+        """Take over the instrument that the arm holds now."""
+        if self._exchange is not None:
+            self._drives.fit(self._exchange.held)
+            self._cartesian.fit()
+            self.refitted = True
 
     def _commands_by_port(self, name: CartArm, gripper: Gripper | None) -> dict[str, _Commanded]:
         """Return order, name and handler of each command, by port."""
@@ -174,13 +195,30 @@ class Arm:
         self._lifecycle.watch(self._period)
         awaited = self._execute_arrived(inputs, arrived)
         self._lifecycle.step(self._period)
+        exchanging = self._step_exchange()
         following = self._drives.step(self._period)
-        state, homed, busy = self._condition = self._lifecycle.condition
+        state, homed, busy = self._lifecycle.condition
+        busy = busy or exchanging
+        self._condition = state, homed, busy
         if awaited or self._condition != before:
             self._messages.operating_state(state, homed=homed, busy=busy)
         self._update_modes()
         self._rests = not busy
         return following
+
+    def _step_exchange(self) -> bool:
+        """Go on with an exchange; return whether one is under way."""
+        if self._exchange is None or not self._exchange.is_busy:
+            return False
+        state, homed, _ = self._lifecycle.condition
+        if state is State.ENABLED and homed:
+            held = self._exchange.held
+            self._exchange.step(self._period)
+            if self._exchange.held is not held:
+                self._equipment.publish()
+        elif state is not State.PAUSED:
+            self._exchange.stop()
+        return self._exchange.is_busy
 
     def drive(self) -> None:
         """Command the final setpoints of the step, through encoders with offsets."""
@@ -201,9 +239,12 @@ class Arm:
 
     def recompute_derived(self) -> None:
         """Recompute all values derived from `state` after a restore."""
+        self._fit()
         for axes in self._drives.groups:
             axes.setpoint.recompute_derived()
-        self._condition = self._lifecycle.condition if self._now.started else None
+        state, homed, busy = self._lifecycle.condition
+        busy = busy or (self._exchange is not None and self._exchange.is_busy)
+        self._condition = (state, homed, busy) if self._now.started else None
         self._update_modes()
         self._rests = False
         self.drive()
@@ -249,6 +290,8 @@ class Arm:
         """Return why the arm refuses `command` now; empty: accepted."""
         if command in _ANY_TIME:
             return ""
+        if self._exchange is not None and (reason := self._exchange.refusal(command)):
+            return reason
         return self._lifecycle.not_ready() or (
             self._cartesian.not_ready() if command in crtk.CARTESIAN_COMMANDS else ""
         )

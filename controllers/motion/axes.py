@@ -53,6 +53,11 @@ class Axes:
         self.setpoint.reset(start)
         self.state = (self._state, self.setpoint.state)
 
+    def fit(self, chain: SerialChain) -> None:
+        """Take over the kinematics and limits of an instrument with joints of the same names."""
+        self.chain = chain
+        self.setpoint.limit(chain.joints)
+
     @property
     def mode(self) -> Mode:
         """Present mode of the drives."""

@@ -44,8 +44,8 @@ class CartesianCommands:
             period: the controller's step, s.
         """
         self._arm, self._drives, self._base, self._ratio, self._period = arm, drives, base, ratio, period
-        self._joints, self._chain = drives.joints, drives.joints.chain
-        self._cannula = Cannula.of(self._chain)
+        self._joints = drives.joints
+        self.fit()
         self.handlers: Mapping[str, Callable[[Any], None]] = {
             "body/set_cf_orientation_absolute": self._set_cf_orientation_absolute,
             "set_base_frame": self._set_base_frame,
@@ -57,6 +57,11 @@ class CartesianCommands:
             "spatial/servo_cf": self._spatial_servo_cf,
             "move_cp": self._move_cp,
         }
+
+    def fit(self) -> None:
+        """Take over the kinematics of the instrument."""
+        self._chain = self._joints.chain
+        self._cannula = Cannula.of(self._chain)
 
     def not_ready(self) -> str:
         """Return why the arm refuses Cartesian commands; empty: accepted."""

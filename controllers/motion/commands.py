@@ -39,7 +39,7 @@ class Commands:
     def __init__(self, drives: Drives, period: float) -> None:
         """`period`: the controller's step, s."""
         self._drives, self._period = drives, period
-        self._joints, self._chain = drives.joints, drives.joints.chain
+        self._joints = drives.joints
         self.settings = CommandState()
         self.settings.ratio[:] = 1.0
         self.handlers: Mapping[str, Callable[[Any], None]] = {
@@ -75,27 +75,27 @@ class Commands:
         self._drives.rest()
 
     def _free(self, _: EmptyMessage) -> None:
-        self._drives.apply(self._joints, np.zeros(len(self._chain.joints)))
+        self._drives.apply(self._joints, np.zeros(len(self._joints.chain.joints)))
 
     def _servo_jp(self, message: JointState) -> None:
         goal, velocity = (
-            goals.joint_values(self._chain, message, "position"),
-            goals.stated_velocity(self._chain, message),
+            goals.joint_values(self._joints.chain, message, "position"),
+            goals.stated_velocity(self._joints.chain, message),
         )
         self._drives.follow(self._joints, goal, self._period, velocity)
 
     def _servo_jr(self, message: JointState) -> None:
-        goal = self._joints.newest_goal + goals.joint_values(self._chain, message, "position")
+        goal = self._joints.newest_goal + goals.joint_values(self._joints.chain, message, "position")
         self._drives.follow(self._joints, goal, self._period)
 
     def _servo_jf(self, message: JointState) -> None:
-        self._drives.apply(self._joints, goals.efforts(self._chain, message))
+        self._drives.apply(self._joints, goals.efforts(self._joints.chain, message))
 
     def _move_jp(self, message: JointState) -> None:
-        self._move(goals.joint_values(self._chain, message, "position"))
+        self._move(goals.joint_values(self._joints.chain, message, "position"))
 
     def _move_jr(self, message: JointState) -> None:
-        self._move(self._joints.newest_goal + goals.joint_values(self._chain, message, "position"))
+        self._move(self._joints.newest_goal + goals.joint_values(self._joints.chain, message, "position"))
 
     def _move(self, goal: Vector) -> None:
         self._drives.move(self._joints, goal, self.settings.ratio)

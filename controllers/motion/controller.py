@@ -109,12 +109,20 @@ class MotionController(Controller):
             if self._followers is None or self._followers.setpoints != following:
                 self._followers = Followers(following, self._period)
             self._followers.step()
-        for arm in arms:
+        for name, arm in self._arms.items():
             arm.drive()
+            if arm.refitted:
+                self._refit(name, arm)
         if self._telemetry is not None and not (t + h) % self.params.publish_period:
             self._publish(self._telemetry)
         self._setup_joints.step(t, h, inputs)
         return self._outputs
+
+    def _refit(self, name: str, arm: Arm) -> None:
+        """Take over the kinematics of another instrument of an arm."""
+        arm.refitted, self._followers = False, None
+        if self._telemetry is not None:
+            self._telemetry.fit(name, arm.chain)
 
     def _publish(self, telemetry: Telemetry) -> None:
         """Update the states not published at every step."""
@@ -125,8 +133,10 @@ class MotionController(Controller):
     def restore(self, state: bytes) -> None:
         """Return to a saved state, of trajectories from their start, goal and age."""
         super().restore(state)
-        for arm in self._arms.values():
+        for name, arm in self._arms.items():
             arm.recompute_derived()
+            if arm.refitted:
+                self._refit(name, arm)
         self._setup_joints.recompute_derived()
 
     def close(self) -> None:

@@ -65,6 +65,8 @@ class Drives:
         self.gripper = (
             None if gripper is None else Axes(SerialChain(gripper.joints, np.eye(4)), np.array(gripper.start))
         )
+        self.has_gripper = self.gripper is not None
+        """Whether the instrument held has the gripper."""
         self.groups = (self.joints,) if self.gripper is None else (self.joints, self.gripper)
         """Driven joints: the arm's joints, then the gripper."""
         self.control = DrivesState()
@@ -74,6 +76,15 @@ class Drives:
             self._impedance.state,
             *(part for axes in self.groups for part in axes.state),
         )
+
+    def fit(self, arm: PsmParams) -> None:
+        """Take over the instrument of `arm`: kinematics, limits, and whether there is a jaw."""
+        self.joints.fit(arm.chain)
+        if self.gripper is None:
+            return
+        self.has_gripper = bool(arm.end_effector.joints)
+        if self.has_gripper:
+            self.gripper.fit(SerialChain(arm.end_effector.joints, np.eye(4)))
 
     @property
     def is_moving(self) -> bool:
@@ -90,7 +101,7 @@ class Drives:
         self._abandon_move(*self.groups)
         self._leave()
         for axes in self.groups:
-            axes.power(on=on)
+            axes.power(on=on and (axes is self.joints or self.has_gripper))
 
     def rest(self) -> None:
         """Brake and stay; a pressing gripper goes on pressing."""

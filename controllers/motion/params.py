@@ -37,9 +37,11 @@ class PsmParams(MountedPsm):
 
     @property
     def gripper(self) -> Gripper | None:
-        """The instrument's grasping part; None: the instrument does not grasp."""
-        effector = self.end_effector
-        return Gripper(effector.name, effector.joints, self.end_effector_start) if effector.joints else None
+        """Grasping part of the instrument, or of the first spare that grasps; None: no instrument grasps."""
+        for one in self.variants:
+            if effector := one.end_effector if one.end_effector.joints else None:
+                return Gripper(effector.name, effector.joints, one.end_effector_start)
+        return None
 
     @property
     def home(self) -> tuple[float, ...]:
@@ -136,6 +138,14 @@ class MotionParams(Params):
     )
     power_time: Duration = Field(
         default=100_000_000, ge=0, description="from `enable` to ENABLED; the real arm takes 3 s"
+    )
+    exchange_time: Duration = Field(
+        default=5 * 10**9,
+        ge=0,
+        description=(
+            "of an exchange of instruments, while the arm is empty; assumed, with an assistant who has the"
+            " next instrument at hand"
+        ),
     )
     publish_period: Duration = Field(
         default=10_000_000,

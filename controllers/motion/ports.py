@@ -77,10 +77,10 @@ _EVENTS = {
     "warning": "a command that is refused at present",
     "status": "what happens",
 }
-_EQUIPMENT = "what the arm holds, in the dVRK's words, at time 0"
+_EQUIPMENT = "what the arm holds, in the dVRK's words, at time 0 and after an exchange"
 EQUIPMENT_COMMANDS = {
     "tool_type": {
-        "set_tool_type": "refused unless it is what the arm holds",
+        "set_tool_type": "what the arm holds, or else gets in exchange if it is a spare instrument",
         "emulate_adapter_present": "refused unless true: the adapter is there",
         "emulate_tool_present": "refused unless true: the instrument is there",
     },
@@ -140,6 +140,9 @@ def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns
         ),
         size=2,
     )
+    if len(params.variants) > 1:
+        held = "in the arm: 0 the mounted instrument, 1 the first spare"
+        yield signal_out(f"drive/{arm}/instrument", Float64Message, held)
     if gripper is not None:
         driven = tuple(joint.name for joint in gripper.joints)
         yield from _joint_states(f"{arm}/{gripper.name}", driven, period_ns)

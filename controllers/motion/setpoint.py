@@ -51,18 +51,22 @@ class Setpoint:
         """Start at zero, with HOLD; range, velocity, acceleration and jerk of the joints are kept to."""
         n = len(joints)
         self._n = n
-        self._lower, self._upper, self._velocity, self._acceleration, self._jerk = np.array(
-            [(joint.lower, joint.upper, joint.velocity, joint.acceleration, joint.jerk) for joint in joints]
-        ).T.copy()
-        self._most, self._backwards = FOLLOWING_ACCELERATION * self._acceleration, -self._velocity
-        self.limits = np.array([self._lower, self._upper, self._velocity, self._most])
-        """Limits of position to either side, velocity, and acceleration while following, shape (4, n)."""
+        self.limit(joints)
         self.state = SetpointState(n=n)
         self.course = self.state.values[: 5 * n].reshape(5, n)
         """The first five parts of `state`: position, velocity, acceleration, goal, velocity at the goal."""
         self.position, self.velocity, self.goal = self.state.position, self.state.velocity, self.state.goal
         self._arrival, self._origin = self.state.arrival, self.state.origin
         self._ruckig, self._trajectory = Ruckig(n), Trajectory(n)
+
+    def limit(self, joints: tuple[Joint, ...]) -> None:
+        """Keep to range, velocity, acceleration and jerk of `joints` from now on."""
+        self._lower, self._upper, self._velocity, self._acceleration, self._jerk = np.array(
+            [(joint.lower, joint.upper, joint.velocity, joint.acceleration, joint.jerk) for joint in joints]
+        ).T.copy()
+        self._most, self._backwards = FOLLOWING_ACCELERATION * self._acceleration, -self._velocity
+        self.limits = np.array([self._lower, self._upper, self._velocity, self._most])
+        """Limits of position to either side, velocity, and acceleration while following, shape (4, n)."""
 
     @property
     def activity(self) -> Activity:

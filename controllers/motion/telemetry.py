@@ -114,6 +114,11 @@ class Telemetry:
             f"{arm}/trajectory_j/{name}": self._ratios[i, j : j + 1] for j, name in enumerate(_RATIOS)
         }
 
+    def fit(self, arm: str, chain: SerialChain) -> None:
+        """Take over the kinematics of the instrument of `arm`."""
+        for group in self._groups:
+            group.fit(arm, chain)
+
     def update(self, *, wrenches: bool = True) -> None:
         """Compute all states from `rows`, except states with unchanged input bits.
 
@@ -173,13 +178,20 @@ class _Group:
     ) -> None:
         """`tips`, (k, 2, 4, 4), `twists`, (k, 2, 6): written; commanded and measured, in base frames."""
         k, n = len(arms), len(arms[0][1].joints)
-        self._chain, self._chains = arms[0][1], SerialChains([chain for _, chain, _ in arms])
+        self._chain, self._by_arm = arms[0][1], {arm: chain for arm, chain, _ in arms}
+        self._chains = SerialChains(list(self._by_arm.values()))
         self._weights = [weight for *_, weight in arms]
         self.state, self._seen = np.zeros((k, 2, 3, n)), b""
         """Positions, velocities and efforts as commanded, then as measured."""
         self._tips, self._twists, self._jacobian = tips, twists, np.zeros((k, 6, n))
         self._jacobians, self._wrenches = np.zeros((k, 2, 6, n)), np.zeros((k, 2, 6))  # body, then spatial
         self._carried = np.zeros((k, n))
+
+    def fit(self, arm: str, chain: SerialChain) -> None:
+        """Take over the kinematics of the instrument of `arm`, if that is one of these."""
+        if arm in self._by_arm and self._by_arm[arm] is not chain:
+            self._by_arm[arm], self._seen = chain, b""
+            self._chains = SerialChains(list(self._by_arm.values()))
 
     def outputs_of(self, i: int, arm: str) -> dict[str, Vector]:
         """Return the outputs of arm number `i` with the name `arm`."""

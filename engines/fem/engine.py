@@ -131,6 +131,9 @@ class FemEngine(Stepped):
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Press the organs along the predicted motion; return the reactions, and the nodes when due."""
         seconds, end = h * 1e-9, t + h
+        for grasp, probe in self._grasps:
+            if probe.leaves(inputs):
+                grasp.take_away(t)
         for probe in self._probes:
             probe.begin(inputs, seconds)
         for organ in self._sharpened:

@@ -27,6 +27,8 @@ RIGID = Coupling(stiffness=np.inf, least_stiffness=np.inf, mass=0.0, damping=0.0
 
 _PREDICTIONS = ("hold", "velocity", "slope")
 """Predicted motions by their numbers in `_probe.c`."""
+_LEAP_M = 1.0
+"""Way in a step that no arm moves an instrument: an exchange of instruments does."""
 _FAR_M = 1e3
 """Place of spheres before the first step."""
 
@@ -122,6 +124,13 @@ class Probe:
         """Put a spring of `compliance` (m/N, shape (3, 3)) in series with the pull of the held spheres."""
         values, axes = np.linalg.eigh(compliance)
         self._compliance[:] = (axes * np.maximum(values, 0.0)) @ axes.T
+
+    def leaves(self, inputs: Inputs) -> bool:
+        """Return whether the instrument is taken out of the arm, away from the tissue that it holds."""
+        if not self.held.any():
+            return False
+        way = inputs[self._position_port][:3] - self.targets[0]
+        return float(way @ way) > _LEAP_M**2
 
     def begin(self, inputs: Inputs, seconds: float) -> None:
         """Write the ways of the spheres in a step of `seconds` to `Spheres.path`."""

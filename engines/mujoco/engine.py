@@ -64,6 +64,8 @@ class MujocoEngine(Stepped):
         super().__init__(name, params)
         self._touching: list[ProbeBond | ContactSpheresBond | WireBond] = []
         self._wires: list[WireBond] = []
+        self._felt_by_spares: list[tuple[Vector, ProbeBond | ContactSpheresBond]] = []
+        """`tip_wrench` of an arm with spares, and one of the bonds that it sums."""
         self._keepers: list[_Keeper] = []
         self._effective_mass: dict[str, float] = {}
         self._outputs: dict[str, Value] = {}
@@ -146,15 +148,26 @@ class MujocoEngine(Stepped):
             positions: for a lean model, the matrix to the positions of the whole model.
         """
         from engines.mujoco.arms.brakes import Brakes
+        from engines.mujoco.arms.exchange import Exchange
         from engines.mujoco.arms.readings import Readings
         from engines.mujoco.arms.servos import Servos
         from engines.mujoco.interaction.holding import Holding
 
         model, data, params = self._model, self._data, self.params
         self._servos = Servos(model, data, params.arms, period)
+        self._exchange = Exchange(model, data, params.arms)
+        self._servos.engage(self._exchange.engaged)
         self._mujoco.mj_forward(model, data)
         weighs = params.measured_effort == "motor"
-        self._readings = Readings(model, data, params.arms, self._servos, positions, weighs=weighs)
+        self._readings = Readings(
+            model,
+            data,
+            params.arms,
+            self._servos,
+            positions,
+            weighs=weighs,
+            engaged=lambda: self._exchange.engaged,
+        )
         self._brakes = Brakes(model, data, params)
         self._holding = Holding(model, data, params, params.publish_period * 1e-9)
         self._outputs.update({**self._readings.outputs, **self._holding.outputs})
@@ -175,6 +188,7 @@ class MujocoEngine(Stepped):
     def _allocate_state(self) -> None:
         """Size the saved state by the model and by the parts with state of their own."""
         self._keepers = [
+            *([self._exchange] if self._exchange.engaged else []),
             self._servos,
             self._brakes,
             self._holding,
@@ -194,17 +208,25 @@ class MujocoEngine(Stepped):
 
         kinds = {"probe": ProbeBond, "contact": ContactSpheresBond}
         for bond in self.bonds:
-            owner, _, kind = bond.name.partition("/")
+            owner, _, kind = bond.name.rpartition("/")
             plan = setup.bonds.get(bond.name)
             if kind == WIRE:
                 self._couple_needle(owner, bond, plan)
                 continue
+            arm = owner.partition("/")[0]
+            if owner != arm:
+                self._mount(arm, self._exchange.owners[arm].index(owner))
             self._effective_mass[bond.name] = kinds[kind].least_mass(owner, self._model, self._data)
-            self._outputs[f"{owner}/tip_wrench"] = np.zeros(6)
+            if owner != arm:
+                self._mount(arm, 0)
+            felt = self._outputs.setdefault(f"{arm}/tip_wrench", np.zeros(6))
             if plan:
                 touching = kinds[kind](owner, MotionSide(bond, plan), self._model, self._data)
                 self._touching.append(touching)
                 self._outputs.update(touching.outputs)
+                if arm in self._exchange.engaged:
+                    self._outputs[f"{arm}/tip_wrench"] = felt
+                    self._felt_by_spares.append((cast("Vector", felt), touching))
         bonded = {touching.bond.partition("/")[0] for touching in self._touching}
         felt = {arm: self._outputs.get(f"{arm}/tip_wrench") for arm in self.params.arms}
         self._felt = {arm: cast("Vector", wrench) for arm, wrench in felt.items() if wrench is not None}
@@ -214,6 +236,13 @@ class MujocoEngine(Stepped):
             for touching in self._touching
             if touching.acts_off_centre or setup.bonds[touching.bond].correction is not None
         ]
+
+    def _mount(self, arm: str, number: int) -> None:
+        """Give `arm` an instrument where its servos are."""
+        self._exchange.engage(arm, number)
+        self._servos.engage(self._exchange.engaged)
+        self._exchange.put(arm, self._servos.arm_setpoint(arm), self._servos.jaw_setpoint(arm))
+        self._mujoco.mj_step1(self._model, self._data)
 
     def _couple_needle(self, thing: str, bond: BondSide, plan: BondPlan | None) -> None:
         from engines.mujoco.interaction.wire_bond import WireBond
@@ -254,6 +283,8 @@ class MujocoEngine(Stepped):
                 self._set_gravity(value)
         if not inputs.quiet:
             self._place(inputs)
+        if self._exchange.engaged:
+            self._exchange_instruments(inputs)
         self._servos.begin(inputs)
         self._brakes.set(on="ECM" in self._servos.off)
         if self._rigid is None and not self._touching:
@@ -306,6 +337,17 @@ class MujocoEngine(Stepped):
         self._ahead = None
         self._mujoco.mj_step1(self._model, self._data)
 
+    def _exchange_instruments(self, inputs: Inputs) -> None:
+        """Give arms the instruments asked for: the last sub-step has prepared the motion of the old ones."""
+        self._exchange.hold()
+        if not (asked := self._exchange.asked(inputs)):
+            return
+        for arm, number in asked.items():
+            self._mount(arm, number)
+        self._ahead = None
+        for touching in self._touching:
+            touching.refresh()
+
     def _place(self, inputs: Inputs) -> None:
         """Put objects where events say."""
         from engines.mujoco.interaction.placing import place
@@ -344,6 +386,10 @@ class MujocoEngine(Stepped):
             self._rigid.end()
         for touching in self._touching:
             touching.end()
+        for felt, _ in self._felt_by_spares:
+            felt[:] = 0.0
+        for felt, touching in self._felt_by_spares:
+            felt += touching.tip_wrench
         if self._wires:
             self._feel_needles()
 
@@ -409,6 +455,8 @@ class MujocoEngine(Stepped):
             size = keeper.state.size
             keeper.state = values[at : at + size]
             at += size
+        if self._exchange.engaged:
+            self._servos.engage(self._exchange.engaged)
         self._mujoco.mj_setState(self._model, self._data, values[: self._size], self._signature)
         self._mujoco.mj_step1(self._model, self._data)
         self._readings.update()
@@ -422,6 +470,7 @@ class MujocoEngine(Stepped):
     def close(self) -> None:
         """Release model and data."""
         self._touching.clear()
+        self._felt_by_spares.clear()
         self._wires.clear()
         self._keepers.clear()
         self._outputs.clear()

@@ -21,7 +21,7 @@ from pydantic import (
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
 from engines.mujoco.object_params import ObjectParams, TableParams
-from engines.mujoco.tools import instrument_tool
+from engines.mujoco.tools import instrument_tools
 from hub.participant import Params, Tool, ToolParams
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
 from robots.dvrk.mounted import MountedArms, MountedEcm, MountedPsm
@@ -193,7 +193,8 @@ class MujocoParams(SceneParams, ToolParams):
     def tools(self) -> tuple[Tool, ...]:
         """The instruments of all PSMs."""
         return tuple(
-            instrument_tool(name, arm, self.base_pose(name))
+            tool
             for name, arm in self.arms.items()
             if isinstance(arm, MountedPsm)
+            for tool in instrument_tools(name, arm, self.base_pose(name))
         )

@@ -11,6 +11,7 @@ from hub.participant import event_in, signal_in, signal_out, tunable_in
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.linkage import LINKAGES
 from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
+from robots.dvrk.psm import ARM_JOINTS
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message, JointState, PoseStamped, WrenchStamped
 
@@ -69,7 +70,8 @@ def _collision_ports(slow: int) -> Iterator[Port]:
 def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
     """Return the bonds `<arm>/probe` of palpation probes and `<arm>/contact` of contact spheres.
 
-    Needles have `<needle>/wire`: base, middle and tip of the wire. All are in the world.
+    A spare instrument has `<arm>/<spare>/contact`. Needles have `<needle>/wire`: base, middle and tip of the
+    wire. All are in the world.
     """
     needles = (name for name, thing in params.objects.items() if isinstance(thing, NeedleParams))
     return (
@@ -81,8 +83,9 @@ def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
 def _arm_bonds(name: str, arm: MountedArm) -> Iterator[BondSide]:
     if isinstance(arm.end_effector, Probe):
         yield BondSide(name=f"{name}/probe", side="motion", frame="world")
-    if spheres := arm.spheres:
-        yield BondSide(name=f"{name}/contact", side="motion", dof=3, points=len(spheres), frame="world")
+    for owner, one in arm.by_owner(name).items():
+        if spheres := one.spheres:
+            yield BondSide(name=f"{owner}/contact", side="motion", dof=3, points=len(spheres), frame="world")
 
 
 def _arm_ports(arm: str, params: MountedPsm | MountedEcm, engine: MujocoParams) -> Iterator[Port]:
@@ -90,6 +93,9 @@ def _arm_ports(arm: str, params: MountedPsm | MountedEcm, engine: MujocoParams) 
     names = tuple(joint.name for joint in params.chain.joints)
     yield from _servo_ports(arm, names, params.start, "goal of the joint servos")
     yield signal_in(f"{arm}/control_mode", description=_MODES, size=2, start=(1.0, 1.0))
+    if len(params.variants) > 1:
+        engaged = "instrument in the arm: 0 the mounted one, 1 the first spare"
+        yield signal_in(f"{arm}/instrument", Float64Message, engaged, start=(0.0,))
     yield signal_out(f"{arm}/measured_js", JointState, names=names, fields=_ALL)
     yield signal_out(f"{arm}/setpoint_js", JointState, names=names, period_ns=slow)
     yield signal_out(f"{arm}/measured_cp", PoseStamped, frame=base, period_ns=slow)
@@ -116,11 +122,12 @@ def _servo_ports(owner: str, names: tuple[str, ...], start: tuple[float, ...], g
 
 
 def _end_effector_ports(arm: str, params: MountedArm) -> Iterator[Port]:
-    effector = params.end_effector
-    if not effector.joints:
+    effector = next((one.end_effector for one in params.variants if one.end_effector.joints), None)
+    if effector is None:
         return
     owner, names = f"{arm}/{effector.name}", tuple(joint.name for joint in effector.joints)
-    yield from _servo_ports(owner, names, params.end_effector_start, effector.goal)
+    start = params.end_effector_start or (0.0,) * len(names)
+    yield from _servo_ports(owner, names, start, effector.goal)
     yield signal_out(f"{owner}/measured_js", JointState, effector.measured, names=names, fields=_ALL)
     for reading, links in groupby(params.end_effector_links, lambda link: link.reading):
         if reading:
@@ -155,4 +162,8 @@ def position_count(scene: SceneParams) -> int:
     count = _FREE_BODY * len(scene.objects)
     for name, arm in scene.arms.items():
         count += len(arm.chain.joints) + len(LINKAGES[name].joints) + len(arm.end_effector_links)
+        if len(arm.variants) > 1:  # each instrument has a seat
+            own = [spare.chain.joints[len(ARM_JOINTS) :] for spare in arm.variants[1:]]
+            count += len(arm.variants) + sum(map(len, own))
+            count += sum(len(spare.end_effector_links) for spare in arm.variants[1:])
     return count

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from hub.participant import Tool
@@ -11,7 +12,7 @@ from robots.dvrk.end_effectors.scissors import Scissors
 from robots.dvrk.mounted import MountedPsm
 from schemas.vectors import Vector
 
-__all__ = ["instrument_tool"]
+__all__ = ["instrument_tools"]
 
 
 def _energy(mounted: MountedPsm) -> dict[str, Any]:
@@ -22,8 +23,16 @@ def _energy(mounted: MountedPsm) -> dict[str, Any]:
     return mode
 
 
-def instrument_tool(arm: str, mounted: MountedPsm, base: Vector) -> Tool:
-    """Return the instrument of an arm with its base frame at `base`, pose in the world, shape (4, 4)."""
+def instrument_tools(arm: str, mounted: MountedPsm, base: Vector) -> Iterator[Tool]:
+    """Yield the instruments of an arm with its base frame at `base`, pose in the world, shape (4, 4).
+
+    The tool of a spare instrument, `PSM1_<spare>`, is far away while out of use.
+    """
+    for owner, one in mounted.by_owner(arm).items():
+        yield _tool(arm, owner, one, base)
+
+
+def _tool(arm: str, owner: str, mounted: MountedPsm, base: Vector) -> Tool:
     is_probe, spheres = isinstance(mounted.end_effector, Probe), mounted.spheres
     probe: dict[str, Any] = {}
     if is_probe:
@@ -40,10 +49,10 @@ def instrument_tool(arm: str, mounted: MountedPsm, base: Vector) -> Tool:
         if clip := mounted.tool.clip:
             probe["clip"] = {"length": clip.length, "diameters": clip.diameters}
     return Tool(
-        name=arm,
+        name=owner.replace("/", "_"),
         touches=mounted.touches,
         path=("arms", arm, "touches"),
-        bond=f"{arm}/{'probe' if is_probe else 'contact'}" if probe else "",
+        bond=f"{owner}/{'probe' if is_probe else 'contact'}" if probe else "",
         probe=probe,
         tip=f"{arm}/measured_cp",
         base=base,

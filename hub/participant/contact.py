@@ -24,7 +24,7 @@ class Tool:
     """A tool on an arm; lengths in m."""
 
     name: str
-    """Name of the arm, and of the probe that planning makes."""
+    """Name of the arm, and of the probe that planning makes; of a spare instrument, `<arm>_<instrument>`."""
     touches: tuple[str, ...]
     """Names of the bodies of tissue to touch, as stated."""
     path: tuple[str | int, ...]
@@ -59,7 +59,7 @@ class ToolParams(Params):
     @property
     @abstractmethod
     def tools(self) -> Sequence[Tool]:
-        """The tools, one at most on each arm."""
+        """The tools, one at a time on each arm."""
 
 
 class TissueParams(Params):

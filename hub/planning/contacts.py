@@ -32,7 +32,8 @@ class MissingContact:
         """Lines to add to the scenario, or what to change."""
         if not self.tool.bond:
             return "Its instrument has no contact spheres: choose another, or accept it."
-        return f"To let them touch, add\nscene:\n  arms:\n    {self.tool.name}: {{touches: [{self.body}]}}"
+        arm = self.tool.path[1]
+        return f"To let them touch, add\nscene:\n  arms:\n    {arm}: {{touches: [{self.body}]}}"
 
 
 def add_contacts(source: Source, params: Mapping[str, Params]) -> list[str]:

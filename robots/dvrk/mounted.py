@@ -28,9 +28,12 @@ from robots import rotation
 from robots.dvrk import arm_bodies, drives, ecm, psm
 from robots.dvrk.drive import Disc, Drive
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
+from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.end_effectors.end_effector import EndEffector, Mount
+from robots.dvrk.end_effectors.jaw import Jaw
 from robots.dvrk.end_effectors.own_jaw import JawFile, with_own_jaw
 from robots.dvrk.end_effectors.probe import PROBE_RADIUS, Probe
+from robots.dvrk.end_effectors.scissors import Scissors
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import Instrument, instrument
 from robots.dvrk.link import Link
@@ -58,6 +61,10 @@ __all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedArms", "MountedEcm", "Mou
 
 DEFAULT_INSTRUMENT = "palpation-probe"
 
+_WRISTED = 3
+"""Joints of an instrument with roll, wrist pitch and wrist yaw."""
+_EXCHANGED = (Jaw, Scissors, Electrode)
+"""End effectors of instruments that may be exchanged: a jaw of the name `jaw`, or none."""
 
 _Published = tuple[Mapping[str, Inertia], Mapping[str, Drive], tuple[Disc, ...]]
 """Bodies, drives and discs."""
@@ -109,6 +116,15 @@ class MountedArm(BaseModel):
     def spheres(self) -> tuple[ContactSphere, ...]:
         """Contact spheres for tissue."""
         return ()
+
+    @property
+    def variants(self) -> tuple[Self, ...]:
+        """The arm as mounted, then with each spare instrument."""
+        return (self,)
+
+    def by_owner(self, arm: str) -> Mapping[str, Self]:
+        """Return the variants of `arm` by the prefix of names in a model: `PSM1`, `PSM1/<spare>`."""
+        return {arm: self}
 
     @property
     @abstractmethod
@@ -247,6 +263,54 @@ class MountedPsm(PsmTool, MountedArm):
             " bond between both; state either for numbers of your own"
         ),
     )
+
+    spares: tuple[InstrumentName, ...] = Field(
+        default=(),
+        description=(
+            "instruments that the arm may be given in exchange while the session runs: names or numbers;"
+            " with a jaw or a rigid tip, and with the wrist of an 8 mm instrument"
+        ),
+    )
+
+    @property
+    def variants(self) -> tuple[Self, ...]:
+        """The arm as mounted, then with each spare instrument, its joints at the start."""
+        return self, *self._with_spares
+
+    @cached_property
+    def _with_spares(self) -> tuple[Self, ...]:
+        fields = {name: getattr(self, name) for name in type(self).model_fields} | {"spares": ()}
+        return tuple(
+            self.model_construct(self.model_fields_set, **(fields | {"instrument": spare, "jaw": 0.0}))
+            for spare in self.spares
+        )
+
+    def by_owner(self, arm: str) -> Mapping[str, Self]:
+        """Return the variants of `arm` by the prefix of names in a model: `PSM1`, `PSM1/<spare>`."""
+        mounted, *others = self.variants
+        return {arm: mounted} | {f"{arm}/{other.instrument.replace('-', '_')}": other for other in others}
+
+    @model_validator(mode="after")
+    def _exchanges_what_fits(self) -> Self:
+        if not self.spares:
+            return self
+        if self.tip is not None or self.dynamics is not None:
+            raise ValueError("spares: not beside `tip` or `dynamics`, which are those of one instrument")
+        tools = [instrument(name) for name in (self.instrument, *self.spares)]
+        for tool in tools:
+            if len(tool.joints) != _WRISTED or type(tool.end_effector) not in _EXCHANGED:
+                raise ValueError(
+                    f"spares: {tool.name} cannot be exchanged while a session runs; allowed are instruments"
+                    " with roll, wrist and a jaw or a rigid tip"
+                )
+            if tools.count(tool) > 1:
+                raise ValueError(f"spares: {tool.name} is named twice; name each instrument once")
+        for variant in self.variants[1:]:
+            try:
+                variant.chain.check(np.array(self.start, np.float64))
+            except MotionError as error:
+                raise ValueError(f"spares: with {variant.instrument} {error}") from error
+        return self
 
     @cached_property
     def tool(self) -> Instrument:

@@ -292,6 +292,12 @@ class MjModel:
     nsite: int
     geom_aabb: _Array
     geom_bodyid: NDArray[np.int32]
+    sensor_objtype: NDArray[np.int32]
+    sensor_objid: NDArray[np.int32]
+    tendon_frictionloss: _Array
+    geom_conaffinity: NDArray[np.int32]
+    geom_contype: NDArray[np.int32]
+    body_inertia: _Array
     geom_dataid: NDArray[np.int32]
     geom_group: NDArray[np.int32]
     geom_matid: NDArray[np.int32]
@@ -314,12 +320,15 @@ class MjModel:
     eq_obj1id: NDArray[np.int32]
     eq_obj2id: NDArray[np.int32]
     eq_type: NDArray[np.int32]
+    jnt_bodyid: NDArray[np.int32]
     jnt_dofadr: NDArray[np.int32]
     jnt_limited: NDArray[np.uint8]
     jnt_qposadr: NDArray[np.int32]
     jnt_range: _Array
     body_jntadr: NDArray[np.int32]
+    dof_M0: _Array
     dof_armature: _Array
+    dof_bodyid: NDArray[np.int32]
     dof_damping: _Array
     dof_frictionloss: _Array
     dof_solimp: _Array
@@ -460,6 +469,7 @@ class MjVisual:
 class MjStatistic:
     center: _Array
     extent: float
+    meaninertia: float
 
 class MjvOption:
     sitegroup: NDArray[np.uint8]

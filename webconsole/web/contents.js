@@ -7,6 +7,7 @@ import { boxSides, creased, gathered, onSide, smooth, splitByChart } from "./mes
 const BURNT = 2 // and above: kinds of burnt faces
 const WET = 1 // the kind of face inside a cut: webconsole/stage.py has the colours by kind
 const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
+const AWAY_M = 500 // bodies farther away are instruments out of use, waiting for an exchange
 const TILED = 2 ** 16 // charts from here on are the sides of a box, for each kind of face
 
 export class Contents {
@@ -89,7 +90,7 @@ export class Contents {
     groups.forEach((group, body) => {
       group.position.fromArray(places, 3 * body)
       group.quaternion.fromArray(turns, 4 * body).normalize()
-      group.visible = true
+      group.visible = group.position.lengthSq() < AWAY_M * AWAY_M
     })
     this.placed = true
   }

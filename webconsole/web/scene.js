@@ -143,7 +143,8 @@ export class Scene {
       groups[frame.body].add(axes)
       this.axes.push(axes)
       const [arm, end] = frame.name.split("/")
-      this.places.set(end === "base" ? `${arm}_base` : arm, placed(groups[frame.body], frame.pose))
+      const place = end === "base" ? `${arm}_base` : arm // an arm with spare instruments has several tips
+      if (!this.places.has(place)) this.places.set(place, placed(groups[frame.body], frame.pose))
       if (frame.name.endsWith("/tip")) this.tips.push({ name: frame.name.split("/")[0], axes })
     }
     for (const camera of scene.cameras) {
@@ -171,8 +172,10 @@ export class Scene {
     this.world.add(object)
   }
 
+  get usedTips() { return this.tips.filter(({ axes }) => axes.parent.visible) }
+
   get choices() {
-    const arms = this.tips.map(({ name }) => name).filter((name) => name !== "ECM")
+    const arms = [...new Set(this.tips.map(({ name }) => name))].filter((name) => name !== "ECM")
     return ["work", "robot", ...Object.keys(DIRECTIONS), ...(this.room ? ["overview"] : []),
       ...(this.cameras.length ? ["endoscope"] : []), ...arms]
   }
@@ -198,7 +201,7 @@ export class Scene {
     const { mesh, burnt } = this.surfaces[index] ?? {}
     if (burnt || !mesh) return burnt ?? null
     const middle = mesh.geometry.boundingSphere?.center ?? new THREE.Vector3()
-    const places = this.tips.filter(({ name }) => name !== "ECM").map(({ axes }) => axes.getWorldPosition(new THREE.Vector3()))
+    const places = this.usedTips.filter(({ name }) => name !== "ECM").map(({ axes }) => axes.getWorldPosition(new THREE.Vector3()))
     return places.sort((one, other) => one.distanceTo(middle) - other.distanceTo(middle))[0] ?? null
   }
 
@@ -261,7 +264,7 @@ export class Scene {
 
   frameChoice(name) {
     const box = name === "robot" ? this.robotBox() : this.workBox()
-    const tip = this.tips.find((one) => one.name === name)
+    const tip = this.usedTips.find((one) => one.name === name)
     if (tip) this.orbit.look(tip.axes.getWorldPosition(new THREE.Vector3()).toArray(), 0.12)
     else if (name !== "endoscope" && !box.isEmpty()) {
       const sphere = box.getBoundingSphere(new THREE.Sphere())
@@ -314,7 +317,7 @@ export class Scene {
     this.world.updateMatrixWorld()
     const box = this.surfaceBox()
     if (box.isEmpty()) {
-      for (const { name, axes } of this.tips) {
+      for (const { name, axes } of this.usedTips) {
         if (name !== "ECM") box.expandByPoint(axes.getWorldPosition(new THREE.Vector3()))
       }
       if (!box.isEmpty()) box.expandByScalar(0.04)

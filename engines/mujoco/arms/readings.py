@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import groupby
 
 import mujoco
@@ -37,11 +37,21 @@ class Readings:
         positions: Vector | None = None,
         *,
         weighs: bool = False,
+        engaged: Callable[[], Mapping[str, int]] = dict[str, int],
     ) -> None:
         """Report on `arms`; `weighs`: by the whole efforts of their motors.
 
-        `positions`: for a lean model, the matrix to the positions of the whole model.
+        Args:
+            model: the model.
+            data: its state.
+            arms: the arms.
+            servos: their drives.
+            positions: for a lean model, the matrix to the positions of the whole model.
+            weighs: whether efforts are the whole efforts of the motors.
+            engaged: returns the number of the engaged instrument by arm, where there are spares.
         """
+        self._engaged = engaged
+        self._jaws: list[tuple[str, list[tuple[Vector, Vector] | None], Vector]] = []
         self._whole = positions
         self._sensors = data.sensordata
         self._qpos = np.empty(model.nq if positions is None else len(positions))
@@ -66,6 +76,9 @@ class Readings:
     def _add_end_effector(self, model: mujoco.MjModel, arm: str, params: MountedArm) -> None:
         """Report the joints of an end effector, and links with readings."""
         effector = params.end_effector
+        if len(params.variants) > 1:
+            self._add_jaws(model, arm, params)
+            return
         if not effector.joints:
             return
         to_joints = _to_joints(effector)
@@ -86,8 +99,29 @@ class Readings:
                 self.outputs[port] = self._sensors[at : at + size]
                 at += size
 
+    def _add_jaws(self, model: mujoco.MjModel, arm: str, params: MountedArm) -> None:
+        """Report the jaw of the engaged instrument; zeros where that has none."""
+        jaws: list[tuple[Vector, Vector] | None] = []
+        for owner, one in params.by_owner(arm).items():
+            if one.end_effector.joints:
+                to_joints = _to_joints(one.end_effector)
+                first = next(name for group in sensed_motors(one.end_effector) for name in group)
+                at = int(model.sensor(f"{owner}/position/{first}").adr[0])
+                jaws.append((to_joints, self._sensors[at : at + to_joints.shape[1]]))
+            else:
+                jaws.append(None)
+        sizes = {len(jaw[0]) for jaw in jaws if jaw is not None}
+        if sizes:
+            self.outputs[f"{arm}/jaw/measured_js"] = joints = np.zeros(sizes.pop())
+            self._jaws.append((arm, jaws, joints))
+
     def update(self) -> None:
         """Update the outputs due in every step."""
+        for arm, jaws, joints in self._jaws:
+            if (jaw := jaws[self._engaged()[arm]]) is None:
+                joints[:] = 0.0
+            else:
+                jaw[0].dot(jaw[1], joints)
         for to_joints, sensed, joints in self._end_effectors:
             to_joints.dot(sensed, joints)
         if self._motors is not None:

@@ -9,7 +9,7 @@ slope as velocity, and a feed-forward effort.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import mujoco
@@ -18,6 +18,7 @@ import numpy as np
 from engines.mujoco.arms.friction import Friction
 from hub.participant import Inputs
 from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.psm import ARM_JOINTS
 from robots.dvrk.setup_joints import CartArm
 from robots.serial_chain import Joint
 from schemas.errors import SessionError
@@ -32,6 +33,8 @@ _BARE = 2.0
 docs/decisions/0010.
 """
 
+_OF_ARM = frozenset(joint.name for joint in ARM_JOINTS)
+"""Joints that all instruments of an arm have in common."""
 _Row = tuple[float, float, float, float]
 """Start, lower and upper limit, velocity of a joint."""
 _Share = tuple[int, int, float]
@@ -43,8 +46,8 @@ class _Axes(NamedTuple):
 
     joints: Sequence[Joint]
     start: Sequence[float]
-    motors: Sequence[tuple[str, str, float]]
-    """Name of a motor, name of the joint, and the motor's share of the joint's position."""
+    motors: Sequence[Sequence[tuple[str, str, float]]]
+    """Motors of each instrument: actuator, name of the joint, and the motor's share of its position."""
 
 
 @dataclass
@@ -62,6 +65,14 @@ class _Group:
     weighed: list[int] = field(default_factory=list[int])
     """Bodies with weight on the real controller too: the endoscope. Springs and weights balance all else."""
     mode: float = _POSITION
+    spares: list[list[_Share]] = field(default_factory=list[list[_Share]])
+    """Motors of each instrument, the mounted one first, where the arm has spares."""
+
+    def engage(self, variant: int) -> None:
+        """Let the motors of an instrument be the group's, in place of all other instruments'."""
+        own = {actuator for shares in self.spares for actuator, *_ in shares}
+        self.actuators = [one for one in self.actuators if one not in own]
+        self.actuators += [actuator for actuator, *_ in self.spares[variant]]
 
 
 class Servos:
@@ -80,17 +91,31 @@ class Servos:
         rows: list[_Row] = []
         shares: list[_Share] = []
         for arm, params in arms.items():
-            effector = params.end_effector
-            grasping = {f"{arm}/{link.name}" for link in params.end_effector_links}
+            variants = params.by_owner(arm)
+            effector = next((one.end_effector for one in params.variants if one.end_effector.joints), None)
+            grasping = {
+                f"{owner}/{link.name}" for owner, one in variants.items() for link in one.end_effector_links
+            }
             own = [i for i in range(model.nbody) if model.body(i).name.startswith(f"{arm}/")]
             fixed = [i for i in own if model.body(i).name not in grasping]
-            joints = params.chain.joints
-            alone = [(joint.name, joint.name, 1.0) for joint in joints]
-            axes = _Axes(joints, params.start, alone)
+            motors = [
+                [
+                    (f"{owner}/{joint.name}", joint.name, 1.0)
+                    for joint in one.chain.joints
+                    if owner == arm or joint.name not in _OF_ARM
+                ]
+                for owner, one in variants.items()
+            ]
+            joints = _widest([one.chain.joints for one in params.variants])
+            axes = _Axes(joints, params.start, motors)
             self._add_group(_Group(arm, f"{arm}/", fixed), axes, rows, shares)
-            if effector.joints:
-                motors = [(motor.name, motor.joint, motor.share) for motor in effector.motors]
-                axes = _Axes(effector.joints, params.end_effector_start, motors)
+            if effector is not None:
+                motors = [
+                    [(f"{owner}/{motor.name}", motor.joint, motor.share) for motor in one.end_effector.motors]
+                    for owner, one in variants.items()
+                ]
+                joints = _widest([one.end_effector.joints for one in params.variants])
+                axes = _Axes(joints, params.end_effector_start or (0.0,), motors)
                 moving = [i for i in own if i not in fixed]
                 self._add_group(_Group(arm, f"{arm}/{effector.name}/", moving), axes, rows, shares)
         start, self._lower, self._upper, speed = np.array(rows).T.copy()
@@ -121,9 +146,15 @@ class Servos:
         """Add joints commanded together, and their motors."""
         model, first = self._model, len(rows)
         places = {joint.name: first + i for i, joint in enumerate(axes.joints)}
-        for motor, joint, share in axes.motors:
-            group.actuators.append(model.actuator(f"{group.arm}/{motor}").id)
-            shares.append((group.actuators[-1], places[joint], share))
+        by_instrument = [
+            [(model.actuator(motor).id, places[joint], share) for motor, joint, share in motors]
+            for motors in axes.motors
+        ]
+        group.actuators = [actuator for actuator, *_ in by_instrument[0]]
+        shares += [one for own in by_instrument for one in own]
+        if len(by_instrument) > 1:
+            arm = {places[name] for name in _OF_ARM if name in places}
+            group.spares = [[one for one in own if one[1] not in arm] for own in by_instrument]
         rows += [
             (q, joint.lower, joint.upper, joint.velocity)
             for q, joint in zip(axes.start, axes.joints, strict=True)
@@ -174,6 +205,31 @@ class Servos:
     def arm_setpoint(self, arm: str) -> Vector:
         """Return the joints of `arm` as a view of `setpoint`."""
         return self.setpoint[next(group.part for group in self._groups if group.arm == arm)]
+
+    def jaw_setpoint(self, arm: str) -> Vector:
+        """Return the jaw of `arm` as a view of `setpoint`; empty without one."""
+        _, *jaw = (group.part for group in self._groups if group.arm == arm)
+        return self.setpoint[jaw[0] if jaw else slice(0)]
+
+    def engage(self, engaged: Mapping[str, int]) -> None:
+        """Drive the engaged instruments, by arm, and let the motors of all others rest."""
+        gain, bias = self._gains
+        for group in self._groups:
+            if not group.spares:
+                continue
+            group.engage(engaged[group.arm])
+            holds = group.mode == _POSITION
+            for number, shares in enumerate(group.spares):
+                driven = holds and number == engaged[group.arm]
+                for actuator, *_ in shares:
+                    self._model.actuator_gainprm[actuator] = gain[actuator] * driven
+                    self._model.actuator_biasprm[actuator] = bias[actuator] * driven
+                for _, drive, _ in shares:
+                    self._measure[drive] = 0.0
+            for actuator, drive, _ in group.spares[engaged[group.arm]]:
+                for joint, coefficient in self._joints_of_actuator(actuator):
+                    self._measure[drive, self._model.jnt_qposadr[joint]] = coefficient
+        self._at_rest = b""
 
     def begin(self, inputs: Inputs) -> None:
         """Apply commands and modes at the beginning of a step; unchanged and reached commands cost nothing.
@@ -286,3 +342,14 @@ class Servos:
         self._at_rest = b""
         self.setpoint[:] = state[: self.setpoint.size]
         self._set_modes(state[self.setpoint.size :])
+
+
+def _widest(chains: Sequence[Sequence[Joint]]) -> Sequence[Joint]:
+    """Return the joints of all instruments by name, each with the widest range."""
+    found: dict[str, Joint] = {}
+    for joint in (one for joints in chains for one in joints):
+        known = found.setdefault(joint.name, joint)
+        if known is not joint:
+            ends = min(known.lower, joint.lower), max(known.upper, joint.upper)
+            found[joint.name] = replace(known, lower=ends[0], upper=ends[1])
+    return tuple(found.values())

@@ -25,10 +25,10 @@ class ContactSpheresBond:
     acts_off_centre = True
     """The moment is renewed in every sub-step."""
 
-    def __init__(self, arm: str, motion: MotionSide, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Let `motion` act on the spheres of the instrument of `arm`."""
-        self.motion, self.bond = motion, f"{arm}/{CONTACT}"
-        sites = _sphere_sites(arm, model)
+    def __init__(self, owner: str, motion: MotionSide, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Let `motion` act on the spheres of the instrument of `owner`: an arm, or a spare of an arm."""
+        self.motion, self.bond = motion, f"{owner}/{CONTACT}"
+        arm, sites = owner.partition("/")[0], _sphere_sites(owner, model)
         n, carriers = len(sites), model.site_bodyid[sites]
         first = int(model.sensor(f"{model.site(sites[0]).name}/position").adr[0])
         self._position, self._velocity = (
@@ -53,11 +53,11 @@ class ContactSpheresBond:
         self._last = self._position.copy()
         tip, base = int(model.sensor(f"{arm}/tip/position").adr[0]), model.site(f"{arm}/base").id
         self._tip, self._to_base = data.sensordata[tip : tip + 3], data.site_xmat[base].reshape(3, 3).T.copy()
-        self._tip_wrench, self._about_tip = np.zeros(6), np.zeros((n, 3))
-        self._tip_force, self._tip_torque = self._tip_wrench[:3], self._tip_wrench[3:]
+        self.tip_wrench, self._about_tip = np.zeros(6), np.zeros((n, 3))
+        self._tip_force, self._tip_torque = self.tip_wrench[:3], self.tip_wrench[3:]
         self.outputs = {
             **motion.result(self._position, self._velocity),
-            f"{arm}/tip_wrench": self._tip_wrench,
+            f"{arm}/tip_wrench": self.tip_wrench,
         }
 
     def begin(self, inputs: Inputs) -> None:

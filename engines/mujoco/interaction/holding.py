@@ -44,9 +44,12 @@ def _arms_with_jaw(scene: SceneParams) -> list[str]:
 
 
 def _finger_lengths(scene: SceneParams) -> dict[str, float]:
-    """Return the length of the fingers of every arm with a jaw, m."""
+    """Return the length of the fingers of every instrument with a jaw, m, by owner."""
     return {
-        name: arm.end_effector.length for name, arm in scene.arms.items() if isinstance(arm.end_effector, Jaw)
+        owner: one.end_effector.length
+        for name, arm in scene.arms.items()
+        for owner, one in arm.by_owner(name).items()
+        if isinstance(one.end_effector, Jaw)
     }
 
 
@@ -62,8 +65,9 @@ class Holding:
         )
         self._settled = 1 if self._rays is not None else max(1, round(_SETTLED / period))
         self._things, self._arms = {thing: i for i, thing in enumerate(things)}, arms
-        self._numbers = [int(arm[-1]) for arm in arms]
+        self._numbers = [int(arm.partition("/")[0][-1]) for arm in arms]
         self._bodies = [model.body(thing).id for thing in things]
+        # an arm with spare instruments counts once for each of them
         # in what slip is measured: what a ray holds does not move with a finger
         part = FINGERS[0] if self._rays is None else "wrist_yaw"
         self._fingers = [model.body(f"{arm}/{part}").id for arm in arms]
@@ -166,7 +170,7 @@ class Holding:
     def holder(self, thing: str) -> str | None:
         """Return the holding arm of an object, the first of two; None without."""
         holder = int(self._holder[self._things[thing]])
-        return self._arms[holder] if holder >= 0 else None
+        return self._arms[holder].partition("/")[0] if holder >= 0 else None
 
     def _choose_holder(self, i: int) -> None:
         """Keep the holding arm of object `i` while holding; then choose the first holding arm."""

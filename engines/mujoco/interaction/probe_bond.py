@@ -40,8 +40,8 @@ class ProbeBond:
         self._translation, self._rotation = self._moved[:3], self._moved[3:]
         to_base = data.site_xmat[model.site(f"{arm}/base").id].reshape(3, 3).T
         self._to_base: Vector = np.kron(np.eye(2), to_base)
-        self._tip_wrench = np.zeros(6)
-        self.outputs = {**motion.result(self._pose, self._twist), f"{arm}/tip_wrench": self._tip_wrench}
+        self.tip_wrench = np.zeros(6)
+        self.outputs = {**motion.result(self._pose, self._twist), f"{arm}/tip_wrench": self.tip_wrench}
         self.refresh()
 
     def begin(self, inputs: Inputs) -> None:
@@ -57,7 +57,7 @@ class ProbeBond:
     def end(self) -> None:
         """Record the work done, and set the wrench at the tip, the probe's centre."""
         self._record_work()
-        self._to_base.dot(self._wrench, self._tip_wrench)
+        self._to_base.dot(self._wrench, self.tip_wrench)
 
     def _record_work(self) -> None:
         """Record the work of the wrench since the last call, and update the pose."""

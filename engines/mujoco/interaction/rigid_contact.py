@@ -155,8 +155,11 @@ class RigidContact:
 def _owners(model: mujoco.MjModel, arms: list[str]) -> NDArray[np.intp]:
     """Return for every geom of `model` the index of the instrument's arm, else -1."""
     owners = np.full(model.nbody, -1)
-    for i, arm in enumerate(arms):
-        owners[model.body(instrument_body(arm)).id] = i
+    root = instrument_body("")
+    for body in range(model.nbody):
+        name = model.body(body).name
+        if (arm := name.partition("/")[0]) in arms and name.endswith(root):  # a spare's too
+            owners[body] = arms.index(arm)
     for body, parent in enumerate(model.body_parentid.tolist()):  # which comes before it
         owners[body] = max(owners[body], owners[parent])
     return owners[model.geom_bodyid]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engines.mujoco.model.seats import arm_tips
 from engines.mujoco.params import SceneParams
 from robots.dvrk.crtk import CART_FRAME, WORLD_FRAME
 from robots.dvrk.ecm import tip
@@ -50,7 +51,9 @@ class SceneFrames:
         self.fixed = frozenset(_fixed_frames(scene))
         """Those that never move."""
         self._site = {f"{arm}_base": model.site(f"{arm}/base").id for arm in scene.arms}
-        self._site |= {arm: model.site(f"{arm}/tip").id for arm in scene.arms}
+        tips = {arm: arm_tips(params.by_owner(arm), model) for arm, params in scene.arms.items()}
+        self._tips = {arm: found for arm, found in tips.items() if len(found) > 1}
+        self._site |= {arm: found[0].site for arm, found in tips.items()}
         self._body = {name: model.body(name).id for name in (*scene.fixtures, *scene.objects)}
         ecm = scene.arms.get("ECM")
         self._left = _left_in_tip(ecm) if isinstance(ecm, MountedEcm) else None
@@ -65,6 +68,8 @@ class SceneFrames:
         if self._left is not None and frame.endswith(_OPTICAL):
             return self.pose("ECM", data) @ self._left
         pose = np.eye(4)
+        if frame in self._tips:
+            self._site[frame] = next(tip.site for tip in self._tips[frame] if tip.is_engaged(data))
         if (site := self._site.get(frame)) is not None:
             pose[:3, :3], pose[:3, 3] = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
         elif (body := self._body.get(frame)) is not None:

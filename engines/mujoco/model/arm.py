@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import end_effector as end_effectors
-from engines.mujoco.model.names import sphere_site
+from engines.mujoco.model.names import SEAT, sphere_site
 from engines.mujoco.model.poses import pose_attributes
 from engines.mujoco.model.rigid import tie
 from engines.mujoco.model.sensors import add_arm_sensors, add_sphere_sensors
 from engines.mujoco.model.servo import add_joint_drive
 from engines.mujoco.model.shapes import Bodies
-from engines.mujoco.model.tree import BASE, links
+from engines.mujoco.model.tree import BASE, links, spare_links
 from robots.dvrk.drive import Disc
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
 from robots.dvrk.link import Link
@@ -23,10 +23,16 @@ from robots.dvrk.setup_joints import CartArm
 from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
-__all__ = ["add"]
+__all__ = ["add", "add_spare"]
 
 _HIDDEN = 4
 """A group hidden in MuJoCo's viewer by default."""
+_SEAT_ARMATURE = 1e4
+"""Inertia of a seat, kg: 10 N move it by 1 nm in a step, and `Exchange.hold` moves it back. With 1e6 kg the
+constraint solver loses digits of the other joints.
+"""
+_SEAT_MASS, _SEAT_INERTIA = 1e-9, 1e-12
+"""kg and kg m^2; MuJoCo wants some."""
 
 
 def add(spec: mujoco.MjSpec, name: CartArm, params: MountedArm, base_pose: Vector) -> Bodies:
@@ -46,6 +52,8 @@ def add(spec: mujoco.MjSpec, name: CartArm, params: MountedArm, base_pose: Vecto
         )
         bodies[link.name] = body, link.pose
         _add_joint(spec, body, name, link)
+    if SEAT in bodies:
+        _make_seat(spec, bodies[SEAT][0], f"{name}/{SEAT}")
     chain, effector, moved = params.chain, params.end_effector, params.end_effector_links
     for joint in chain.joints:
         add_joint_drive(spec, f"{name}/{joint.name}", f"{name}/{joint.name}", params.drives[joint.name])
@@ -57,6 +65,42 @@ def add(spec: mujoco.MjSpec, name: CartArm, params: MountedArm, base_pose: Vecto
     end_effectors.add_sensors(spec, name, effector, moved)
     _add_spheres(spec, name, params.spheres, bodies)
     return bodies
+
+
+def add_spare(spec: mujoco.MjSpec, arm: CartArm, owner: str, spare: MountedArm, bodies: Bodies) -> Bodies:
+    """Add a spare instrument to the arm called `arm`, with `bodies`, and return its own bodies by link.
+
+    `owner`: prefix of the names of its parts.
+    """
+    own: dict[str, tuple[mujoco.MjsBody, Vector]] = {}
+    for link in spare_links(arm, spare):
+        above, above_pose = own.get(link.parent) or bodies[link.parent]
+        body = above.add_body(
+            name=f"{owner}/{link.name}",
+            gravcomp=1.0,
+            **pose_attributes(inverse_transform(above_pose) @ link.pose),
+        )
+        own[link.name] = body, link.pose
+        _add_joint(spec, body, owner, link)
+    _make_seat(spec, own[SEAT][0], f"{owner}/{SEAT}")
+    for joint in spare.chain.joints:
+        if joint.name in own:
+            add_joint_drive(spec, f"{owner}/{joint.name}", f"{owner}/{joint.name}", spare.drives[joint.name])
+    effector, moved = spare.end_effector, spare.end_effector_links
+    end_effectors.add_motors(spec, owner, effector, moved, spare.drives)
+    _add_discs(spec, owner, spare.discs)
+    _set_inertias(own, spare)
+    tip = pose_attributes(spare.chain.tip)
+    own[spare.chain.joints[-1].name][0].add_site(name=f"{owner}/tip", group=_HIDDEN, **tip)
+    end_effectors.add_sensors(spec, owner, effector, moved)
+    _add_spheres(spec, owner, spare.spheres, own)
+    return own
+
+
+def _make_seat(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str) -> None:
+    body.mass, body.explicitinertial = _SEAT_MASS, True
+    body.inertia = [_SEAT_INERTIA] * 3
+    spec.joint(name).armature = _SEAT_ARMATURE
 
 
 def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) -> None:
@@ -88,6 +132,8 @@ def _add_discs(spec: mujoco.MjSpec, arm: str, discs: Sequence[Disc]) -> None:
 def _set_inertias(bodies: Bodies, params: MountedArm) -> None:
     """Set the inertia of each body from the base frame with every joint at 0."""
     for link, given in params.bodies.items():
+        if link not in bodies:  # a spare instrument has its own links alone
+            continue
         body, pose = bodies[link]
         turn = pose[:3, :3]
         tensor = turn.T @ given.tensor @ turn

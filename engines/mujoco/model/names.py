@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-__all__ = ["CONTACT", "first_sensor", "instrument_body", "probe_body", "sphere_site"]
+__all__ = ["CONTACT", "PARKED_M", "SEAT", "first_sensor", "instrument_body", "probe_body", "sphere_site"]
+
+SEAT = "seat"
+"""Slide of an instrument on an arm with spares, along the insertion: 0 in the arm, `-PARKED_M` out of use."""
+PARKED_M = 1000.0
+"""Distance, m, at which no camera sees an instrument and nothing touches one."""
 
 CONTACT = "contact"
 """Name of the bond at contact spheres, and second part of the names of the spheres' sites."""

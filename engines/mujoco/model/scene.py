@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import arm, fixtures, objects, setup_joints, shapes
-from engines.mujoco.model.tree import links
+from engines.mujoco.model.names import PARKED_M, SEAT
+from engines.mujoco.model.tree import links, spare_links
 from engines.mujoco.params import SceneParams
 from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
@@ -36,8 +37,13 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     result.worldbody.add_light(pos=[0.0, 0.0, 3.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
     for name, params in scene.arms.items():
-        pose = mounts.get(name, params.pose)
-        shapes.add_arm(result, name, params, arm.add(result, name, params, pose), seen=scene.looks != "none")
+        pose, seen = mounts.get(name, params.pose), scene.looks != "none"
+        bodies = arm.add(result, name, params, pose)
+        shapes.add_arm(result, name, params, bodies, seen=seen)
+        for owner, spare in params.by_owner(name).items():
+            if owner != name and isinstance(spare, MountedPsm):
+                own = arm.add_spare(result, name, owner, spare, bodies)
+                shapes.add_instrument(result, owner, spare, own, seen=seen)
     if scene.table is not None:
         objects.add_table(result, scene.table)
     for name, fixture in scene.fixtures.items():
@@ -52,13 +58,28 @@ def place(
 ) -> None:
     """Put the joints of `arms`, with fingers and, unless the model is lean, linkages, at the start."""
     for name, params in arms.items():
-        start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
-        start |= params.end_effector.positions(np.array(params.end_effector_start))
+        start = _start(params) | {SEAT: 0.0}
         for link in links(name, params):
             q = link.follow.ratio * start[link.follow.joint] if link.follow else start[link.name]
-            joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{name}/{link.name}")
-            if joint >= 0:
-                data.qpos[int(model.jnt_qposadr[joint])] = q
+            _put(model, data, f"{name}/{link.name}", q)
+        _, *spares = params.by_owner(name).items()
+        for owner, spare in spares:
+            start = _start(spare) | {SEAT: -PARKED_M}
+            for link in spare_links(name, spare):
+                _put(model, data, f"{owner}/{link.name}", start[link.name])
+
+
+def _start(params: MountedPsm | MountedEcm) -> dict[str, float]:
+    """Return the positions at time 0 by joint, of an end effector by link."""
+    start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
+    return start | dict(params.end_effector.positions(np.array(params.end_effector_start)))
+
+
+def _put(model: mujoco.MjModel, data: mujoco.MjData, name: str, position: float) -> None:
+    """Set a joint, if the model has one of this name."""
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if joint >= 0:
+        data.qpos[int(model.jnt_qposadr[joint])] = position
 
 
 def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:

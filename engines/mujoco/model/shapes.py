@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco import looks
+from engines.mujoco.model.names import SEAT
 from engines.mujoco.model.poses import pose_attributes
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.instruments import Instrument
@@ -24,7 +25,7 @@ from robots.dvrk.setup_joints import CartArm
 from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
-__all__ = ["Bodies", "add", "add_arm"]
+__all__ = ["Bodies", "add", "add_arm", "add_instrument"]
 
 Bodies = Mapping[str, tuple[mujoco.MjsBody, Vector]]
 """Body by link, and the body's pose, shape (4, 4), in the frame of the look, with every joint at 0."""
@@ -43,8 +44,9 @@ def add_arm(
     spec: mujoco.MjSpec, arm: CartArm, params: MountedPsm | MountedEcm, bodies: Bodies, *, seen: bool
 ) -> None:
     """Give an arm and the instrument collision shapes and, if `seen`, looks."""
-    for what in ("ecm",) if isinstance(params, MountedEcm) else ("psm", _look(params)):
-        add(spec, what, arm, bodies, seen=seen)
+    add(spec, "ecm" if isinstance(params, MountedEcm) else "psm", arm, bodies, seen=seen)
+    if isinstance(params, MountedPsm):
+        add_instrument(spec, arm, params, bodies, seen=seen)
     if isinstance(params.end_effector, Probe):
         body, _ = bodies[params.chain.joints[-1].name]
         body.add_geom(
@@ -55,6 +57,17 @@ def add_arm(
             group=_SEEN,
             **_instrument(arm),
         )
+
+
+def add_instrument(
+    spec: mujoco.MjSpec, owner: str, params: MountedPsm, bodies: Bodies, *, seen: bool
+) -> None:
+    """Give an instrument collision shapes and, if `seen`, looks.
+
+    `owner`: prefix of the names of the bodies. On a seat the housing goes with the instrument.
+    """
+    seat = {"insertion": bodies[SEAT]} if SEAT in bodies else {}
+    add(spec, _look(params), owner, {**bodies, **seat}, seen=seen)
 
 
 def _look(params: MountedPsm) -> str | Instrument:
@@ -117,9 +130,10 @@ def _label(what: str | Instrument, owner: str) -> str:
     return f"{owner}/{what.name}" if isinstance(what, Instrument) else what
 
 
-def _instrument(arm: str) -> dict[str, int]:
-    """Return the collision filter of shaft, wrist and fingers."""
-    return {"contype": _BIT[arm], "conaffinity": _THINGS | sum(_BIT.values()) - _BIT[arm]}
+def _instrument(owner: str) -> dict[str, int]:
+    """Return the collision filter of shaft, wrist and fingers; `owner`: an arm, or a spare of it."""
+    bit = _BIT[owner.partition("/")[0]]
+    return {"contype": bit, "conaffinity": _THINGS | sum(_BIT.values()) - bit}
 
 
 def _mesh(spec: mujoco.MjSpec, name: str, part: looks.Part, pose: Vector) -> str:

@@ -33,4 +33,5 @@ def add(spec: mujoco.MjSpec, scene: SceneParams) -> None:
             name = f"{BRAKED}/{joint.name}"
             spec.add_equality(name=brake(joint.name), name1=name, active=False, **joints, **RIGID)
     for arm, params in scene.arms.items():
-        add_ties(spec, arm, params.end_effector)
+        for owner, variant in params.by_owner(arm).items():
+            add_ties(spec, owner, variant.end_effector)

@@ -6,14 +6,18 @@ the end effector hang on the main chain; the axis of every joint is z of the lin
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from engines.mujoco.model.names import PARKED_M, SEAT
 from robots.dvrk.link import Follow, Link
 from robots.dvrk.linkage import LINKAGES
 from robots.dvrk.mounted import MountedArm
+from robots.dvrk.psm import ARM_JOINTS
 from robots.dvrk.setup_joints import CartArm
 
-__all__ = ["BASE", "links"]
+__all__ = ["BASE", "links", "spare_links"]
 
 BASE = "base"
 """The fixed link; the origin of the frame is the remote centre of motion."""
@@ -22,7 +26,7 @@ BASE = "base"
 def links(arm: CartArm, params: MountedArm) -> tuple[Link, ...]:
     """Return all moving links of `arm`, parents before children.
 
-    The order: joints, linkage, end effector.
+    The order: joints, linkage, end effector. An arm with spare instruments has a seat under the roll.
     """
     chain = params.chain
     poses = chain.frames(np.zeros(len(chain.joints)))
@@ -45,4 +49,24 @@ def links(arm: CartArm, params: MountedArm) -> tuple[Link, ...]:
             upper,
             Follow(passive.follows, passive.ratio),
         )
+    if len(params.variants) > 1:
+        tree = _seat_roll(tree)
     return *tree.values(), *params.end_effector_links
+
+
+def spare_links(arm: CartArm, spare: MountedArm) -> tuple[Link, ...]:
+    """Return the moving links of a spare instrument, the seat first, parents before children."""
+    shared = {joint.name for joint in ARM_JOINTS} | {one.name for one in LINKAGES[arm].joints}
+    tree = _seat_roll({link.name: link for link in links(arm, spare)})
+    return tuple(link for name, link in tree.items() if name not in shared)
+
+
+def _seat_roll(tree: dict[str, Link]) -> dict[str, Link]:
+    """Return `tree` with a seat between insertion and roll."""
+    carriage, seated = tree["insertion"], dict[str, Link]()
+    for name, link in tree.items():
+        if name == "roll":
+            seated[SEAT] = Link(SEAT, "insertion", "prismatic", carriage.pose, -PARKED_M, 0.0)
+            link = replace(link, parent=SEAT)
+        seated[name] = link
+    return seated

@@ -54,16 +54,16 @@ class ViewScene:
 
     @property
     def frames(self) -> tuple[Frame, ...]:
-        """The base and the tip of each arm."""
+        """The base and the tip of each arm; of an arm with spares the tip of each instrument."""
         sites = (self._model.site(i) for i in range(self._model.nsite))
         return tuple(
             Frame(
-                site.name,
+                f"{site.name.partition('/')[0]}/{site.name.rpartition('/')[2]}",
                 int(self._model.site_bodyid[site.id]),
                 [*map(float, site.pos), *map(float, np.roll(site.quat, -1))],
             )
             for site in sites
-            if site.name.partition("/")[2] in ("base", "tip")
+            if site.name.rpartition("/")[2] in ("base", "tip")
         )
 
     @property

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from engines.mujoco.model.seats import is_engaged, seat_place
 from engines.mujoco.params import SceneParams
 from engines.mujoco.truth.labels import Body
 from engines.mujoco.truth.sight import Sight, Viewpoint
@@ -50,8 +51,14 @@ class Instrument:
     """
     tip_turn: Vector
     """Turn of the tip frame in its body, shape (3, 3)."""
+    seat: int | None
+    """Place of the seat in `qpos`; None: an arm without spare instruments."""
     shaft: tuple[int, Vector, Vector]
     """Body, and the ends of the shaft's axis in its frame, the lower one first, shape (3,) each, m."""
+
+    def is_in_arm(self, data: mujoco.MjData) -> bool:
+        """Return whether the arm holds this one of its instruments."""
+        return is_engaged(data, self.seat)
 
     def keypoints(self, data: mujoco.MjData, sight: Sight, bodies: tuple[Body, ...]) -> dict[str, Keypoint]:
         """Return the keypoints in what a camera sees; `bodies`: of the scene."""
@@ -86,14 +93,18 @@ class Instrument:
 def instruments(params: SceneParams, model: mujoco.MjModel) -> tuple[Instrument, ...]:
     """Return the instruments of all PSMs of a scene."""
     psms = {name: arm for name, arm in params.arms.items() if isinstance(arm, MountedPsm)}
-    return tuple(_instrument(name, arm, model) for name, arm in psms.items())
+    return tuple(
+        _instrument(name, owner, one, model)
+        for name, arm in psms.items()
+        for owner, one in arm.by_owner(name).items()
+    )
 
 
-def _instrument(arm: str, params: MountedPsm, model: mujoco.MjModel) -> Instrument:
+def _instrument(arm: str, owner: str, params: MountedPsm, model: mujoco.MjModel) -> Instrument:
     roll, *wrist = [joint.name for joint in params.tool.joints]
-    body = model.body(f"{arm}/{roll}").id
+    body = model.body(f"{owner}/{roll}").id
     height = body_triangles(model, body, "shaft").vertices[:, 2]
-    last, tip = model.body(f"{arm}/{params.chain.joints[-1].name}").id, params.chain.tip
+    last, tip = model.body(f"{owner}/{params.chain.joints[-1].name}").id, params.chain.tip
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     ends = sorted(
@@ -101,14 +112,15 @@ def _instrument(arm: str, params: MountedPsm, model: mujoco.MjModel) -> Instrume
         key=lambda end: float(np.linalg.norm(_place(data, body, end) - _place(data, last, tip[:3, 3]))),
     )
     points = {"shaft_end": (body, ends[0])}
-    points |= {name: (model.body(f"{arm}/{name}").id, np.zeros(3)) for name in wrist}
+    points |= {name: (model.body(f"{owner}/{name}").id, np.zeros(3)) for name in wrist}
     points["tip"] = last, tip[:3, 3]
     parents = {link.parent for link in params.end_effector_links}
     fingers = [link.name for link in params.end_effector_links if link.name not in parents]
     for name in fingers or wrist[-1:]:  # a hook or a blade is fixed to the last link
-        finger = model.body(f"{arm}/{name}").id
+        finger = model.body(f"{owner}/{name}").id
         points[f"{name}_end"] = finger, _far_end(body_triangles(model, finger).vertices)
-    return Instrument(arm, params.tool.name, points, tip[:3, :3], (body, ends[0], ends[1]))
+    shaft = (body, ends[0], ends[1])
+    return Instrument(arm, params.tool.name, points, tip[:3, :3], seat_place(model, owner), shaft)
 
 
 def _far_end(points: Vector) -> Vector:

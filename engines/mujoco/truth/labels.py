@@ -64,7 +64,9 @@ def rigid_class(params: SceneParams, body: str) -> SceneClass:
         return SceneClass.NEEDLE if is_needle else SceneClass.OBJECT
     arm = next((mounted for name, mounted in params.arms.items() if name == owner), None)
     if isinstance(arm, MountedPsm):
-        return _instrument_class(arm, link)
+        spare, _, part = link.rpartition("/")
+        held = arm.by_owner(owner)[f"{owner}/{spare}" if spare else owner]
+        return _instrument_class(held, part)
     return SceneClass.ARM
 
 

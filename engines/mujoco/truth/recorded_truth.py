@@ -135,6 +135,7 @@ class RecordedTruth:
                 one.shaft_edges(data, view),
             )
             for one in self.scene.instruments
+            if one.is_in_arm(data)
         }
 
     def _poses(self, view: Viewpoint) -> dict[str, Vector]:

@@ -154,14 +154,21 @@ class Grasp:
         self._widest = 0.0
         """Widest spread of the fingers since first contact; during a grasp the spread at its beginning, m."""
         self._held, self._pull, self._lift = np.zeros(1), np.zeros(3), np.zeros(1)
+        self._lost: tuple[TissueGrasp, ...] = ()
+        """Events of the present step so far."""
         self.outputs = nothing_held(probe.name)
+
+    def take_away(self, t: int) -> None:
+        """Let go of the tissue at the beginning `t` (ns) of a step: the instrument leaves the arm."""
+        if self._holds:
+            self._lost = self._let_go("exchanged while holding", t)
 
     def update(self, t: int, *, looked: bool) -> None:
         """Grasp or release at the end `t` (ns) of a step.
 
         `looked`: the organs' nodes, and the contacts with them, have been read at the end of this step.
         """
-        events: tuple[TissueGrasp, ...] = ()
+        events, self._lost = self._lost, ()
         if self._holds:
             self._pull[:] = self._probe.forces[self._probe.held].sum(axis=0)
             if float(self._pull @ self._pull) > self._params.hold**2:

@@ -211,6 +211,20 @@ def test_a_state_with_held_tissue_goes_on_as_it_would_have():
     assert ends[0][1] > 1e-3
 
 
+def test_tissue_slides_off_an_instrument_that_is_taken_out_of_the_arm_in_an_exchange():
+    jaw = Jaw().take().go(CLOSED, LIFTED)
+    away = jaw.spheres(*LIFTED) + np.array([0.0, 0.0, 1000.0])
+    inputs = Inputs({"probe/position": away.ravel(), "probe/velocity": np.zeros(18)})
+    jaw.outputs |= jaw.engine.step(jaw.t, MS, inputs)
+    (event,) = jaw.outputs["probe/events"]
+    assert (event.event, event.body) == ("exchanged while holding", "block")
+    assert event.force_n > 0.1
+    assert jaw.outputs["probe/held"][0] == 0.0
+    jaw.t += MS
+    jaw.go((1000.0, 5e-3), (1000.0, 5e-3), 0.3)
+    assert np.abs(jaw.engine._organs[0].solid.displacement[:, :3]).max() < 5e-4
+
+
 def test_tissue_that_is_pulled_too_hard_tears_loose():
     jaw = Jaw(hold="0.3 N")
     jaw.go((3e-3, 5e-3), (0.5e-3, 5e-3)).go((0.5e-3, 5e-3), (0.5e-3, 2e-3), 0.2).go(
