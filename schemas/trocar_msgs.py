@@ -13,6 +13,7 @@ from schemas.message import (
     Float32Array,
     Float64,
     Float64Array,
+    Int32,
     Int32Array,
     Int64,
     Message,
@@ -56,6 +57,8 @@ __all__ = [
     "TaskEvent",
     "TissueEvent",
     "TissueGrasp",
+    "TubeClips",
+    "TubeEvent",
     "TubeLine",
 ]
 
@@ -216,6 +219,48 @@ class TubeLine(Message):
     """1: a clip shuts the ring."""
     parted: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
     """1: the tube is parted between this ring and the next."""
+
+
+class TubeClips(Message):
+    """All clips that have closed on a tube since time 0."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/TubeClips"
+    header: Header
+    body: String
+    numbers: Int32Array = Field(default_factory=lambda: np.zeros(0, np.int32))
+    """Number of each clip on this tube, from 0 in the order of closing."""
+    along_m: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Place of each clip as in `TubeLine.along_m`."""
+    on: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
+    """1: the clip is on the tube and shuts it; 0: it was pulled off."""
+    instruments: StringArray = Field(default_factory=list[str])
+    """Probe that closed each clip."""
+
+
+class TubeEvent(Message):
+    """Something happened to a tube: a clip, or a parting."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/TubeEvent"
+    header: Header
+    kind: String
+    """`clipped`, `clip slipped`, `clip not across`, `clip pulled off` or `parted`."""
+    body: String
+    instrument: String = ""
+    """Name of the probe; empty: none."""
+    position: Point = Field(default_factory=Point)
+    """Place, m, in `header.frame_id`."""
+    along_m: Float64 = 0.0
+    """Place along the tube at rest, as in `TubeLine.along_m`."""
+    clip: Int32 = -1
+    """Number of the clip as in `TubeClips`; -1: none."""
+    others: StringArray = Field(default_factory=list[str])
+    """Other organs between the jaws of a clip."""
+    cause: String = ""
+    """Why a clip slipped; whether a tube was `cut`, `torn` or `burnt` apart."""
+    left_clips: UInt32 = 0
+    """Clips on the tube on the left of a parting, up to its end or the next parting."""
+    right_clips: UInt32 = 0
+    """The same on the right."""
 
 
 class ShownMarkers(Message):

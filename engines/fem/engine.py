@@ -111,10 +111,10 @@ class FemEngine(Stepped):
             )
             pairs = (attachment.organs for attachment in self.params.attachments.values())
             tied = [(names.index(one), names.index(other)) for one, other in pairs]
-            plan = own_sub_steps(seconds, longest, plan.count, nodes, tied)
+            plan = own_sub_steps(seconds, longest, plan.total, nodes, tied)
         for organ, every in zip(self._organs, plan.every, strict=True):
             organ.every = every
-        return plan.count
+        return plan.total
 
     def _settle(self) -> None:
         """Let the organs come to rest, side by side where they touch."""

@@ -125,6 +125,15 @@ class Organ:
         return self.solid.origin
 
     @property
+    def probes(self) -> list[str]:
+        """Names of the probes that may touch the organ."""
+        return list(dict.fromkeys(self._spheres.probes))
+
+    def probe_of(self, sphere: int) -> str:
+        """Return the name of the probe of a sphere."""
+        return self._spheres.probes[sphere]
+
+    @property
     def held(self) -> NDArray[np.bool_]:
         """Nodes held by a grasp, shape (n,)."""
         return self.solid.holder >= 0

@@ -24,7 +24,7 @@ _CONTACT_SHARE = 0.2
 class SubSteps(NamedTuple):
     """Sub-steps of a step."""
 
-    count: int
+    total: int
     every: tuple[int, ...]
     """Sub-steps between the forces of the elements of each organ."""
 
@@ -69,4 +69,4 @@ def _with_multiple(
 def _cost(plan: SubSteps, nodes: Sequence[int]) -> float:
     """Return about how many nodes are served in a step."""
     forces = sum(own / every for own, every in zip(nodes, plan.every, strict=True))
-    return plan.count * (forces + _CONTACT_SHARE * sum(nodes))
+    return plan.total * (forces + _CONTACT_SHARE * sum(nodes))

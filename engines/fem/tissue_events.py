@@ -62,6 +62,8 @@ class TissueEvents:
         """First and last change, ns."""
         self._is_fresh: NDArray[np.bool_] = np.zeros(rows, np.bool_)
         """Changes of the present step."""
+        self._latest: NDArray[np.int64] = np.full(2, _NONE)
+        """Kind and instrument of the latest change."""
         self._said: list[tuple[str, str, Vector, float, str]] = []
         """Kind, instrument, place, size and unit of the single events of the present step."""
 
@@ -74,6 +76,13 @@ class TissueEvents:
         row, instruments = _KINDS.index(kind), self._number[spheres]
         np.add.at(self._sums[row], instruments, np.column_stack([sizes, sizes[:, None] * places]))
         self._is_fresh[row, instruments] = True
+        self._latest[:] = row, np.bincount(instruments, sizes).argmax()
+
+    @property
+    def latest(self) -> tuple[str, str]:
+        """Kind and instrument of the latest change; empty: there was none, or no instrument."""
+        kind, instrument = int(self._latest[0]), int(self._latest[1])
+        return ("", "") if kind == _NONE else (_KINDS[kind], self._names[instrument])
 
     def say(self, kind: str, instrument: str, place: Vector, size: float, unit: str) -> None:
         """Add a single event of the present step. `place`: m, in `world`, shape (3,)."""
@@ -102,12 +111,12 @@ class TissueEvents:
 
     @property
     def state(self) -> tuple[NDArray[np.generic], ...]:
-        """Sums and times between steps, to be written."""
-        return self._sums, self._times
+        """Sums, times and latest change between steps, to be written."""
+        return self._sums, self._times, self._latest
 
     def restore(self, parts: Iterator[bytes]) -> None:
         """Go back to a saved `state`."""
-        for array in (self._sums, self._times):
+        for array in self.state:
             array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
 
 

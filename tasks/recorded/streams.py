@@ -55,7 +55,8 @@ def score(task: Task, streams: Mapping[str, Stream], period_ns: int) -> Scored:
     queues = {port.name for port in inputs_of if port.variability == "event"}
     arrived: dict[str, tuple[Message, ...]] = {}
     places, inputs, events = dict.fromkeys(known, 0), Inputs(values, events=arrived), list[TaskEvent]()
-    outputs = task.configure(Setup(period_ns, Path(), connected=frozenset(known)))
+    connected = known.keys() | (queues & streams.keys())  # a queue without a message is connected too
+    outputs = task.configure(Setup(period_ns, Path(), connected=frozenset(connected)))
     for t in range(begin_ns, end_ns - period_ns + 1, period_ns):
         for name, stream in known.items():
             first = places[name]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from engines.fem.blood.clips import Clips
 from engines.fem.blood.film import BILE, BLOOD, QUANTUM, Film
 from engines.fem.blood.lumen import Lumen
+from engines.fem.blood.tube_events import TubeEvents
 from engines.fem.blood.tube_line import tube_line
 from engines.fem.heat.tissue import tissue_of
 from engines.fem.organ import Organ
@@ -45,9 +46,12 @@ class Bleeding:
         self.lumen: Lumen | None = None
         self.clips: Clips | None = None
         """Clips on a tube."""
+        self.tube: TubeEvents | None = None
+        """Events of a tube."""
         if params.lumen is not None and (wall := params.inner_wall) is not None:
             self.lumen = Lumen(params.lumen, liquid, organ, wall)
             self.clips = Clips(organ, self.lumen, wall.rings.size)
+            self.tube = TubeEvents(organ, self.lumen, self.clips)
         self._opened: NDArray[np.int64] = np.full(len(organ.surface.faces), _CLOSED)
         """Time at which each face began to bleed, ns, or -1, shape (f,)."""
         self._book: NDArray[np.int64] = np.zeros(3, np.int64)
@@ -86,8 +90,11 @@ class Bleeding:
     def step(self, t: int, seconds: float) -> None:
         """Bleed and run for `seconds` until `t` ns."""
         self._follow()
-        for lost in () if self.clips is None else self.clips.watch():
-            self.organ.events.say("clip pulled off", "", lost.place, lost.force, "N")
+        if self.clips is not None and self.tube is not None:
+            self.tube.watch()
+            for lost in self.clips.watch():
+                self.organ.events.say("clip pulled off", "", lost.place, lost.force, "N")
+                self.tube.say_lost(lost)
         faces, nodes = self.organ.surface.faces, self.organ.nodes
         bleeds = self.organ.surface.kinds == FaceKind.CUT
         if not bleeds.any() and not self._book[_EMITTED]:
@@ -158,7 +165,7 @@ class Bleeding:
     @property
     def state(self) -> tuple[NDArray[Any], ...]:
         """Arrays that the next step depends on."""
-        clips = () if self.clips is None else self.clips.state
+        clips = () if self.clips is None or self.tube is None else (*self.clips.state, self.tube.parted)
         return self.film.amounts, self._opened, self._book, self._rate, self._source, *clips
 
     def restore(self, parts: Iterator[bytes]) -> None:
@@ -167,7 +174,9 @@ class Bleeding:
             np.frombuffer(next(parts), array.dtype) for array in self.state
         )
         if self.clips is not None:
-            self.clips.restore(*clips)
+            self.clips.restore(*clips[:-1])
+        if self.tube is not None:
+            self.tube.parted = clips[-1].copy()
         self.film.amounts, self._opened = amounts.copy(), opened.copy()
         self._book[:], self._rate[:], self._source[:] = book, rate, source
         self._known = _UNKNOWN

@@ -12,6 +12,7 @@ from engines.fem.blood.bleeding import Bleeding
 from engines.fem.blood.clip import ClipApplier, clip_ports
 from engines.fem.blood.clip_markers import clip_markers
 from engines.fem.blood.suction import Suction, suction_ports
+from engines.fem.blood.tube_events import tube_ports
 from engines.fem.blood.tube_line import line_port
 from engines.fem.organ import Organ
 from engines.fem.probe import Probe
@@ -35,6 +36,7 @@ def blood_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
     return (
         *(port for organ in organs for port in _organ_ports(organ, params.node_period)),
         *(line_port(organ, params.node_period) for organ in tubes),
+        *(port for organ in tubes for port in tube_ports(organ, params.node_period)),
         *(port for name in suctions for port in suction_ports(name)),
         *(port for name in clips for port in clip_ports(name)),
         *((_clip_bodies(params.node_period),) if clips else ()),
@@ -89,6 +91,7 @@ class Blood:
             for probe in probes
             if (clip := params.probes[probe.name].clip) is not None
         ]
+        self._organs = organs
         self._elapsed = np.zeros(1)
         """Time since the last step of blood, s."""
         self.outputs = self._read()
@@ -98,7 +101,7 @@ class Blood:
         """Go on by `h` ns to `t`, where the nodes have been read if `looked`; return the outputs."""
         self._elapsed += h * 1e-9
         for applier in self._appliers:
-            applier.step(inputs, self.bleedings)
+            applier.step(inputs, self.bleedings, self._organs)
         if looked:
             seconds = float(self._elapsed[0])
             self._elapsed[:] = 0.0
@@ -107,14 +110,15 @@ class Blood:
             for suction in self._suctions:
                 suction.step(inputs, self.bleedings, seconds)
             self.outputs = self._read()
-        return self.outputs
+        happened = ((f"{one.organ.name}/tube", one.tube) for one in self.bleedings if one.tube is not None)
+        return self.outputs | {port: tube.finish(t) for port, tube in happened}
 
     def pictures(self, t: int) -> dict[str, Value]:
         """Return the films, the middle lines of tubes, and the clips, at `t` ns."""
         found: dict[str, Value] = {f"{one.organ.name}/film": one.picture(t) for one in self.bleedings}
         for one in self.bleedings:
-            if (line := one.line(t)) is not None:
-                found[f"{one.organ.name}/line"] = line
+            if one.tube is not None and (line := one.line(t)) is not None:
+                found[f"{one.organ.name}/line"], found[f"{one.organ.name}/clips"] = line, one.tube.clips(t)
         return found | {"clips": self._clip_bodies(t)} if self._appliers else found
 
     def _clip_bodies(self, t: int) -> ShownMarkers:
@@ -136,6 +140,8 @@ class Blood:
         for bleeding in self.bleedings:
             name, volumes = bleeding.organ.name, bleeding.volumes
             found[f"{name}/bleeding"] = np.array([bleeding.rate])
+            if bleeding.tube is not None:
+                found[f"{name}/tube"] = ()
             found[f"{name}/blood/lost"], found[f"{name}/blood/surface"] = volumes[:1], volumes[1:2]
         for suction in self._suctions:
             found.update(suction.outputs)

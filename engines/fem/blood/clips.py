@@ -12,20 +12,34 @@ from engines.fem.organ import Organ
 from engines.tissue.probes.clip import ClipParams
 from schemas.vectors import Vector
 
-__all__ = ["MOST_CLIPS", "ClipBody", "Clips", "Lost"]
+__all__ = ["MOST_CLIPS", "ClipBody", "Clips", "ClosedClip", "Lost"]
 
 MOST_CLIPS = 32
-"""Most clips on a tube at a time."""
-_ON, _RING, _FIRST, _LAST, _SECTOR, _LENGTH, _WIDTH, _ALONG, _ACROSS = range(9)
+"""Most clips of a tube since time 0."""
+_ON, _RING, _FIRST, _LAST, _SECTOR, _LENGTH, _WIDTH, _ALONG, _ACROSS, _PROBE = range(10)
 
 
 class Lost(NamedTuple):
     """A clip that has come off."""
 
+    number: int
+    ring: int
+    instrument: str
+    """Probe that pulled."""
     place: Vector
     """m, in `world`, shape (3,)."""
     force: float
     """Pull just before, N."""
+
+
+class ClosedClip(NamedTuple):
+    """A clip since it was closed."""
+
+    number: int
+    ring: int
+    instrument: str
+    """Probe that closed the clip."""
+    is_on: bool
 
 
 class ClipBody(NamedTuple):
@@ -50,15 +64,18 @@ class Clips:
     def __init__(self, organ: Organ, lumen: Lumen, room: int) -> None:
         """`room`: for ties."""
         self._organ, self._lumen = organ, lumen
-        self._rows: Vector = np.zeros((MOST_CLIPS, 9))
+        self._rows: Vector = np.zeros((MOST_CLIPS, 10))
         self._clip_of: NDArray[np.int64] = np.full(room, -1)
         """Clip of each tie, shape (room,)."""
 
-    def put(self, ring: int, closing: Vector, params: ClipParams) -> bool:
-        """Shut the rings within half a clip's width of a ring, along `closing`; False: no clip is left."""
-        free = np.flatnonzero(self._rows[:, _ON] == 0.0)
+    def put(self, ring: int, closing: Vector, params: ClipParams, instrument: str) -> int:
+        """Shut the rings within half a clip's width of a ring, along `closing`.
+
+        Return the number of the clip; -1: no clip is left.
+        """
+        free = np.flatnonzero(self._rows[:, _LENGTH] == 0.0)
         if not free.size:
-            return False
+            return -1
         first, last = self._lumen.rings_near(ring, 0.5 * params.width)
         sector, number = self._lumen.sector_towards(ring, closing), int(free[0])
         fresh = [one for one in range(first, last + 1) if not self._lumen.shut[one]]
@@ -69,9 +86,10 @@ class Clips:
             self._organ.solid.tie(tied)
             self._clip_of[begun : begun + len(tied)] = number
         shape = params.length, params.width, params.hold_along, params.hold_across
-        self._rows[number] = 1.0, ring, first, last, sector, *shape
+        probe = self._organ.probes.index(instrument)
+        self._rows[number] = 1.0, ring, first, last, sector, *shape, probe
         self._shut()
-        return True
+        return number
 
     def watch(self) -> list[Lost]:
         """Take off the clips that instruments pull at too hard, and return them.
@@ -91,8 +109,10 @@ class Clips:
             whole = float((pull * pull).sum())
             across = max(0.0, whole - along * along)
             if (along / row[_ALONG]) ** 2 + across / row[_ACROSS] ** 2 > 1.0:
+                holders = self._organ.solid.holder[nodes]
+                holder = self._organ.probe_of(int(holders[holders >= 0][0]))
                 self._take_off(number)
-                lost.append(Lost(self._lumen.middles[ring], float(np.sqrt(whole))))
+                lost.append(Lost(number, ring, holder, self._lumen.middles[ring], float(np.sqrt(whole))))
         return lost
 
     def _take_off(self, number: int) -> None:
@@ -102,13 +122,22 @@ class Clips:
         self._organ.solid.tie(ties)
         self._clip_of[:] = -1
         self._clip_of[: len(clips)] = clips
-        self._rows[number] = 0.0
+        self._rows[number, _ON] = 0.0
         self._shut()
 
     def _shut(self) -> None:
         self._lumen.shut[:] = False
         for row in self._rows[self._rows[:, _ON] > 0.0].astype(np.int64):
             self._lumen.shut[row[_FIRST] : row[_LAST] + 1] = True
+
+    @property
+    def closed(self) -> list[ClosedClip]:
+        """All clips since time 0, in the order of closing."""
+        rows = self._rows[self._rows[:, _LENGTH] > 0.0]
+        return [
+            ClosedClip(number, int(row[_RING]), self._organ.probes[int(row[_PROBE])], bool(row[_ON]))
+            for number, row in enumerate(rows)
+        ]
 
     @property
     def bodies(self) -> list[ClipBody]:

@@ -120,15 +120,19 @@ class Lumen:
         """Middle of every ring now, m, in `world`, shape (r, 3)."""
         return self._organ.nodes[self._rings].mean(axis=1)
 
+    def direction(self, ring: int) -> Vector:
+        """Return the direction of the tube at a ring, a unit vector, shape (3,)."""
+        middles = self.middles
+        along: Vector = middles[min(ring + _BESIDE, len(middles) - 1)] - middles[max(ring - _BESIDE, 0)]
+        return along / max(float(np.linalg.norm(along)), 1e-12)
+
     def frame_at(self, ring: int, sector: int) -> Vector:
         """Return the axes of a flattened ring: across the tube, along the tube, and where its walls meet.
 
         `sector`: the pressed one. Shape (3, 3), a column each.
         """
-        middles, quarter = self.middles, self._rings.shape[1] // 4
-        along: Vector = middles[min(ring + _BESIDE, len(middles) - 1)] - middles[max(ring - _BESIDE, 0)]
+        quarter, along = self._rings.shape[1] // 4, self.direction(ring)
         one, other = self._organ.nodes[self._rings[ring, [sector - quarter, sector - 3 * quarter]]]
-        along /= max(float(np.linalg.norm(along)), 1e-12)
         across: Vector = one - other - float((along * (one - other)).sum()) * along
         across /= max(float(np.linalg.norm(across)), 1e-12)
         return np.column_stack([across, along, cross(across, along)])

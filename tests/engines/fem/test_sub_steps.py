@@ -34,8 +34,8 @@ def test_a_plan_gives_soft_organs_longer_steps_by_powers_of_two():
     assert common_sub_steps(1e-3, [400e-6, 30e-6]) == (34, (1, 1))
     assert common_sub_steps(1e-3, [400e-6], 7) == (7, (1,))
     plan = own_sub_steps(1e-3, [400e-6, 30e-6, 75e-6], 34, [500, 100, 100])
-    assert plan.count % max(plan.every) == 0
-    step = 1e-3 / plan.count
+    assert plan.total % max(plan.every) == 0
+    step = 1e-3 / plan.total
     assert plan.every[1] == 1
     assert plan.every[0] == 8
     for every, longest in zip(plan.every, [400e-6, 30e-6, 75e-6], strict=True):
