@@ -41,6 +41,7 @@ EventKind = Literal[
     "wrong structure hurt",
     "clip too near",
     "clip oblique",
+    "clip across two",
     "clip not across",
     "clip slipped",
     "clip pulled off",

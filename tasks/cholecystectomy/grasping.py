@@ -43,9 +43,10 @@ class Grasping(Watch[GraspingState]):
             state.time[i] += now.period_s * arm.held
             state.pull[i] = max(float(state.pull[i]), arm.pull)
             state.exchanges[i] += arm.exchanges
-            if arm.exchanges and arm.held:
-                yield Event("exchanged while holding", arm=i)
             kinds = {grasp.event for grasp in arm.grasps}
+            # as commanded, else as the tissue tells
+            if arm.exchanges and arm.held if arm.can_exchange else "exchanged while holding" in kinds:
+                yield Event("exchanged while holding", arm=i)
             state.grasps[i] += "grasped" in kinds  # a grasp of two organs is one
             state.torn[i] += "torn" in kinds
             for grasp in arm.grasps:

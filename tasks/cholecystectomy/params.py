@@ -59,6 +59,12 @@ class CholecystectomyParams(TaskParams):
         description="ml of blood beyond which the operation has failed; ours (usual: 5 to 20 ml)",
     )
 
+    @property
+    def probes(self) -> dict[str, tuple[str, ...]]:
+        """Probes in tissue of each arm with instruments: the mounted one, and each spare."""
+        owners = {arm: self.arms[arm].by_owner(arm) for arm in self.psms}
+        return {arm: tuple(owner.replace("/", "_") for owner in own) for arm, own in owners.items()}
+
     @model_validator(mode="after")
     def _room_for_a_cut(self) -> Self:
         if self.stays > self.clips:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from hub.participant import event_in, signal_in, signal_out
 from schemas.ports import Port
 from schemas.ros import Float64Message, StringMessage
-from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeLine
+from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeEvent, TubeLine
 from tasks.cholecystectomy.organs import BOWEL, FAT_BED, JOINTS, LIVER, ORGANS, PLATE, TUBES
 
 __all__ = ["operation_outputs", "tissue_inputs"]
@@ -17,12 +17,13 @@ _MASSES = (LIVER, BOWEL)
 """Organs without a line, to which distances are measured."""
 
 
-def tissue_inputs(arms: Sequence[str]) -> Iterator[Port]:
-    """Yield the inputs about tissue, all of which may be left unconnected."""
+def tissue_inputs(arms: Mapping[str, Sequence[str]]) -> Iterator[Port]:
+    """Yield the inputs about tissue, all of which may be left unconnected. `arms`: probes by arm."""
     for organ in ORGANS:
         yield from _organ_inputs(f"tissue/{organ}")
     for organ in TUBES:
         yield signal_in(f"tissue/{organ}/line", TubeLine, "middle line of the tube", frame="world", start=())
+        yield event_in(f"tissue/{organ}/tube", TubeEvent, "clips and partings, with their place")
     for organ in _MASSES:
         yield signal_in(
             f"tissue/{organ}/nodes", SoftBodyState, "for distances of burns", frame="world", start=()
@@ -32,30 +33,30 @@ def tissue_inputs(arms: Sequence[str]) -> Iterator[Port]:
             yield signal_in(f"tissue/{attachment}/{part}", description=meaning, unit="m^2", start=(0.0,))
     third = "share that is free of the lower third"
     yield signal_in(f"tissue/{PLATE}/lower_third", description=third, start=(0.0,))
-    for arm in arms:
-        yield from _arm_inputs(arm)
+    for arm, probes in arms.items():
+        yield signal_in(f"{arm}/energy", description="power of the generator", unit="W", start=(0.0,))
+        yield event_in(f"{arm}/set_tool_type", StringMessage, "command to exchange the instrument")
+        for probe in probes:
+            yield from _probe_inputs(f"tissue/{probe}")
 
 
 def _organ_inputs(prefix: str) -> Iterator[Port]:
     yield event_in(f"{prefix}/events", TissueEvent, "of an organ of kind fem")
     yield signal_in(f"{prefix}/blood/lost", description="blood or bile lost", unit="ml", start=(0.0,))
     yield signal_in(f"{prefix}/bleeding", description="flow of blood or bile", unit="ml/s", start=(0.0,))
-    yield signal_in(f"{prefix}/cut_area", description="area swept by edges", unit="m^2", start=(0.0,))
     yield signal_in(
         f"{prefix}/hottest", description="highest temperature", unit="degC", start=(_BODY_TEMPERATURE,)
     )
 
 
-def _arm_inputs(arm: str) -> Iterator[Port]:
-    yield signal_in(f"{arm}/energy", description="power of the generator", unit="W", start=(0.0,))
-    yield signal_in(f"tissue/{arm}/delivered", description="heat given to tissue", unit="J", start=(0.0,))
-    yield signal_in(f"tissue/{arm}/held", Float64Message, "1 while tissue is held", start=(0.0,))
+def _probe_inputs(prefix: str) -> Iterator[Port]:
+    yield signal_in(f"{prefix}/delivered", description="heat given to tissue", unit="J", start=(0.0,))
+    yield signal_in(f"{prefix}/held", Float64Message, "1 while tissue is held", start=(0.0,))
     pull = "force on the tissue that is held"
     yield signal_in(
-        f"tissue/{arm}/pull", description=pull, size=3, unit="N", frame="world", start=(0.0, 0.0, 0.0)
+        f"{prefix}/pull", description=pull, size=3, unit="N", frame="world", start=(0.0, 0.0, 0.0)
     )
-    yield event_in(f"tissue/{arm}/events", TissueGrasp, "grasped, released, torn")
-    yield event_in(f"{arm}/set_tool_type", StringMessage, "command to exchange the instrument")
+    yield event_in(f"{prefix}/events", TissueGrasp, "grasped, released, torn")
 
 
 def operation_outputs() -> Iterator[Port]:

@@ -42,7 +42,7 @@ class CholecystectomyTask(Task):
     default_rules: ClassVar[tuple[str, ...]] = ("cvs-doublet", "goals", "gears", "osats", "ochra", "mscore")
 
     def __init__(self, name: str, params: CholecystectomyParams) -> None:
-        self._seen = seen = TissueSeen(params.psms)
+        self._seen = seen = TissueSeen(params.probes)
         self._bases = [base_pose(params, arm)[:3, :3] for arm in params.psms]
         self._turns: Vector = np.zeros((len(params.psms), 4))
         self._tubes = tuple(TubeWatch(tube, params, self._axis) for tube in TARGETS)
@@ -87,7 +87,7 @@ class CholecystectomyTask(Task):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Inputs of every task, tissue and energy; outputs for the summary."""
-        return (*super().ports, *tissue_inputs(self.params.psms), *operation_outputs())
+        return (*super().ports, *tissue_inputs(self.params.probes), *operation_outputs())
 
     def configure(self, setup: Setup) -> Outputs:
         """Prepare metrics and rules for the connected inputs."""
@@ -110,7 +110,7 @@ class CholecystectomyTask(Task):
         self._losses.observe(now)
         found: list[Event] = [*self._grasping.observe(now), *self._energy.observe(now)]
         for tube in self._tubes:
-            found += tube.observe(seen.organs[tube.name], seen.arm_index, now)
+            found += tube.observe(seen.organs[tube.name], seen.arm_index)
         found += self._harm.observe(seen.arm_index)
         is_clipped = any(event.kind == "clip closed" for event in found)
         found += self._view.observe(is_clipped=is_clipped)

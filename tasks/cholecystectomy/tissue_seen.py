@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
 
 from hub.participant import Inputs
-from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeLine
+from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeEvent, TubeLine
 from schemas.vectors import Vector
 from tasks.cholecystectomy.organs import BILE, FAT, FAT_BED, JOINTS, ORGANS, PLATE, TARGETS, TUBES
 from tasks.cholecystectomy.tube_line import Tube
@@ -40,8 +40,8 @@ class OrganSeen:
     """Liquid flowing out, ml/s."""
     hottest: float = 0.0
     """Highest temperature, degrees C."""
-    cut_area: float = 0.0
-    """Area swept by edges so far, m^2."""
+    tube_events: tuple[TubeEvent, ...] = ()
+    """Clips and partings since the last instant."""
     tube: Tube | None = None
     nodes: Vector = field(default_factory=lambda: np.zeros((0, 3)))
     """Nodes of an organ without a line, m, shape (n, 3)."""
@@ -49,9 +49,11 @@ class OrganSeen:
 
 @dataclass
 class ArmSeen:
-    """An instrument at an instant."""
+    """An arm with its instrument at an instant."""
 
     name: str
+    probes: tuple[str, ...]
+    """Probes of all instruments of the arm."""
     has_energy: bool = False
     """Whether power and heat are connected."""
     has_grasp: bool = False
@@ -74,9 +76,11 @@ class ArmSeen:
 class TissueSeen:
     """All organs and instruments; finite numbers alone, as a card has no others."""
 
-    def __init__(self, arms: Sequence[str]) -> None:
+    def __init__(self, arms: Mapping[str, tuple[str, ...]]) -> None:
+        """`arms`: probes by arm."""
         self.organs = {name: OrganSeen(name) for name in ORGANS}
-        self.arms = [ArmSeen(name) for name in arms]
+        self.arms = [ArmSeen(name, probes) for name, probes in arms.items()]
+        self._arm_of = {probe: i for i, probes in enumerate(arms.values()) for probe in probes}
         self.freed: dict[str, float] = {}
         """Parted area of each connected attachment, m^2."""
         self.shares: dict[str, float] = {}
@@ -90,11 +94,12 @@ class TissueSeen:
             organ.is_known = f"tissue/{name}/events" in connected
             organ.has_liquid = f"tissue/{name}/blood/lost" in connected
             organ.has_heat = f"tissue/{name}/hottest" in connected
-            organ.has_line = f"tissue/{name}/line" in connected
+            organ.has_line = {f"tissue/{name}/line", f"tissue/{name}/tube"} <= connected
         for arm in self.arms:
-            arm.has_energy = {f"{arm.name}/energy", f"tissue/{arm.name}/delivered"} <= connected
+            heats = {f"tissue/{probe}/delivered" for probe in arm.probes}
+            arm.has_energy = f"{arm.name}/energy" in connected and not heats.isdisjoint(connected)
             arm.can_exchange = f"{arm.name}/set_tool_type" in connected
-            arm.has_grasp = f"tissue/{arm.name}/held" in connected
+            arm.has_grasp = any(f"tissue/{probe}/held" in connected for probe in arm.probes)
         known = [name for name in (PLATE, FAT_BED, *JOINTS) if f"tissue/{name}/freed" in connected]
         self.freed, self.shares = dict.fromkeys(known, 0.0), dict.fromkeys(known, 0.0)
         self._has_third = f"tissue/{PLATE}/lower_third" in connected
@@ -107,8 +112,9 @@ class TissueSeen:
             organ.lost = float(inputs[f"tissue/{name}/blood/lost"][0])
             organ.flow = float(inputs[f"tissue/{name}/bleeding"][0])
             organ.hottest = float(inputs[f"tissue/{name}/hottest"][0])
-            organ.cut_area = float(inputs[f"tissue/{name}/cut_area"][0])
         for name in TUBES:
+            events = inputs.events(f"tissue/{name}/tube")
+            self.organs[name].tube_events = cast("tuple[TubeEvent, ...]", events)
             if self.organs[name].has_line:
                 message = inputs.message(f"tissue/{name}/line")
                 self.organs[name].tube = Tube.read(message) if isinstance(message, TubeLine) else None
@@ -125,17 +131,18 @@ class TissueSeen:
             self.plate_freed = float(inputs[f"tissue/{PLATE}/lower_third"][0])
 
     def _read_arm(self, inputs: Inputs, arm: ArmSeen) -> None:
+        prefixes = [f"tissue/{probe}" for probe in arm.probes]
         arm.power = max(0.0, float(inputs[f"{arm.name}/energy"][0]))
-        arm.delivered = float(inputs[f"tissue/{arm.name}/delivered"][0])
-        arm.held = bool(inputs[f"tissue/{arm.name}/held"][0] > 0.0)
-        arm.pull = float(np.linalg.norm(inputs[f"tissue/{arm.name}/pull"]))
+        arm.delivered = float(sum(inputs[f"{prefix}/delivered"][0] for prefix in prefixes))
+        arm.held = any(inputs[f"{prefix}/held"][0] > 0.0 for prefix in prefixes)
+        arm.pull = max(float(np.linalg.norm(inputs[f"{prefix}/pull"])) for prefix in prefixes)
         arm.exchanges = len(inputs.events(f"{arm.name}/set_tool_type"))
-        arm.grasps = cast("tuple[TissueGrasp, ...]", inputs.events(f"tissue/{arm.name}/events"))
+        found = (inputs.events(f"{prefix}/events") for prefix in prefixes)
+        arm.grasps = cast("tuple[TissueGrasp, ...]", tuple(grasp for grasps in found for grasp in grasps))
 
     def arm_index(self, instrument: str) -> int:
-        """Return the index of the arm with this probe, `PSM1` or a spare `PSM1/...`; -1: none."""
-        owner = instrument.partition("/")[0]
-        return next((i for i, arm in enumerate(self.arms) if arm.name == owner), -1)
+        """Return the index of the arm with this probe, -1: none."""
+        return self._arm_of.get(instrument, -1)
 
     def has_parted(self, attachment: str) -> bool:
         """Return whether a part of an attachment has come off."""

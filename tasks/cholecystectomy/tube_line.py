@@ -53,12 +53,6 @@ class Tube:
         """Length at rest, m."""
         return float(self._along[-1])
 
-    @property
-    def partings(self) -> list[float]:
-        """Places where the tube is parted: distances from the left end at rest, m."""
-        rings = np.flatnonzero(self._parted[:-1])
-        return [float(0.5 * (self._along[ring] + self._along[ring + 1])) for ring in rings]
-
     def place(self, point: Vector) -> Place:
         """Return the place of a point, m, in `world`, shape (3,)."""
         starts, ways = self._points[:-1], np.diff(self._points, axis=0)

@@ -31,7 +31,6 @@ class TubeMetrics(Watch[TubeState]):
             ("clips_slipped", state.slipped),
             ("clips_pulled_off", state.pulled_off),
             ("cuts", state.cut_count),
-            ("tears", state.tears),
         ):
             yield value_or_reason(f"{self._word}/{name}", float(value), "", reason)
         if not organ.has_line:

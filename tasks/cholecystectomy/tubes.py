@@ -7,25 +7,18 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from hub.participant import Record, array, integer, number
-from schemas.trocar_msgs import TissueEvent
+from schemas.trocar_msgs import TubeEvent
 from schemas.vectors import Vector
-from tasks.cholecystectomy.organs import DUCT, ORGANS
+from tasks.cholecystectomy.organs import DUCT, ORGANS, TUBES
 from tasks.cholecystectomy.params import CholecystectomyParams
 from tasks.cholecystectomy.tissue_seen import OrganSeen
 from tasks.events import Event
-from tasks.instant import Instant
 
 __all__ = ["TubeWatch"]
 
 _MOST_CLIPS, _MOST_CUTS = 32, 4
-_ALONG, _TILT, _WIDTH = range(3)
+_NUMBER, _ALONG, _TILT, _WIDTH = range(4)
 _UNKNOWN = -1.0
-_CUT_WINDOW = 0.5
-"""Time after the last sweep of an edge within which a parting is a cut, s; else the tube has torn."""
-_BURNT_THROUGH = 90.0
-"""Temperature at which a parting is a cut by heat, degrees C."""
-_NEAR_JOINT = 1e-3
-"""Slack of a clip's distance from the end of a tube, m."""
 
 Axis = Callable[[int], Vector]
 """Direction in which an arm's tip points, in `world`, shape (3,)."""
@@ -34,8 +27,10 @@ Axis = Callable[[int], Vector]
 class TubeState(Record):
     """Clips and cuts of a tube."""
 
-    clips = array(_MOST_CLIPS, 3)
-    """Distance from the left end, m, deviation from square, rad (-1: unknown), and width, m, of each clip."""
+    clips = array(_MOST_CLIPS, 4)
+    """Number, distance from the left end, m, deviation from square, rad (-1: unknown), and width, m, of each
+    closed clip.
+    """
     count = integer()
     """Number of closed clips."""
     length = number(_UNKNOWN)
@@ -47,13 +42,8 @@ class TubeState(Record):
     """Tissue between the first cut and the next clips towards gallbladder and patient, m; -1: no clip."""
     stays = integer()
     """Number of clips on the patient's side at the first cut."""
-    area = number()
-    """Area swept by edges, m^2."""
-    swept_at = number(-1.0)
-    """Time of the last sweep of an edge, s."""
     slipped = integer()
     pulled_off = integer()
-    tears = integer()
 
 
 class TubeWatch:
@@ -82,42 +72,44 @@ class TubeWatch:
         found = self.state.clips[: self.state.count, _TILT]
         return found[found >= 0.0]
 
-    def observe(self, organ: OrganSeen, arm_of: Callable[[str], int], now: Instant) -> Iterator[Event]:
+    def observe(self, organ: OrganSeen, arm_of: Callable[[str], int]) -> Iterator[Event]:
         """Yield the events of an instant."""
         state = self.state
         if organ.tube is not None and state.length < 0.0:
             state.length = organ.tube.length
-        if organ.cut_area > state.area:
-            state.area, state.swept_at = organ.cut_area, now.time_s
-        yield from self._part(organ, now)
-        for event in organ.events:
+        widths = [event.size for event in organ.events if event.kind == "clipped"]
+        for event in organ.tube_events:
             arm = arm_of(event.instrument)
             if event.kind == "clipped":
-                yield from self._clip(organ, event, arm)
+                yield from self._clip(organ, event, arm, widths[0] if widths else 0.0)
+            elif event.kind == "clip pulled off":
+                self._lose(event.clip)
+                yield Event("clip pulled off", arm=arm, place=self._place)
+            elif event.kind == "parted":
+                yield from self._part(event, arm)
             elif event.kind in ("clip slipped", "clip not across"):
                 state.slipped += 1
                 kind = "clip slipped" if event.kind == "clip slipped" else "clip not across"
-                yield Event(kind, arm=arm, place=self._place, value=event.size, unit=event.unit)
-            elif event.kind == "clip pulled off":
-                self._lose(organ, event)
-                yield Event("clip pulled off", place=self._place, value=event.size, unit=event.unit)
-            elif event.kind == "torn":
-                state.tears += 1
+                yield Event(kind, arm=arm, place=self._place)
+        for event in organ.events:
+            if event.kind == "torn":
+                arm = arm_of(event.instrument)
                 yield Event("tube torn", arm=arm, place=self._place, value=event.size, unit=event.unit)
 
-    def _clip(self, organ: OrganSeen, event: TissueEvent, arm: int) -> Iterator[Event]:
-        state, params = self.state, self._params
+    def _clip(self, organ: OrganSeen, event: TubeEvent, arm: int, width: float) -> Iterator[Event]:
+        state, params, along = self.state, self._params, event.along_m
         if state.count >= _MOST_CLIPS:
             return
-        row, before = state.count, self.clips
-        state.clips[row], state.count = (_UNKNOWN, _UNKNOWN, event.size), row + 1
-        along, tilt = self._measure(organ, event, arm)
-        state.clips[row, :2] = along, tilt
-        yield Event("clip closed", arm=arm, place=self._place, value=max(along, 0.0), unit="m")
+        before, tilt = self.clips, self._tilt(organ, event, arm)
+        state.clips[state.count] = event.clip, along, tilt, width
+        state.count += 1
+        yield Event("clip closed", arm=arm, place=self._place, value=along, unit="m")
         if state.cut_count:
             yield Event("clipped after cut", arm=arm, place=self._place)
-        apart = float(np.abs(before - along).min()) if before.size and along >= 0.0 else np.inf
-        stump = state.length - along + _NEAR_JOINT if along >= 0.0 else np.inf
+        if set(event.others).intersection(TUBES):
+            yield Event("clip across two", arm=arm, place=self._place)
+        apart = float(np.abs(before - along).min(initial=np.inf))
+        stump = state.length - along if state.length >= 0.0 else np.inf
         if apart < params.clip_distance or stump < params.stump:
             yield Event("clip too near", arm=arm, place=self._place, value=min(apart, stump), unit="m")
         if tilt > params.tilt:
@@ -125,49 +117,37 @@ class TubeWatch:
         if state.count == params.clips:
             yield Event(self._nouns[0], arm=arm, place=self._place)
 
-    def _measure(self, organ: OrganSeen, event: TissueEvent, arm: int) -> tuple[float, float]:
-        """Return the place of a clip along the tube, m, and its deviation from square, rad; -1: unknown."""
-        if organ.tube is None:
-            return _UNKNOWN, _UNKNOWN
-        place = organ.tube.place(_position(event))
-        if arm < 0:
-            return place.along, _UNKNOWN
-        along_legs = abs(float((self._axis(arm) * place.direction).sum()))
-        return place.along, float(np.arcsin(min(1.0, along_legs)))
+    def _tilt(self, organ: OrganSeen, event: TubeEvent, arm: int) -> float:
+        """Return the deviation of a clip from square, rad; -1: unknown."""
+        if organ.tube is None or arm < 0:
+            return _UNKNOWN
+        at = np.array([event.position.x, event.position.y, event.position.z])
+        along_legs = abs(float((self._axis(arm) * organ.tube.place(at).direction).sum()))
+        return float(np.arcsin(min(1.0, along_legs)))
 
-    def _lose(self, organ: OrganSeen, event: TissueEvent) -> None:
-        """Take away the clip nearest to the place of an event."""
+    def _lose(self, clip: int) -> None:
+        """Take away a clip by its number."""
         state = self.state
         state.pulled_off += 1
-        if not state.count:
-            return
-        along = state.clips[: state.count, _ALONG]
-        place = 0.0 if organ.tube is None else organ.tube.place(_position(event)).along
-        row, last = int(np.abs(along - place).argmin()), state.count - 1
-        state.clips[row] = state.clips[last]
-        state.clips[last], state.count = 0.0, last
+        rows = np.flatnonzero(state.clips[: state.count, _NUMBER] == clip)
+        if rows.size:
+            last = state.count - 1
+            state.clips[rows[0]] = state.clips[last]
+            state.clips[last], state.count = 0.0, last
 
-    def _part(self, organ: OrganSeen, now: Instant) -> Iterator[Event]:
-        """See whether the tube has been parted, and how."""
+    def _part(self, event: TubeEvent, arm: int) -> Iterator[Event]:
+        """Take a parting, and see whether it is a good cut."""
         state = self.state
-        partings = [] if organ.tube is None else organ.tube.partings[:_MOST_CUTS]
-        if len(partings) <= state.cut_count:
-            return
-        known = state.cuts[: state.cut_count]
-        fresh = [one for one in partings if not known.size or np.abs(known - one).min() > _NEAR_JOINT]
-        state.cut_count = len(partings)
-        state.cuts[: len(partings)] = partings
-        is_cut = now.time_s - state.swept_at <= _CUT_WINDOW and state.swept_at >= 0.0
-        if not is_cut and organ.hottest < _BURNT_THROUGH:
-            state.tears += 1
-            yield Event("tube torn", place=self._place)
-            return
-        if known.size or not fresh:
-            return
-        yield Event(self._nouns[1], place=self._place, value=fresh[0], unit="m")
-        yield from self._judge(fresh[0])
+        if state.cut_count < _MOST_CUTS:
+            state.cuts[state.cut_count] = event.along_m
+            state.cut_count += 1
+        if event.cause not in ("cut", "burnt"):
+            yield Event("tube torn", arm=arm, place=self._place)
+        elif state.cut_count == 1:
+            yield Event(self._nouns[1], arm=arm, place=self._place, value=event.along_m, unit="m")
+            yield from self._judge(event.along_m, arm)
 
-    def _judge(self, cut: float) -> Iterator[Event]:
+    def _judge(self, cut: float, arm: int) -> Iterator[Event]:
         """Compare the first cut with the clips on both sides."""
         state, clips = self.state, self.clips
         specimen, patient = clips[clips < cut], clips[clips >= cut]
@@ -178,15 +158,11 @@ class TubeWatch:
         if patient.size:
             state.cuffs[1] = max(0.0, float(patient[0]) - cut - half)
         if not clips.size:
-            yield Event("cut without clip", place=self._place)
+            yield Event("cut without clip", arm=arm, place=self._place)
         elif not (specimen.size and patient.size):
-            yield Event("cut beside clips", place=self._place, value=cut, unit="m")
+            yield Event("cut beside clips", arm=arm, place=self._place, value=cut, unit="m")
         elif len(patient) < self._params.stays or len(clips) < self._params.clips:
-            yield Event("cut with too few clips", place=self._place, value=float(len(patient)))
+            yield Event("cut with too few clips", arm=arm, place=self._place, value=float(len(patient)))
         known = state.cuffs[state.cuffs >= 0.0]
         if known.size and float(known.min()) < self._params.cuff:
-            yield Event("cut with short cuff", place=self._place, value=float(known.min()), unit="m")
-
-
-def _position(event: TissueEvent) -> Vector:
-    return np.array([event.position.x, event.position.y, event.position.z])
+            yield Event("cut with short cuff", arm=arm, place=self._place, value=float(known.min()), unit="m")

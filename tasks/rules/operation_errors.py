@@ -68,6 +68,7 @@ ERRORS: Mapping[EventKind, ErrorKind] = MappingProxyType(
         "wrong structure clipped": ErrorKind("wrong_object", True),
         "wrong structure hurt": ErrorKind("wrong_object", True, lasts=True),
         "clip too near": ErrorKind("wrong_place", False),
+        "clip across two": ErrorKind("wrong_object", True),
         "clip oblique": ErrorKind("wrong_direction", False),
         "clip not across": ErrorKind("too_little", True),
         "clip slipped": ErrorKind("step_repeated", True),

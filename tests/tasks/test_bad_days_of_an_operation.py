@@ -30,7 +30,7 @@ def test_a_duct_cut_without_a_clip_leaks_bile():
         theatre.wait(0.05).cut(DUCT, 15e-3)
         assert "leaking" in theatre.tissue
         assert theatre.number(f"{DUCT}/blood/lost") > 0.5
-        assert ("cut without clip", DUCT, "") in theatre.said
+        assert ("cut without clip", DUCT, "PSM3") in theatre.said
         assert theatre.metric("errors/cut_without_clip") == 1.0
         assert theatre.metric("bile_spilled") == theatre.number(f"{DUCT}/blood/lost")
         assert theatre.failure == "duct open"
@@ -40,7 +40,7 @@ def test_an_artery_cut_on_the_wrong_side_of_its_clips_bleeds():
     with Theatre([ARTERY], HANDS) as theatre:
         theatre.clip(ARTERY, 6e-3, 10e-3).cut(ARTERY, 20e-3)
         assert theatre.number(f"{ARTERY}/bleeding") > 0.0  # its supply is on the right
-        assert ("cut beside clips", ARTERY, "") in theatre.said
+        assert ("cut beside clips", ARTERY, "PSM3") in theatre.said
         assert theatre.metric("errors/cut_beside_clips") == 1.0
         assert theatre.metric("blood_lost") == theatre.number(f"{ARTERY}/blood/lost") > 0.0
         assert theatre.metric("bleeding_grade") > 0.0

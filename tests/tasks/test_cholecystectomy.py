@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from hub.testing import Driver, check_engine
 from schemas.ros import Header, Point
-from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeLine
+from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeEvent, TubeLine
 from tasks.cholecystectomy.outcome import FAILURES
 from tasks.cholecystectomy.params import CholecystectomyParams
 from tasks.cholecystectomy.task import CholecystectomyTask
@@ -52,6 +52,12 @@ def event(kind, x=0.0, z=0.0, instrument="PSM1", size=1.2e-3, unit="m"):
     return TissueEvent(header=Header(), kind=kind, instrument=instrument, position=at, size=size, unit=unit)
 
 
+def tube_event(kind, organ, x=0.0, **more):
+    at = Point(x=x, y=0.0, z=HEIGHTS[organ])
+    more = {"instrument": "PSM1"} | more
+    return TubeEvent(header=Header(), kind=kind, body=organ, position=at, along_m=x, **more)
+
+
 class Operation:
     """A task whose tissue is the test's."""
 
@@ -75,7 +81,7 @@ class Operation:
         self.driver = Driver(self.task, period_ns=PERIOD_NS, inputs=given)
         # event ports count as connected too
         self.task._seen.connect(frozenset(self.known))
-        self.said = []
+        self.said, self.clips = [], -1
 
     def set(self, **values):
         for name, value in values.items():
@@ -99,17 +105,20 @@ class Operation:
         self.driver.set("tissue/PSM2/held", [1.0])
         return self.wait(0.05)
 
-    def clip(self, organ, *places, **rest):
+    def clip(self, organ, *places, **more):
         for x in places:
-            self.report(organ, event("clipped", x, HEIGHTS[organ], **rest)).wait(0.05)
+            self.clips += 1
+            self.driver.send(f"tissue/{organ}/tube", tube_event("clipped", organ, x, clip=self.clips, **more))
+            self.report(organ, event("clipped", x, HEIGHTS[organ])).wait(0.05)
         return self
 
-    def cut(self, organ, ring):
-        self.driver.set(
-            f"tissue/{organ}/cut_area", [float(self.driver.values[f"tissue/{organ}/cut_area"][0]) + 1e-5]
-        )
-        self.driver.set(f"tissue/{organ}/line", line(organ, parted=[ring]))
+    def tube(self, organ, kind, x=0.0, **more):
+        self.driver.send(f"tissue/{organ}/tube", tube_event(kind, organ, x, **more))
         return self.wait(0.05)
+
+    def cut(self, organ, x):
+        self.driver.set(f"tissue/{organ}/line", line(organ, parted=[round(1e3 * x)]))
+        return self.tube(organ, "parted", x, instrument="PSM2", cause="cut")
 
     @property
     def kinds(self):
@@ -153,6 +162,7 @@ def inputs_of(task):
         "TissueEvent": (event("clipped", 0.01),),
         "TissueGrasp": (TissueGrasp(header=Header(), event="grasped", body="gallbladder", force_n=1.0),),
         "TubeLine": line("cystic_duct"),
+        "TubeEvent": (tube_event("clipped", "cystic_duct", 0.01, clip=0),),
         "SoftBodyState": SoftBodyState(
             header=Header(), body="liver", nodes_m=np.zeros(3, np.float32), triangles=np.zeros(0, np.uint32)
         ),
@@ -171,8 +181,8 @@ def test_it_keeps_the_contract():
 def whole():
     """A trial in which all is done well."""
     trial = Operation().wait(0.05).grasp()
-    trial.clip("cystic_duct", 4e-3, 9e-3, 13e-3).cut("cystic_duct", 6)
-    return trial.clip("cystic_artery", 4e-3, 9e-3, 13e-3).cut("cystic_artery", 6).wait(0.1)
+    trial.clip("cystic_duct", 4e-3, 9e-3, 13e-3).cut("cystic_duct", 6.5e-3)
+    return trial.clip("cystic_artery", 4e-3, 9e-3, 13e-3).cut("cystic_artery", 6.5e-3).wait(0.1)
 
 
 def test_clips_and_cuts_reach_the_goals():
@@ -203,19 +213,19 @@ def test_clips_and_cuts_reach_the_goals():
 
 
 @pytest.mark.parametrize(
-    ("clips", "ring", "error", "failure"),
+    ("clips", "cut", "error", "failure"),
     [
-        ((), 6, "cut without clip", "duct open"),
-        ((4e-3,), 6, "cut beside clips", "duct open"),
-        ((13e-3, 17e-3, 21e-3), 6, "cut beside clips", ""),
-        ((4e-3, 13e-3), 6, "cut with too few clips", "clips missing"),
-        ((4e-3, 9e-3, 13e-3), 4, "cut with short cuff", ""),
+        ((), 6.5e-3, "cut without clip", "duct open"),
+        ((4e-3,), 6.5e-3, "cut beside clips", "duct open"),
+        ((13e-3, 17e-3, 21e-3), 6.5e-3, "cut beside clips", ""),
+        ((4e-3, 13e-3), 6.5e-3, "cut with too few clips", "clips missing"),
+        ((4e-3, 9e-3, 13e-3), 5e-3, "cut with short cuff", ""),
     ],
 )
-def test_a_cut_at_a_wrong_place_is_an_error(clips, ring, error, failure):
-    trial = Operation().wait(0.05).clip("cystic_duct", *clips).cut("cystic_duct", ring)
+def test_a_cut_at_a_wrong_place_is_an_error(clips, cut, error, failure):
+    trial = Operation().wait(0.05).clip("cystic_duct", *clips).cut("cystic_duct", cut)
     assert trial.errors == [error]
-    assert (error, "cystic_duct", "") in trial.said
+    assert (error, "cystic_duct", "PSM2") in trial.said
     assert trial.failure == failure
     assert not trial.success
     assert trial.metric(f"errors/{error.replace(' ', '_')}") == 1.0
@@ -231,9 +241,7 @@ def test_a_clip_on_the_common_duct_is_an_injury():
 
 
 def test_a_tube_that_parts_without_an_edge_has_torn():
-    trial = (
-        Operation().wait(0.05).set(**{"tissue/cystic_artery/line": line("cystic_artery", [10])}).wait(0.05)
-    )
+    trial = Operation().wait(0.05).tube("cystic_artery", "parted", 10e-3, instrument="PSM2", cause="torn")
     assert trial.errors == ["tube torn"]
     assert trial.failure == "tube torn"
     trial.report("cystic_artery", event("torn", 10e-3, 0.01, "PSM2", 1e-5, "m^2"))
@@ -241,20 +249,22 @@ def test_a_tube_that_parts_without_an_edge_has_torn():
     assert trial.metric("cystic_artery/torn") == 1e-5
     avulsed = Operation().set(**{"tissue/artery_origin/freed": [1e-6]}).wait(0.05)
     assert (avulsed.errors, avulsed.metric("avulsions")) == (["tube torn"], 1.0)
+    burnt = Operation().wait(0.05).tube("cystic_duct", "parted", 10e-3, cause="burnt")
+    assert burnt.errors == ["cut without clip"]
 
 
 def test_clips_that_are_oblique_crowded_slipped_or_pulled_off():
     trial = Operation().wait(0.05)
-    trial.driver.set(
-        "PSM1/measured_cp", [0.0, 0.0, 0.0, *np.array([0.0, 0.5**0.5, 0.0, 0.5**0.5])]
-    )  # along x
+    along = [0.0, 0.5**0.5, 0.0, 0.5**0.5]
+    trial.driver.set("PSM1/measured_cp", [0.0, 0.0, 0.0, *along])
     trial.clip("cystic_duct", 9e-3, 10e-3, 28e-3)
-    assert trial.errors == ["clip oblique", "clip too near", "clip oblique", "clip too near", "clip oblique"]
+    near, oblique = "clip too near", "clip oblique"
+    assert trial.errors == [oblique, near, oblique, near, oblique]
     assert trial.metric("duct/clip_tilt") == pytest.approx(np.pi / 2)
-    trial = Operation().clip("cystic_duct", 4e-3, 9e-3)
-    trial.report("cystic_duct", event("clip slipped"), event("clip not across"))
-    trial.report("cystic_duct", event("clip pulled off", 8.5e-3, size=4.5, unit="N"))
-    assert trial.errors == ["clip slipped", "clip not across", "clip pulled off"]
+    trial = Operation().clip("cystic_duct", 4e-3, 9e-3).clip("cystic_artery", 9e-3, others=["cystic_duct"])
+    trial.tube("cystic_duct", "clip slipped").tube("cystic_duct", "clip not across")
+    trial.tube("cystic_duct", "clip pulled off", 9e-3, clip=1)
+    assert trial.errors == ["clip across two", "clip slipped", "clip not across", "clip pulled off"]
     assert trial.metric("duct/clips") == 1.0
     assert trial.metric("duct/clip1_from_gallbladder") == pytest.approx(4e-3)
 
@@ -340,7 +350,7 @@ def test_numbers_that_are_none_do_not_reach_the_card():
     for rows in (np.zeros(0), np.zeros(1)):
         trial.set(**{"tissue/cystic_duct/line": broken.model_copy(update={"along_m": rows})}).wait(0.02)
     for _ in range(40):  # more clips than anyone has
-        trial.report("cystic_duct", event("clipped", 5e-3))
+        trial.clip("cystic_duct", 5e-3)
     assert trial.card is not None
 
 

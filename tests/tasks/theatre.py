@@ -70,6 +70,7 @@ class Theatre:
         self.task._seen.connect({name for name in self.known if name.removeprefix("tissue/") in self.outputs})
         for arm in self.task._seen.arms:
             arm.has_energy = f"{arm.name}/energy" in self.values
+            arm.can_exchange = True
         self.tissue, self.said = [], []
 
     def __enter__(self):
@@ -113,7 +114,8 @@ class Theatre:
         for name, value in self.outputs.items():
             if isinstance(value, tuple) and value and f"tissue/{name}" in self.known:
                 self.driver.send(f"tissue/{name}", *value)
-                self.tissue += [(one.kind if hasattr(one, "kind") else one.event) for one in value]
+                if not name.endswith("/tube"):
+                    self.tissue += [(one.kind if hasattr(one, "kind") else one.event) for one in value]
 
     def _step_task(self):
         for name, value in self._signals().items():
