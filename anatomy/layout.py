@@ -12,13 +12,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from anatomy.patient import DUCT_WALL, HEPATIC_ARTERY_DIAMETER, Patient
+from anatomy.patient import HEPATIC_ARTERY_DIAMETER, Patient
 
 __all__ = ["Layout", "Line"]
 
 Line = NDArray[np.float64]
 """Points of a centre line, m, shape (k, 3)."""
 
+_NECK_WALL = 0.0021
+"""Wall of the gallbladder where the cystic duct begins, m."""
 _CONFLUENCE_Y = -0.014
 _COMMON = np.array(
     [[0.020, -0.050, -0.010], [0.0205, -0.028, -0.007], [0.020, -0.008, -0.007], [0.019, 0.012, -0.009]]
@@ -91,15 +93,14 @@ class Layout:
         """Outer diameter at each point of the gallbladder's line, m."""
         shares = np.array([0.0, 0.42, 0.68, 0.86, 1.0, 1.0, 0.94])
         found = shares * self.patient.gallbladder_width
-        found[0] = self.patient.duct_diameter + 0.0015
+        found[0] = self.patient.duct_diameter + 0.0025
         return found
 
     @cached_property
     def gallbladder_walls(self) -> Line:
         """Thickness of the wall at each point of the gallbladder's line, m."""
         wall = self.patient.gallbladder_wall
-        neck = DUCT_WALL + 0.0004
-        return np.array([neck, min(wall, 0.0022), wall, wall, wall, wall, wall])
+        return np.array([min(wall, _NECK_WALL), *[wall] * 6])
 
     def _on_infundibulum(self, outward: Line) -> tuple[Line, Line]:
         """Return a place on the wall of the infundibulum in a direction, and the normal there."""

@@ -17,6 +17,7 @@ _OF_MODULUS = frozenset({"poisson_ratio", "density"})
 def add_anatomy(given: Any) -> Any:
     """Return parameters with the organs and attachments of their `anatomy`, if any.
 
+    Stiff tubes lie beside a soft liver: organs have sub-steps of their own, unless it is stated otherwise.
     Fields of an organ or attachment of the same name replace the patient's.
     """
     if not isinstance(given, Mapping):
@@ -24,6 +25,7 @@ def add_anatomy(given: Any) -> Any:
     tree = dict(cast("Mapping[str, Any]", given))
     if tree.get("anatomy") is None:
         return tree
+    tree.setdefault("own_sub_steps", True)
     anatomy = AnatomyParams.model_validate(tree["anatomy"])
     for key, made in (("organs", anatomy.organs), ("attachments", anatomy.attachments)):
         own: Any = tree.get(key) or {}

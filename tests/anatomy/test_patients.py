@@ -90,13 +90,12 @@ def test_every_patient_has_sound_hollow_organs_that_hang_together(seed):
         assert shape_quality(mesh.nodes, mesh.tetrahedra).min() > 0.05
         assert name == "liver" or params.inner_wall is not None
         organs[name] = Organ(name, params, is_carried=True)
-        assert organs[name].solid.longest_step > 8e-6
+        assert organs[name].solid.longest_step > 25e-6
     for name, attachment in given.attachments.items():
         one, other = (organs[organ] for organ in attachment.organs)
         chosen = given.organs[one.name].surface(AnchorParams(surface=attachment.surface))
         ties = find_ties(one, other, chosen, attachment.within)
         assert len(ties.areas) >= (5 if name in JOINTS else 25)
-        assert np.linalg.norm(ties.offsets, axis=1).max() <= attachment.within
 
 
 @given(SEEDS, st.sampled_from(["cystic_duct", "cystic_artery"]))
@@ -121,7 +120,7 @@ def test_meshes_are_the_same_on_all_platforms():
     for params in tissue(patient=7).organs.values():
         digest.update(np.round(1e6 * params.rest.nodes).astype(np.int64).tobytes())
         digest.update(params.rest.tetrahedra.tobytes())
-    assert digest.hexdigest()[:16] == "e526d22935edb70f"
+    assert digest.hexdigest()[:16] == "a5e2c14715dd9ab6"
 
 
 def test_fields_of_an_organ_of_the_same_name_replace_those_of_the_patient():
