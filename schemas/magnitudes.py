@@ -28,6 +28,7 @@ MAGNITUDES = {
     "Pa": Magnitude(1e-3, 1e13, "from a foam to ten times diamond"),
     "kg/m^3": Magnitude(1e-3, 1e5, "from a gas to four times osmium"),
     "J/m^2": Magnitude(1e-3, 1e7, "from a gel to a hundred times steel"),
+    "m^3": Magnitude(1e-15, 1e6, "from a cell to a reservoir"),
     "m^3/s": Magnitude(1e-15, 1e3, "from a sweat gland to a river"),
     "m^3/(s kg)": Magnitude(1e-12, 1e3, "from a cartilage to a pump"),
     "N": Magnitude(1e-9, 1e6, "from a cell to a hundred tonnes"),

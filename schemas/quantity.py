@@ -33,6 +33,7 @@ __all__ = [
     "Speed",
     "Stiffness",
     "Toughness",
+    "Volume",
     "VolumeFlow",
     "same_unit",
     "to_si",
@@ -159,6 +160,7 @@ Power = Annotated[float, *_quantity_type("W", "30 W")]
 Pressure = Annotated[float, *_quantity_type("Pa", "10 kPa")]
 Density = Annotated[float, *_quantity_type("kg/m^3", "1000 kg/m^3")]
 Toughness = Annotated[float, *_quantity_type("J/m^2", "160 J/m^2")]
+Volume = Annotated[float, *_quantity_type("m^3", "50 ml")]
 VolumeFlow = Annotated[float, *_quantity_type("m^3/s", "30 ml/s")]
 Perfusion = Annotated[float, *_quantity_type("m^3/(s kg)", "860 ml/min/kg")]
 Force = Annotated[float, *_quantity_type("N", "2 N")]

@@ -243,7 +243,9 @@ class TubeEvent(Message):
     ros_type: ClassVar[str] = "trocar_msgs/msg/TubeEvent"
     header: Header
     kind: String
-    """`clipped`, `clip slipped`, `clip not across`, `clip pulled off` or `parted`."""
+    """`clipped`, `clip slipped`, `clip not across`, `clip pulled off`, `perforated` (the wall is open) or
+    `parted`.
+    """
     body: String
     instrument: String = ""
     """Name of the probe; empty: none."""
@@ -256,7 +258,7 @@ class TubeEvent(Message):
     others: StringArray = Field(default_factory=list[str])
     """Other organs between the jaws of a clip."""
     cause: String = ""
-    """Why a clip slipped; whether a tube was `cut`, `torn` or `burnt` apart."""
+    """Why a clip slipped; whether a tube was `cut`, `torn` or `burnt` open or apart."""
     left_clips: UInt32 = 0
     """Clips on the tube on the left of a parting, up to its end or the next parting."""
     right_clips: UInt32 = 0
@@ -326,7 +328,7 @@ class TissueEvent(Message):
     the volume; `bleeding`, with its flow, and `bleeding stopped`, with the volume lost by then, of bile
     `leaking` and `leaking stopped`; `clipped`, with the width of the clip, `clip slipped` and
     `clip not across`, with the diameter of the tube, and `clip pulled off`, with the force; `detached` from
-    another organ, with the area.
+    another organ, `perforated` (the wall of a lumen is open), with the area.
     """
     instrument: String = ""
     """Name of the probe; empty: none."""

@@ -104,7 +104,7 @@ class Bleeding:
         if self._clotting is not None:
             velocity *= np.maximum(0.0, 1.0 - (t - self._opened) / self._clotting)
         if self.lumen is not None:
-            velocity += self.lumen.velocity(nodes)
+            velocity += self.lumen.velocity(nodes, seconds)
         rates, emitted = self.film.emit(faces, nodes, velocity, seconds)
         self._book[_EMITTED] += emitted
         self._note(rates)
@@ -165,7 +165,7 @@ class Bleeding:
     @property
     def state(self) -> tuple[NDArray[Any], ...]:
         """Arrays that the next step depends on."""
-        clips = () if self.clips is None or self.tube is None else (*self.clips.state, self.tube.parted)
+        clips = () if self.clips is None or self.tube is None else (*self.clips.state, *self.tube.state)
         return self.film.amounts, self._opened, self._book, self._rate, self._source, *clips
 
     def restore(self, parts: Iterator[bytes]) -> None:
@@ -174,9 +174,9 @@ class Bleeding:
             np.frombuffer(next(parts), array.dtype) for array in self.state
         )
         if self.clips is not None:
-            self.clips.restore(*clips[:-1])
+            self.clips.restore(*clips[:2])
         if self.tube is not None:
-            self.tube.parted = clips[-1].copy()
+            self.tube.restore(*clips[2:])
         self.film.amounts, self._opened = amounts.copy(), opened.copy()
         self._book[:], self._rate[:], self._source[:] = book, rate, source
         self._known = _UNKNOWN

@@ -37,6 +37,11 @@ def blood_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
         *(port for organ in organs for port in _organ_ports(organ, params.node_period)),
         *(line_port(organ, params.node_period) for organ in tubes),
         *(port for organ in tubes for port in tube_ports(organ, params.node_period)),
+        *(
+            signal_out(f"{name}/spilled", description="liquid that the sac has lost", unit="ml")
+            for name, organ in params.organs.items()
+            if organ.lumen and organ.lumen.volume
+        ),
         *(port for name in suctions for port in suction_ports(name)),
         *(port for name in clips for port in clip_ports(name)),
         *((_clip_bodies(params.node_period),) if clips else ()),
@@ -142,6 +147,8 @@ class Blood:
             found[f"{name}/bleeding"] = np.array([bleeding.rate])
             if bleeding.tube is not None:
                 found[f"{name}/tube"] = ()
+            if bleeding.lumen is not None and (spilled := bleeding.lumen.spilled) is not None:
+                found[f"{name}/spilled"] = spilled
             found[f"{name}/blood/lost"], found[f"{name}/blood/surface"] = volumes[:1], volumes[1:2]
         for suction in self._suctions:
             found.update(suction.outputs)

@@ -21,12 +21,14 @@ from robots.vector3 import cross
 from schemas.soft_surface import FaceKind
 from schemas.vectors import Vector
 
-__all__ = ["Lumen", "opening_flow"]
+__all__ = ["Lumen", "Opening", "opening_flow"]
 
 _CONTRACTION = 0.6
 """Discharge coefficient of a sharp-edged orifice."""
 _LEAST_AREA = 1e-10
 """A lumen narrower than 0.01 mm is shut, m^2."""
+_NARROWEST_GAP_M = 3e-4
+"""Width of a slit in a sac whose sides touch: the pressure of the liquid opens it; assumed."""
 _BESIDE = 3
 """Rings on each side of a clip between which its tube has a direction."""
 _EDGES = np.array([[0, 1], [1, 2], [2, 0]])
@@ -41,13 +43,17 @@ def opening_flow(pressure: float, area: float, resistance: float, density: float
 
 
 @dataclass(frozen=True)
-class _Opening:
+class Opening:
     """A run of neighbouring rings between which the inner wall is open."""
 
     first: int
     last: int
     share: float
     """Open part of the circumference; 1: the tube is parted."""
+    hole: float
+    """Area of the inner wall that has gone, m^2."""
+    parted: NDArray[np.int64]
+    """Nodes of the inner wall that have parted, each with one of their copies, shape (p, 2)."""
     slots: NDArray[np.int64]
     """Faces around the opening, shape (k,)."""
     is_left: NDArray[np.bool_]
@@ -72,7 +78,11 @@ class Lumen:
         self.walls: Vector = 0.5 * self.diameters - arms.mean(axis=1)
         """Thickness of the wall at each ring, m, shape (r,)."""
         self._area = float(self.areas(organ.mesh.nodes).mean())
-        self._openings: list[_Opening] = []
+        self._cell = 0.5 * (float(np.diff(self.along).mean()) + sqrt(4.0 * pi * self._area) / len(points[0]))
+        """Mean distance of neighbouring nodes of the inner wall, m."""
+        self.left: Vector = np.array([params.volume or 0.0])
+        """Liquid left in a sac, m^3."""
+        self.openings: list[Opening] = []
         self.partings: list[Parting] = []
         """Places where the tube is parted, from the left end to the right."""
 
@@ -83,6 +93,11 @@ class Lumen:
         spans = np.cross(arms, np.roll(arms, -1, axis=1)).sum(axis=1)
         turn = 2.0 * pi / self._rings.shape[1]
         return 0.5 * turn / sin(turn) * np.linalg.norm(spans, axis=1)
+
+    @property
+    def spilled(self) -> Vector | None:
+        """Liquid that a sac has lost, ml, shape (1,); None: no sac."""
+        return None if self._params.volume is None else 1e6 * (self._params.volume - self.left)
 
     @property
     def open_areas(self) -> Vector:
@@ -139,26 +154,67 @@ class Lumen:
 
     def find_openings(self) -> None:
         """Find where the inner wall is open, in a mesh that has been cut."""
-        surface, solid = self._organ.surface, self._organ.solid
+        surface, solid, whole = self._organ.surface, self._organ.solid, len(self._organ.mesh.triangles)
         slots = np.flatnonzero((surface.kinds != FaceKind.OUTSIDE) & (surface.faces[:, 0] >= 0))
-        slots = slots[slots >= len(self._organ.mesh.triangles)]
+        slots = slots[slots >= whole]
         origins = solid.origin[surface.faces[slots]]
-        ring, sector, width = self._opened_edges(origins)
-        crosses, is_open = sector >= 0, ring >= 0
-        opened = np.zeros(self._rings.shape, np.bool_)
-        for step in range(int(width.max(initial=0))):  # an edge may pass over sectors
-            passes = crosses & (width > step)
-            opened[ring[passes], (sector[passes] + step) % self._rings.shape[1]] = True
+        gone = self._organ.mesh.triangles[surface.faces[:whole, 0] < 0]
+        gone = gone[(self._ring_of[gone] >= 0).all(axis=1)]
+        parted: NDArray[np.bool_] = np.bincount(solid.origin, minlength=len(self._ring_of)) > 1
+        ring, sector, width = self._opened_edges(origins, parted)
+        burnt, burnt_sector, burnt_width = self._opened_edges(gone, np.ones(len(parted), np.bool_))
+        opened = self._opened_sectors(
+            *(np.concatenate(pair) for pair in ((ring, burnt), (sector, burnt_sector), (width, burnt_width)))
+        )
         marks = np.zeros(len(self._rings), np.bool_)
-        marks[ring[is_open]] = True
+        marks[ring[ring >= 0]] = True
+        marks[burnt[burnt >= 0]] = True
         elements = self._station[solid.origin[solid.tetrahedra[solid.owners[slots]]]].mean(axis=1)
         is_left = elements < self._station[origins].mean(axis=1)
-        self._openings, self.partings = [], find_partings(self._ring_pieces(), self.along)
+        areas = self._areas_of(gone)
+        self.openings, self.partings = [], find_partings(self._ring_pieces(), self.along)
         for first, last in _runs(marks):
             sectors = int(opened[first : last + 1].any(axis=0).sum())
             here = ((ring >= first) & (ring <= last)).any(axis=1)
+            lost = ((burnt >= first) & (burnt <= last)).any(axis=1)
+            here |= np.isin(origins, gone[lost]).any(axis=1)
             share = max(1, sectors) / self._rings.shape[1]
-            self._openings.append(_Opening(first, last, share, slots[here], is_left[here]))
+            pairs = self._parted_nodes(origins[here], parted)
+            hole = float(areas[lost].sum())
+            self.openings.append(Opening(first, last, share, hole, pairs, slots[here], is_left[here]))
+
+    def _opened_sectors(
+        self, ring: NDArray[np.int64], sector: NDArray[np.int64], width: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        """Return the sectors over which edges pass, shape (r, a)."""
+        crosses, opened = sector >= 0, np.zeros(self._rings.shape, np.bool_)
+        for step in range(int(width.max(initial=0))):  # an edge may pass over sectors
+            passes = crosses & (width > step)
+            opened[ring[passes], (sector[passes] + step) % self._rings.shape[1]] = True
+        return opened
+
+    def _areas_of(self, faces: NDArray[np.integer]) -> Vector:
+        """Return the areas of faces of the uncut mesh, m^2."""
+        corners = self._organ.mesh.nodes[faces]
+        return 0.5 * np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+
+    def _parted_nodes(self, faces: NDArray[np.int32], parted: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return each parted node of the inner wall at these faces with its last copy, shape (p, 2)."""
+        nodes = np.unique(faces)
+        nodes = nodes[parted[nodes] & (self._ring_of[nodes] >= 0)]
+        last: NDArray[np.int64] = np.full(len(parted), -1)
+        last[self._organ.solid.origin] = np.arange(len(self._organ.solid.origin))
+        return np.stack([nodes, last[nodes]], axis=1).astype(np.int64)
+
+    def gape(self, opening: Opening, nodes: Vector) -> float:
+        """Return the area of an opening of a sac, m^2: a hole, or the width of a slit along its length."""
+        if opening.share >= 1.0:
+            return self._area
+        one, other = (nodes[opening.parted[:, k]] for k in (0, 1))
+        widths = np.maximum(np.linalg.norm(one - other, axis=1), _NARROWEST_GAP_M)
+        return min(self._area, opening.hole + self._cell * float(widths.sum()))
 
     def _ring_pieces(self) -> NDArray[np.int64]:
         """Return the piece of the organ to which each node of the rings belongs, -1: none, shape (r, a)."""
@@ -169,17 +225,17 @@ class Lumen:
         return piece_of[self._rings]
 
     def _opened_edges(
-        self, origins: NDArray[np.int32]
+        self, origins: NDArray[np.integer], parted: NDArray[np.bool_]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Return lower ring, first sector and number of sectors of each edge of faces, shapes (k, 3).
 
         The ring is -1 for an edge that is not open on the inner wall, the sector for an edge along the tube
-        too. An edge is open if one of its nodes has parted: else the crack ends there. `origins`: nodes of
-        the faces in the uncut mesh, shape (k, 3).
+        too. An edge is open if one of its nodes has parted: else the crack ends there.
+
+        origins: nodes of the faces in the uncut mesh, shape (k, 3). parted: by node of the uncut mesh.
         """
         edges = origins[:, _EDGES]  # (k, 3, 2)
         rings, sectors = self._ring_of[edges], self._sector_of[edges]
-        parted = np.bincount(self._organ.solid.origin, minlength=len(self._ring_of)) > 1
         is_open = (rings >= 0).all(axis=2) & (np.abs(rings[..., 0] - rings[..., 1]) <= 1)
         is_open &= parted[edges].any(axis=2)
         around = self._rings.shape[1]
@@ -191,14 +247,17 @@ class Lumen:
         ring = np.where(is_open, rings.min(axis=2), -1)
         return ring, np.where(is_open & (apart > 0), sector, -1), width
 
-    def velocity(self, nodes: Vector) -> Vector:
-        """Return the flow per area out of each face of the surface, m/s, shape (f,)."""
+    def velocity(self, nodes: Vector, seconds: float) -> Vector:
+        """Return the flow per area out of each face of the surface, m/s, shape (f,), for `seconds`."""
         found: Vector = np.zeros(len(self._organ.surface.faces))
-        if not self._openings:
+        if not self.openings:
+            return found
+        if self._params.volume is not None:
+            self._empty(found, self._params.volume, nodes, seconds)
             return found
         resistance = self._resistances(nodes)
         for end in self._params.supply:
-            for opening in self._openings if end == "left" else self._openings[::-1]:
+            for opening in self.openings if end == "left" else self.openings[::-1]:
                 # nodes of a parted ring stay with the left part
                 behind = resistance[: opening.first] if end == "left" else resistance[opening.last + 1 :]
                 is_parted = opening.share >= 1.0
@@ -207,23 +266,37 @@ class Lumen:
                     break
         return found
 
-    def _flow(self, opening: _Opening, resistances: Vector) -> float:
+    def _empty(self, found: Vector, volume: float, nodes: Vector, seconds: float) -> None:
+        """Let a sac run out through its openings, by a pressure that falls with what is left."""
+        pressure = self._params.pressure * float(self.left[0]) / volume
+        for opening in self.openings:
+            flow = opening_flow(pressure, self.gape(opening, nodes), 0.0, self._liquid.density)
+            flow = min(flow, float(self.left[0]) / seconds, self._params.most_flow or np.inf)
+            if flow > 0.0 and self._pour(found, opening, flow, "", nodes):
+                self.left[0] = max(0.0, float(self.left[0]) - flow * seconds)
+
+    def _flow(self, opening: Opening, resistances: Vector) -> float:
         """Return the flow out of an opening behind these resistances, m^3/s."""
         area, density = opening.share * self._area, self._liquid.density
         flow = opening_flow(self._params.pressure, area, float(resistances.sum()), density)
         return flow if self._params.most_flow is None else min(flow, self._params.most_flow)
 
-    def _pour(self, found: Vector, opening: _Opening, flow: float, side: str, nodes: Vector) -> None:
-        """Spread a flow over the open faces of an opening; of a parted tube those of one side."""
+    def _pour(self, found: Vector, opening: Opening, flow: float, side: str, nodes: Vector) -> bool:
+        """Spread a flow over the open faces of an opening; of a parted tube those of one side.
+
+        Return whether there are any.
+        """
         slots = opening.slots
         if side:
             slots = slots[opening.is_left == (side == "left")]
-        slots = slots[self._organ.surface.kinds[slots] == FaceKind.CUT]  # a sealed stump is tight
+        if not opening.hole or opening.share >= 1.0:
+            slots = slots[self._organ.surface.kinds[slots] == FaceKind.CUT]  # a sealed stump is tight
         a, b, c = (nodes[self._organ.surface.faces[slots, i]] for i in range(3))
         area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
         whole = float(area.sum())
         if whole > 0.0:
             found[slots] = np.maximum(found[slots], flow / whole)
+        return whole > 0.0
 
     def _resistances(self, nodes: Vector) -> Vector:
         """Return the resistance between each ring and the next, Pa s/m^3, shape (r - 1,); infinite: shut."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.fem.blood.clips import Clips, Lost
-from engines.fem.blood.lumen import Lumen
+from engines.fem.blood.lumen import Lumen, Opening
 from engines.fem.blood.partings import Parting
 from engines.fem.organ import Organ
 from hub.participant import event_out, signal_out
@@ -40,6 +40,8 @@ class TubeEvents:
         self._said: list[TubeEvent] = []
         self.parted: NDArray[np.int64] = np.zeros(0, np.int64)
         """Rings of the partings that have been said."""
+        self.open: NDArray[np.int64] = np.zeros(0, np.int64)
+        """Rings at which an opening of the wall has been said."""
 
     def say_clipped(
         self, number: int, ring: int, place: Vector, instrument: str, others: Sequence[str]
@@ -58,12 +60,37 @@ class TubeEvents:
         self._say("clip pulled off", lost.place, lost.ring, lost.instrument, clip=lost.number)
 
     def watch(self) -> None:
-        """Say where the tube has parted since it was watched last."""
+        """Say where the wall has opened, and where the tube has parted, since it was watched last."""
+        for opening in self._lumen.openings:
+            rings = np.arange(opening.first, opening.last + 1)
+            is_known = self.open.size and int(np.abs(self.open[:, None] - rings).min()) <= _SAME
+            self.open = np.union1d(self.open, rings)
+            if not is_known and opening.share < 1.0:
+                self._say_perforated(opening)
         partings = self._lumen.partings
         for k, parting in enumerate(partings):
             if not self.parted.size or int(np.abs(self.parted - parting.ring).min()) > _SAME:
                 self.parted = np.append(self.parted, parting.ring)
                 self._say_parted(partings, k)
+
+    def _say_perforated(self, opening: Opening) -> None:
+        cause, instrument = self._organ.events.latest
+        ring = (opening.first + opening.last) // 2
+        faces = self._organ.surface.faces[opening.slots]
+        nodes = self._organ.nodes
+        place: Vector = nodes[faces].mean(axis=(0, 1)) if len(faces) else self._lumen.middles[ring]
+        self._organ.events.say("perforated", instrument, place, self._lumen.gape(opening, nodes), "m^2")
+        self._say("perforated", place, ring, instrument, cause=cause)
+
+    @property
+    def state(self) -> tuple[NDArray[np.generic], ...]:
+        """Arrays that the next step depends on."""
+        return self.parted, self.open, self._lumen.left
+
+    def restore(self, *state: NDArray[np.generic]) -> None:
+        """Go back to a saved `state`."""
+        self.parted, self.open = (part.astype(np.int64) for part in state[:2])
+        self._lumen.left[:] = state[2]
 
     def _say_parted(self, partings: Sequence[Parting], k: int) -> None:
         cause, instrument = self._organ.events.latest

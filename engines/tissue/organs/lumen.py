@@ -8,7 +8,7 @@ from typing import Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from engines.tissue.organs.picks import Point
-from schemas.quantity import Pressure, VolumeFlow
+from schemas.quantity import Pressure, Volume, VolumeFlow
 
 __all__ = ["LumenParams"]
 
@@ -36,6 +36,15 @@ class LumenParams(BaseModel):
         description=(
             "over that around the tube; default: middle of the mean arterial pressures of 65 to 90 mmHg. A"
             " bile duct has some 10 mmHg"
+        ),
+    )
+    volume: Volume | None = Field(
+        default=None,
+        gt=0,
+        le=1e-2,
+        description=(
+            "liquid of a sac without a supply, such as a gallbladder: the pressure falls with what is left,"
+            " and the flow ends when the sac is empty; default: supplied without end"
         ),
     )
     supply: tuple[Literal["left", "right"], ...] = Field(
