@@ -310,7 +310,7 @@ class FemEngine(Stepped):
         for organ in self._changing:
             outputs |= {f"{organ.name}/events": (), **organ.sums}
         if any(self.params.probes[bond.name].energy for bond in bonds):
-            self._heating = Heating(self.params, self._organs, self._probes)
+            self._heating = Heating(self.params, self._organs, self._probes, self._attachments)
             outputs.update(self._heating.outputs)
         if any(map(bleeds, self.params.organs.values())):
             self._blood = Blood(self.params, self._organs, self._probes)

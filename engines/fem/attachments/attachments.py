@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.fem.attachments.conduction import conduct
 from engines.fem.attachments.params import AttachmentParams
 from engines.fem.attachments.ties import find_ties
 from engines.fem.edges import Edges, Scissors
@@ -135,6 +136,21 @@ class Attachments:
             self._note(whole & self._crossed(), "cut", np.unique(self._edges.ends))
         if any(not heat.is_cold for heat in heats):
             self._note(whole & self._is_burnt(heats), "burnt", np.arange(len(self._spheres.radii)))
+
+    def conduct(self, heats: Sequence[Heat], seconds: float) -> None:
+        """Let heat go through whole ties for `seconds`. `heats`: of all organs."""
+        for number in range(len(self._names)):
+            ties = np.flatnonzero((self._number == number) & ~np.isinf(self.widest))
+            if not ties.size:
+                continue
+            i, j = int(self._one[ties[0]]), int(self._other[ties[0]])
+            faces = self._organs[j].solid.faces[self._slot[ties]]
+            ties, faces = ties[faces[:, 0] >= 0], faces[faces[:, 0] >= 0]
+            if not ties.size or (heats[i].is_cold and heats[j].is_cold):
+                continue
+            nodes = self._organs[i].solid.tetrahedra[self._element[ties], self._corner[ties]]
+            shares, gaps = self.rest[ties, :3], self.rest[ties, 3]
+            conduct(heats[i], heats[j], nodes, faces, shares, self._area[ties], gaps, seconds)
 
     def outputs(self) -> dict[str, Vector]:
         """Return freed areas and forces."""

@@ -162,6 +162,19 @@ class Heat:
             self._cool_down()
         return float(self._steam_per_joule * (self.book[_BOILED] - boiled) + self.book[_ASH] - ash)
 
+    @property
+    def capacity(self) -> Vector:
+        """Heat capacity of every node, J/K, 0 of a node without an element, shape (n,)."""
+        return self._capacity.astype(np.float64)
+
+    def warm(self, nodes: NDArray[np.integer], heat: Vector) -> None:
+        """Give heat (J, shape (k,)) to nodes; negative heat is taken."""
+        capacity = self.capacity[nodes]
+        kept = np.where(capacity > 0.0, heat, 0.0)
+        np.add.at(self.rise, nodes, kept / np.maximum(capacity, 1e-30))
+        self.book[_GIVEN] += kept.sum()
+        self.book[_HOTTEST] = max(float(self.book[_HOTTEST]), float(self.rise.max(initial=0.0)))
+
     def spread(self, nodes: Vector, poles: Vector, reach: float) -> tuple[NDArray[np.float32], float]:
         """Return the share of a current's heat in every element, shape (m,), and the sum of the shares.
 

@@ -76,14 +76,26 @@ class ElectrodeSpheres(Protocol):
         ...
 
 
+class HeatedTies(Protocol):
+    """Ties through which heat goes from organ to organ."""
+
+    def conduct(self, heats: Sequence[Heat], seconds: float) -> None:
+        """Let heat go through for `seconds`. `heats`: of all organs."""
+        ...
+
+
 class Heating:
     """A step of heat every 10 ms for each organ that is not cold."""
 
     def __init__(
-        self, params: PressedOrgansParams, organs: Sequence[Organ], probes: Iterable[ElectrodeSpheres]
+        self,
+        params: PressedOrgansParams,
+        organs: Sequence[Organ],
+        probes: Iterable[ElectrodeSpheres],
+        ties: HeatedTies | None = None,
     ) -> None:
-        """Begin with cold organs."""
-        self._organs = organs
+        """Begin with cold organs. `ties`: of organs that hang together."""
+        self._organs, self._ties = organs, ties
         self.heats = [
             Heat(_tissues(params.organs[organ.name]), *organ.solid.elements, len(organ.nodes), organ.layers)
             for organ in organs
@@ -124,6 +136,8 @@ class Heating:
             )
             if not heat.is_cold:
                 self._burn(self._organs[i], heat, burnt)
+        if self._ties is not None:
+            self._ties.conduct(self.heats, seconds)
         return self.outputs
 
     def follow(self) -> None:
