@@ -148,9 +148,11 @@ class Outcome(Watch[OutcomeState]):
         return not any(self.failures)
 
     def values(self) -> Iterator[ScoreValue]:
-        """Yield success, times of goals (s), and counts of errors."""
+        """Yield success, the classes of failure, times of goals (s), and counts of errors."""
         state = self.state
         yield ScoreValue(name="success", value=float(self.success))
+        for name, holds in zip(FAILURES, self.failures, strict=True):
+            yield ScoreValue(name=f"failed/{name.replace(' ', '_')}", value=float(holds))
         for name, at in zip(self.goals, state.reached.tolist(), strict=False):
             full = f"goal/{name.replace(' ', '_')}"
             yield value_or_reason(full, at, "s", "" if at >= 0.0 else "not reached")

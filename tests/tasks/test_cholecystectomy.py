@@ -236,6 +236,7 @@ def test_a_clip_on_the_common_duct_is_an_injury():
     trial = Operation().clip("common_bile_duct", 10e-3)
     assert ("wrong structure clipped", "common_bile_duct", "PSM1") in trial.said
     assert trial.failure == "common duct injured"
+    assert trial.metric("failed/common_duct_injured") == trial.metric("failed/not_finished") == 1.0
     whole_one = whole().clip("common_bile_duct", 10e-3)
     assert not whole_one.success  # also after the last goal
 
