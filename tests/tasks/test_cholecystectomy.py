@@ -4,11 +4,14 @@ from math import isfinite
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from hub.testing import Driver, check_engine
 from schemas.ros import Header, Point
 from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeEvent, TubeLine
+from tasks.cholecystectomy.organs import ORGANS
 from tasks.cholecystectomy.outcome import FAILURES
 from tasks.cholecystectomy.params import CholecystectomyParams
 from tasks.cholecystectomy.task import CholecystectomyTask
@@ -358,3 +361,33 @@ def test_numbers_that_are_none_do_not_reach_the_card():
 def test_more_clips_stay_than_there_are():
     with pytest.raises(ValidationError, match="stays: 4 of 3 clips cannot stay with the patient"):
         operation(stays=4)
+
+
+TISSUE_KINDS = ("cut", "torn", "burnt", "detached", "bleeding", "leaking", "clipped", "unheard of")
+TUBE_KINDS = ("clipped", "clip slipped", "clip not across", "clip pulled off", "parted", "unheard of")
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(ORGANS),
+            st.sampled_from(TISSUE_KINDS),
+            st.sampled_from(TUBE_KINDS),
+            st.sampled_from(["cut", "torn", "burnt", ""]),
+            st.sampled_from(["PSM1", "PSM2", "", "nobody"]),
+            st.floats(-0.1, 0.1),
+            st.integers(-1, 40),
+        ),
+        max_size=30,
+    )
+)
+def test_any_order_of_events_leaves_a_card_of_numbers(happened):
+    trial = Operation()
+    for organ, kind, tube, cause, instrument, along, clip in happened:
+        trial.driver.send(f"tissue/{organ}/events", event(kind, along, 0.0, instrument))
+        if organ in HEIGHTS:
+            more = {"cause": cause, "instrument": instrument, "clip": clip, "others": [organ]}
+            trial.driver.send(f"tissue/{organ}/tube", tube_event(tube, organ, along, **more))
+        trial.wait(0.02)
+    assert trial.card.goals == 5
+    assert trial.metric("errors") == sum(kind in ERRORS for kind in trial.kinds)
