@@ -35,22 +35,43 @@ def import_files(
             metavar="FILE...",
             help=(
                 "Surfaces (.stl, .obj, .ply, .glb, .gltf), taken together, or one file of tetrahedra (.vtk,"
-                " .vtu, .msh, .med)."
+                " .vtu, .msh, .med), or one label map of several organs (.nrrd, .seg.nrrd, .nii, .nii.gz)."
             ),
         ),
     ],
     *,
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="ORGAN.YAML", help="File for scenarios (mesh: ...).")
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="ORGAN.YAML",
+            help="File for scenarios (mesh: ...); of a label map a scenario, its organs beside it.",
+        ),
     ],
+    labels: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME=LABEL,...",
+            help=(
+                "Organs of a label map, such as 'liver=1,gallbladder=2'; a label may be a segment's name."
+                " Default: all segments with a name."
+            ),
+        ),
+    ] = None,
     nodes: Annotated[
         int | None,
         typer.Option(
-            min=18, max=5000, help="About how many; default: 250 in a surface, those of a file of tetrahedra."
+            min=18,
+            max=5000,
+            help=(
+                "About how many; default: 250 in a surface, those of a file of tetrahedra, 1500 in all"
+                " organs of a label map."
+            ),
         ),
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(metavar="[m|cm|mm]", help="Of the files; default: guessed from the size.")
+        str | None, typer.Option(metavar="[m|cm|mm]", help="Of the files; default: as stated, or guessed.")
     ] = None,
     surface: Annotated[
         list[str] | None,
@@ -59,16 +80,27 @@ def import_files(
             help=(
                 f"Name a part of the surface by normal, box or plane, such as '{_PICK}',"
                 " 'hilum={box: {low: [0, -10 mm, -5 mm], high: [9 mm, 10 mm, 0]}}' or"
-                " 'dome={plane: {point: [0, 0, -5 mm], towards: +z}}'. May be repeated."
+                " 'dome={plane: {point: [0, 0, -5 mm], towards: +z}}'. Of a label map: ORGAN.NAME=PICK."
+                " May be repeated."
             ),
         ),
     ] = None,
     anchor: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="Surface that is held; default: bottom. May be repeated."),
+        typer.Option(
+            metavar="NAME",
+            help=(
+                "Surface that is held; default: bottom. Of a label map: ORGAN.NAME; default: the bottom of"
+                " the largest of those that hang together. May be repeated."
+            ),
+        ),
     ] = None,
     material: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Default material; `trocar organs` lists them.")
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Default material; `trocar organs` lists them. Of a label map: ORGAN=NAME, may be repeated.",
+        ),
     ] = None,
     part: Annotated[
         int | None, typer.Option(min=1, help="Which part of a body in several, 1 for the largest.")
@@ -78,8 +110,8 @@ def import_files(
     ] = False,
 ) -> None:
     """Make an organ of your own of a surface or of tetrahedra, with a picture beside it."""
-    from engines.tissue.organ_import import import_organ
-    from engines.tissue.organs.materials import preset
+    from engines.tissue.files.label_file import is_label_map
+    from engines.tissue.organ_import import FACTORS, import_organ
     from schemas.user_files import require_place
 
     require_place(output)
@@ -87,22 +119,66 @@ def import_files(
         raise typer.BadParameter(f"'{output}' is not a .yaml file", param_hint="--output")
     if unit not in (None, "m", "cm", "mm"):
         raise typer.BadParameter(f"'{unit}' is none of m, cm, mm", param_hint="--unit")
-    try:
-        _ = material and preset(material)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--material") from None
+    picks, materials = _parse_picks(surface or []), material or []
+    _check_materials(materials)
+    if any(is_label_map(file) for file in files):
+        if len(files) > 1 or part is not None:
+            raise typer.BadParameter("a label map is one file, without --part", param_hint="FILE")
+        from engines.patient_command import import_labels, parse_labels
+
+        typer.echo(
+            import_labels(
+                files[0],
+                output,
+                parse_labels(labels or ""),
+                nodes=nodes,
+                unit=None if unit is None else FACTORS[unit],
+                keep_origin=keep_origin,
+                surfaces=picks,
+                anchors=anchor or [],
+                materials=materials,
+            )
+        )
+        return
+    if labels or len(materials) > 1:
+        raise typer.BadParameter("--labels and several materials are those of a label map", param_hint="FILE")
     organ = import_organ(
         files,
         nodes=nodes,
         unit=unit,
         part=part,
         keep_origin=keep_origin,
-        surfaces=_parse_picks(surface or []),
+        surfaces=picks,
         anchors=anchor or ["bottom"],
-        material=material,
+        material=materials[0] if materials else None,
     )
     output.write_text(organ.file.text(), encoding="utf-8")
     typer.echo(_summary(organ, output))
+
+
+@app.command("example")
+def write_example_patient(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Label map to write (.nrrd, .nii, .nii.gz).")],
+    *,
+    seed: Annotated[int, typer.Option(min=0, help="Of the surfaces' noise.")] = 7,
+) -> None:
+    """Write a label map of liver, gallbladder and cystic duct of no real patient."""
+    from engines.tissue.example_patient import LABELS, write_example
+    from schemas.user_files import require_place
+
+    require_place(file)
+    write_example(file, seed)
+    typer.echo(f"wrote {file}: {', '.join(f'{name}={label}' for name, label in LABELS.items())}")
+
+
+def _check_materials(materials: list[str]) -> None:
+    from engines.tissue.organs.materials import preset
+
+    for name in materials:
+        try:
+            preset(name.rpartition("=")[2])
+        except ValueError as error:
+            raise typer.BadParameter(str(error), param_hint="--material") from None
 
 
 def _parse_picks(texts: list[str]) -> Mapping[str, SurfacePick]:
@@ -117,7 +193,8 @@ def _parse_picks(texts: list[str]) -> Mapping[str, SurfacePick]:
     for text in texts:
         name, _, pick = text.partition("=")
         try:
-            TypeAdapter[str](Name).validate_python(name)
+            for one in name.split(".", 1):
+                TypeAdapter[str](Name).validate_python(one)
             picks[name] = SurfacePick.model_validate(yaml.load(pick))
             if picks[name].is_empty:
                 raise typer.BadParameter(f"'{text}' picks nothing; such as '{_PICK}'", param_hint="--surface")

@@ -26,10 +26,11 @@ from schemas.errors import ScenarioError, did_you_mean
 from schemas.files import file_hash
 from schemas.vectors import Vector
 
-__all__ = ["ImportedOrgan", "Unit", "import_organ"]
+__all__ = ["FACTORS", "ImportedOrgan", "Unit", "import_organ"]
 
 Unit = Literal["m", "cm", "mm"]
-_FACTORS: Mapping[Unit, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+FACTORS: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+"""Unit of files, m."""
 
 _NODES = 250
 """Run in real time at sub-steps of 1 ms (docs/decisions/0014-organs.md)."""
@@ -74,7 +75,7 @@ def import_organ(
     try:
         read = _read(paths)
         report: list[str] = []
-        factor = _FACTORS[_unit(read[0], unit, report)]
+        factor = FACTORS[_unit(read[0], unit, report)]
         mesh = _make_mesh(read, factor, nodes, part, report)
         shift = np.zeros(3) if keep_origin else _middle_of_top(mesh.nodes)
         if shift.any():
@@ -94,7 +95,7 @@ def import_organ(
             source=source,
             material=material,
             anchors=tuple(anchors),
-            surfaces=picks,
+            surfaces={**picks},
             mesh=mesh.vtk_text,
         )
     except ValueError as error:
@@ -124,12 +125,12 @@ def _unit(points: Vector, stated: Unit | None, report: list[str]) -> Unit:
     if stated is not None:
         return stated
     guess: Unit = "mm" if size > LARGEST_M else "m"
-    if not SMALLEST_M <= size * _FACTORS[guess] <= LARGEST_M:
+    if not SMALLEST_M <= size * FACTORS[guess] <= LARGEST_M:
         raise ValueError(
             f"it is {size:.4g} units large, which is no organ ({SMALLEST_M:g} to {LARGEST_M:g} m) in m or mm:"
-            f" state --unit, one of {', '.join(_FACTORS)}"
+            f" state --unit, one of {', '.join(FACTORS)}"
         )
-    extent = size * _FACTORS[guess]
+    extent = size * FACTORS[guess]
     report.append(f"unit {guess}, as the longest side is then {1e3 * extent:.4g} mm; --unit states another")
     return guess
 

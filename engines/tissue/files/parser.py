@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MESHIO_READERS", "TRIMESH_SUFFIXES"]
+__all__ = ["MESHIO_READERS", "TRIMESH_SUFFIXES", "limit_resources"]
 
 TRIMESH_SUFFIXES = (".stl", ".obj", ".ply", ".glb", ".gltf")
 """Surfaces."""
@@ -29,7 +29,8 @@ A compressed file may unpack to a thousand times its size.
 """
 
 
-def _limit_resources() -> None:
+def limit_resources() -> None:
+    """Bound memory, time and output of this process, where the system can."""
     try:
         resource: Any = import_module("resource")
     except ImportError:  # Windows: the parent's time limit stands alone
@@ -71,7 +72,7 @@ def _parse_tetrahedra(file: Path) -> dict[str, NDArray[Any]]:
 
 def main(file: Path, result: Path) -> None:
     """Parse `file`, and write arrays to `result` (.npz)."""
-    _limit_resources()
+    limit_resources()
     parse = _parse_surface if file.suffix.lower() in TRIMESH_SUFFIXES else _parse_tetrahedra
     np.savez(result, allow_pickle=False, **parse(file))
 

@@ -13,7 +13,7 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 from engines.tissue.files.vtk_file import parse_vtk
 from engines.tissue.meshing.mesh_check import checked_mesh
 from engines.tissue.meshing.tet_mesh import TetMesh
-from engines.tissue.organs.picks import SurfacePick
+from engines.tissue.organs.picks import NodePick, SurfacePick
 from schemas.scenario import Name
 from schemas.yaml_model import load_yaml_model
 
@@ -37,7 +37,7 @@ class OrganFile(BaseModel):
     """The default preset."""
     anchors: tuple[str, ...] = ()
     """Surfaces anchored by default."""
-    surfaces: dict[Name, SurfacePick] = Field(default_factory=dict[str, SurfacePick])
+    surfaces: dict[Name, SurfacePick | NodePick] = Field(default_factory=dict[str, SurfacePick | NodePick])
     """Named parts of the surface."""
     mesh: str
     """Tetrahedra as a legacy .vtk file, m."""

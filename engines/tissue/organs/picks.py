@@ -21,7 +21,7 @@ from engines.tissue.meshing.tet_mesh import TetMesh
 from schemas.quantity import Angle, Length
 from schemas.vectors import Vector
 
-__all__ = ["Box", "Plane", "Point", "SurfacePick"]
+__all__ = ["Box", "NodePick", "Plane", "Point", "SurfacePick"]
 
 _WITHIN = radians(30.0)
 Point = tuple[Length, Length, Length]
@@ -127,6 +127,22 @@ class SurfacePick(BaseModel):
             picked &= self.box.depth(mesh.nodes) >= 0.0
         if self.plane is not None:
             picked &= self.plane.height(mesh.nodes) >= 0.0
+        return picked
+
+
+class NodePick(BaseModel):
+    """A part of a surface by the numbers of its nodes: where two organs of one scan touch."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    numbers: tuple[Annotated[int, Field(ge=0)], ...] = Field(min_length=1, max_length=5000)
+
+    def nodes(self, mesh: TetMesh) -> NDArray[np.bool_]:
+        """Return the picked nodes of `mesh`, shape (n,). Raises ValueError for a node that is not there."""
+        picked = np.zeros(len(mesh.nodes), np.bool_)
+        if max(self.numbers) >= len(picked):
+            raise ValueError(f"a surface names node {max(self.numbers)}, and the mesh has {len(picked)}")
+        picked[list(self.numbers)] = True
         return picked
 
 

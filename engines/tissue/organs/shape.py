@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from engines.tissue.meshing.isosurface_stuffing import Field, fill
 from engines.tissue.meshing.smoothing import smoothed
 from engines.tissue.meshing.tet_mesh import TetMesh
-from engines.tissue.organs.picks import SurfacePick
+from engines.tissue.organs.picks import NodePick, SurfacePick
 from schemas.errors import did_you_mean
 from schemas.vectors import Vector
 
@@ -57,7 +57,7 @@ class Shape:
     """Surfaces anchored by default."""
     material: str | None
     """The default preset."""
-    picks: Mapping[str, SurfacePick] = field(default_factory=dict[str, SurfacePick])
+    picks: Mapping[str, SurfacePick | NodePick] = field(default_factory=dict[str, SurfacePick | NodePick])
     """Parts of the surface of a mesh, by name."""
 
     def surface(self, name: str, nodes: Vector) -> NDArray[np.bool_]:

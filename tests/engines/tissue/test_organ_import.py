@@ -11,7 +11,7 @@ import trimesh
 from typer.testing import CliRunner
 
 from engines.organ_commands import app
-from engines.tissue.files import mesh_file
+from engines.tissue.files import foreign_file, mesh_file
 from engines.tissue.meshing.grid import block
 from engines.tissue.meshing.tet_mesh import shape_quality
 from engines.tissue.organ_import import import_organ
@@ -144,20 +144,20 @@ def test_files_that_are_no_meshes_are_refused_before_they_are_opened(tmp_path, m
     with pytest.raises(ScenarioError, match="is no file"):
         import_organ([tmp_path / "folder.stl"])
     file = written(tmp_path, "holes")
-    monkeypatch.setattr(mesh_file, "_LARGEST_FILE", 1000)
+    monkeypatch.setattr(foreign_file, "_LARGEST_FILE", 1000)
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("parsed"))
     with pytest.raises(ScenarioError, match="decimate it"):
         import_organ([file])
 
 
 def test_a_parser_that_does_not_end_is_stopped(tmp_path, monkeypatch):
-    monkeypatch.setattr(mesh_file, "_PATIENCE_S", 0.01)
+    monkeypatch.setattr(foreign_file, "_PATIENCE_S", 0.01)
     with pytest.raises(ScenarioError, match="took more than"):
         import_organ([written(tmp_path, "holes")])
 
 
 def test_without_the_extra_the_command_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setattr(mesh_file, "find_spec", lambda _: None)
+    monkeypatch.setattr(foreign_file, "find_spec", lambda _: None)
     with pytest.raises(MissingExtraError, match=r"pip install 'trocar\[meshes\]'"):
         import_organ([written(tmp_path, "holes")])
 
