@@ -1,5 +1,6 @@
 """Figures of the operation, part by part.
 
+python bench/procedure.py import          ugly surfaces and label maps: usable, or refused with the reason
 python bench/procedure.py closed-forms    blood, cuts, tears, clips and attachments beside their closed forms
 """
 
@@ -13,8 +14,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from bench.closed_forms import closed_forms
+from bench.imports import imports
 
-PARTS: Mapping[str, Callable[[], int]] = {"closed-forms": closed_forms}
+PARTS: Mapping[str, Callable[[], int]] = {"closed-forms": closed_forms, "import": imports}
 """Parts by name; each returns the number of its figures that fall short."""
 
 
