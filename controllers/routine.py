@@ -167,6 +167,18 @@ class SetPower(_Command):
         return f"{self.arm}/energy"
 
 
+class SetFlow(_Command):
+    """Let a suction irrigator suck or rinse from now on, 0 to stop; done at once."""
+
+    do: Literal["suction", "irrigation"]
+    share: float = Field(ge=0, le=1, description="of the most")
+
+    @property
+    def port(self) -> str:
+        """Output with the share."""
+        return f"{self.arm}/{self.do}"
+
+
 class Wait(Params):
     """Wait."""
 
@@ -194,6 +206,7 @@ Step = Annotated[
     | CloseClip
     | ExchangeInstrument
     | SetPower
+    | SetFlow
     | Wait
     | Together,
     Field(discriminator="do"),
@@ -242,12 +255,15 @@ class Routine(Controller):
         self._busy = self._now.busy
         self._powers = {step.port: np.zeros(1) for step in params.steps if isinstance(step, SetPower)}
         """Power of every generator, W, by output."""
-        self.keep(self._now, *self._powers.values())
+        self._flows = {step.port: np.zeros(1) for step in params.steps if isinstance(step, SetFlow)}
+        """Share of the most suction or irrigation, by output."""
+        self.keep(self._now, *self._powers.values(), *self._flows.values())
         self._outputs: dict[str, Any] = {
             "step": self._now.part("step"),
             "done": self._now.part("done"),
             **dict.fromkeys(self._commands, ()),
             **self._powers,
+            **self._flows,
         }
 
     @property
@@ -267,6 +283,7 @@ class Routine(Controller):
             *(event_in(f"{arm}/{name}", type_) for arm in self._arms for name, type_ in events),
             *(event_out(name, types[name]) for name in self._commands),
             *(signal_out(name, description="power of the generator", unit="W") for name in self._powers),
+            *(signal_out(name, description="share of the most") for name in self._flows),
             signal_out("step", Float64Message, "number of the present step, from 0"),
             signal_out("done", Float64Message, "1 when all steps are done"),
         )
@@ -298,6 +315,8 @@ class Routine(Controller):
         self._now.begun_ns = t
         if isinstance(step, SetPower):
             self._powers[step.port][0] = step.power
+        if isinstance(step, SetFlow):
+            self._flows[step.port][0] = step.share
         for command in _commands(step):
             port, message = command.message()
             self._outputs[port] += (message,)
@@ -318,7 +337,7 @@ class Routine(Controller):
                     self._busy[i] = 2.0 if busy else 0.0 if self._busy[i] == 2.0 else 1.0
 
     def _is_over(self, step: Step, t: int) -> bool:
-        if isinstance(step, SetPower):
+        if isinstance(step, SetPower | SetFlow):
             return True
         if isinstance(step, Wait):
             return t - self._now.begun_ns >= step.time
@@ -339,5 +358,5 @@ def _commands(
     """Yield the commands of a step."""
     if isinstance(step, Together):
         yield from step.orders
-    elif not isinstance(step, Wait | SetPower):
+    elif not isinstance(step, Wait | SetPower | SetFlow):
         yield step

@@ -38,10 +38,9 @@ class PsmParams(MountedPsm):
     @property
     def gripper(self) -> Gripper | None:
         """Grasping part of the instrument, or of the first spare that grasps; None: no instrument grasps."""
-        for one in self.variants:
-            if effector := one.end_effector if one.end_effector.joints else None:
-                return Gripper(effector.name, effector.joints, one.end_effector_start)
-        return None
+        effector = self.commanded_end_effector
+        start = self.end_effector_start or (0.0,) * len(effector.joints)
+        return Gripper(effector.name, effector.joints, start) if effector.joints else None
 
     @property
     def home(self) -> tuple[float, ...]:

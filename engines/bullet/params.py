@@ -20,7 +20,7 @@ _LONGEST_NS, _HALVES = 1_000_000, 4
 class BulletParams(PressedOrgansParams):
     """Tissue in Bullet."""
 
-    unused_of_tools: ClassVar[frozenset[str]] = frozenset({"energy", "clip"})
+    unused_of_tools: ClassVar[frozenset[str]] = frozenset({"energy", "clip", "suction", "irrigation"})
 
     timestep: Duration | None = Field(
         default=None,
@@ -63,8 +63,9 @@ class BulletParams(PressedOrgansParams):
         for name, probe in self.probes.items():
             if probe.energy is not None:
                 raise ValueError(f"probe '{name}': energy heats tissue of kind fem only; leave it out here")
-            if probe.suction is not None:
-                raise ValueError(f"probe '{name}': suction takes blood off kind fem only; leave it out here")
+            for what in ("suction", "irrigation"):
+                if getattr(probe, what) is not None:
+                    raise ValueError(f"probe '{name}': {what} is for kind fem only; leave it out here")
             if probe.clip is not None:
                 raise ValueError(f"probe '{name}': clips hold tissue of kind fem only; leave it out here")
             if probe.blades:

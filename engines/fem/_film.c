@@ -20,6 +20,7 @@ typedef struct {
     double mobility; /* rho g / (3 mu), 1/(m s) */
     double hanging;  /* thickest film on a surface that looks down, m */
     double down;     /* upward part of the normal below which a surface looks down */
+    double thinner;  /* mobility of saline over that of the liquid */
 } Liquid;
 
 typedef struct {
@@ -34,6 +35,7 @@ typedef struct {
     double *outflow;        /* (nodes,), m^3 */
     double *through;        /* (faces, 3): from a corner to the next one, m^3 */
     int32_t *wet;           /* (faces,): faces with liquid at a corner */
+    int64_t *saline;        /* (nodes,): part of `amount` that is saline, well mixed with the rest; NULL: there is none */
 } Film;
 
 static void subtract(const double *a, const double *b, double *d)
@@ -91,12 +93,36 @@ static int measure(Film *film, double down)
     return count;
 }
 
+/* Return the mobility of the liquid at a node: fluidities mix by volume. */
+static double mobility_at(const Film *film, const Liquid *liquid, int node)
+{
+    if (!film->saline || !film->saline[node])
+        return liquid->mobility;
+    double share = (double)film->saline[node] / (double)film->amount[node];
+    return liquid->mobility * (1.0 + share * (liquid->thinner - 1.0));
+}
+
+/* Take `taken` from a node; return the saline in it. */
+static int64_t take(Film *film, int node, int64_t taken)
+{
+    int64_t saline = 0;
+    if (film->saline && film->saline[node]) {
+        int64_t there = film->saline[node], rest = film->amount[node] - there;
+        saline = (int64_t)((double)taken * ((double)there / (double)film->amount[node]));
+        saline = saline < taken - rest ? taken - rest : saline;
+        saline = saline > there ? there : saline > taken ? taken : saline;
+        film->saline[node] -= saline;
+    }
+    film->amount[node] -= taken;
+    return saline;
+}
+
 /* Return the liquid that flows from one corner of a face to another in `seconds`, m^3. */
 static double flow_between(const Film *film, const Liquid *liquid, int from, int to, double weight, double seconds)
 {
     double thickness = film->volume[from] / film->area[from];
     double fall = film->level[from] - film->level[to];
-    double flow = seconds * liquid->mobility * thickness * thickness * thickness * weight * fall;
+    double flow = seconds * mobility_at(film, liquid, from) * thickness * thickness * thickness * weight * fall;
     double rise = film->rise[from] + film->rise[to];
     double most = rise > 0.0 ? LEVELLED * fall / rise : flow;
     return thickness <= LEAST_FILM ? 0.0 : flow < most ? flow : most;
@@ -138,7 +164,10 @@ static void apply_flows(Film *film, int count)
             double share = film->outflow[from] > film->volume[from] ? film->volume[from] / film->outflow[from] : 1.0;
             int64_t taken = (int64_t)(share * fabs(flow) / QUANTUM);
             taken = taken < film->amount[from] ? taken : film->amount[from];
-            film->amount[from] -= taken, film->amount[to] += taken;
+            int64_t saline = take(film, from, taken);
+            film->amount[to] += taken;
+            if (saline)
+                film->saline[to] += saline;
         }
     }
 }
@@ -153,7 +182,7 @@ static int64_t drip(Film *film, const Liquid *liquid, int count)
             int64_t most = (int64_t)(liquid->hanging * film->area[node] / QUANTUM);
             if (film->volume[node] > 0.0 && film->rise[node] == 0.0 && film->amount[node] > most) {
                 dripped += film->amount[node] - most;
-                film->amount[node] = most;
+                take(film, node, film->amount[node] - most);
             }
         }
     return dripped;
@@ -169,7 +198,7 @@ static int64_t run(Film *film, const Liquid *liquid, double seconds)
 }
 
 typedef struct {
-    Py_buffer view[11];
+    Py_buffer view[12];
     int count;
 } Buffers;
 
@@ -196,11 +225,12 @@ static int hold(Buffers *held, PyObject *arrays, int expected, int written)
 static Film film_of(const Py_buffer *view)
 {
     return (Film){(int)(view[2].len / 8), (int)(view[0].len / 12), view[0].buf, view[1].buf, view[2].buf, view[3].buf,
-                  view[4].buf, view[5].buf, view[6].buf, view[7].buf, view[8].buf, view[9].buf};
+                  view[4].buf, view[5].buf, view[6].buf, view[7].buf, view[8].buf, view[9].buf, NULL};
 }
 
-PyDoc_STRVAR(run_doc, "run(arrays, mobility, hanging, down, seconds, sub_steps)\n--\n\n\
-Let the film run by sub-steps of `seconds`; return how much drips off. For arrays and numbers see `Film`, `Liquid`.");
+PyDoc_STRVAR(run_doc, "run(arrays, mobility, hanging, down, thinner, seconds, sub_steps)\n--\n\n\
+Let the film run by sub-steps of `seconds`; return how much drips off. For arrays and numbers see `Film`, `Liquid`;\n\
+the array of saline may be left out.");
 
 static PyObject *run_method(PyObject *Py_UNUSED(module), PyObject *args)
 {
@@ -209,13 +239,16 @@ static PyObject *run_method(PyObject *Py_UNUSED(module), PyObject *args)
     double seconds;
     int sub_steps;
     int64_t dripped = 0;
-    if (!PyArg_ParseTuple(args, "Oddddi", &arrays, &liquid.mobility, &liquid.hanging, &liquid.down, &seconds, &sub_steps) ||
+    if (!PyArg_ParseTuple(args, "Odddddi", &arrays, &liquid.mobility, &liquid.hanging, &liquid.down, &liquid.thinner,
+                          &seconds, &sub_steps) ||
         !PyTuple_Check(arrays))
         return NULL;
     Buffers held;
-    int failed = hold(&held, arrays, 10, 2);
+    int count = PyTuple_GET_SIZE(arrays) == 11 ? 11 : 10;
+    int failed = hold(&held, arrays, count, 2);
     if (!failed) {
         Film film = film_of(held.view);
+        film.saline = count == 11 ? held.view[10].buf : NULL;
         for (int k = 0; k < sub_steps; k++)
             dripped += run(&film, &liquid, seconds);
     }

@@ -92,10 +92,13 @@ class FemParams(PressedOrgansParams):
     def _something_to_suck(self) -> Self:
         organs = self.organs.values()
         for name, probe in self.probes.items():
-            if probe.suction and not any(organ.bleeding or organ.lumen for organ in organs):
-                raise ValueError(
-                    f"probe '{name}': suction finds no blood: no organ has `bleeding` or `lumen`"
-                )
+            if any(organ.bleeding or organ.lumen for organ in organs):
+                continue
+            for what in ("suction", "irrigation"):
+                if getattr(probe, what) is not None:
+                    raise ValueError(
+                        f"probe '{name}': {what} finds no blood: no organ has `bleeding` or `lumen`"
+                    )
         return self
 
     @property

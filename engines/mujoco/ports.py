@@ -122,8 +122,8 @@ def _servo_ports(owner: str, names: tuple[str, ...], start: tuple[float, ...], g
 
 
 def _end_effector_ports(arm: str, params: MountedArm) -> Iterator[Port]:
-    effector = next((one.end_effector for one in params.variants if one.end_effector.joints), None)
-    if effector is None:
+    effector = params.commanded_end_effector
+    if not effector.joints:
         return
     owner, names = f"{arm}/{effector.name}", tuple(joint.name for joint in effector.joints)
     start = params.end_effector_start or (0.0,) * len(names)

@@ -9,6 +9,7 @@ from hub.participant import Tool
 from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.end_effectors.scissors import Scissors
+from robots.dvrk.end_effectors.suction_tube import SuctionTube
 from robots.dvrk.mounted import MountedPsm
 from schemas.vectors import Vector
 
@@ -46,6 +47,8 @@ def _tool(arm: str, owner: str, mounted: MountedPsm, base: Vector) -> Tool:
         elif jaw is not None:
             probe["grasp"] = {}
         probe |= {"energy": _energy(mounted)} if mounted.tool.energy else {}
+        if isinstance(mounted.end_effector, SuctionTube):
+            probe |= {"suction": {}, "irrigation": {}}
         if clip := mounted.tool.clip:
             probe["clip"] = {"length": clip.length, "diameters": clip.diameters}
     return Tool(

@@ -29,12 +29,21 @@ from robots.dvrk.end_effectors.musha import HAND
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
 from robots.dvrk.end_effectors.scissors import CURVE, Scissors
+from robots.dvrk.end_effectors.suction_tube import SuctionTube
 from robots.serial_chain import Joint, jerk_limit
 from schemas.errors import MotionError, did_you_mean
 from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
-__all__ = ["ROLLING", "SHAFT_RADIUS", "WRIST_RADIUS", "Instrument", "instrument", "instruments"]
+__all__ = [
+    "ROLLING",
+    "SHAFT_RADIUS",
+    "SUCTION_IRRIGATOR",
+    "WRIST_RADIUS",
+    "Instrument",
+    "instrument",
+    "instruments",
+]
 
 SHAFT_RADIUS = 0.0084 / 2
 """Radius of the 8 mm instruments (m), as modelled in unina-icaros/dvrk-vrep."""
@@ -70,6 +79,12 @@ _MUSHA = "MUSHA_HAND"
 
 ROLLING = "ROLLING_NEEDLE_DRIVER"
 """A large needle driver 400006 with a rolling jaw."""
+
+SUCTION_IRRIGATOR = "SUCTION_IRRIGATOR"
+"""A tube for suction and saline on the shaft and wrist of the cautery spatula 400184.
+
+The dVRK's controller has no suction irrigator.
+"""
 
 
 @dataclass(frozen=True, eq=False)  # arrays have no single truth value, as the equality of Python 3.13 needs
@@ -163,6 +178,14 @@ def instruments() -> Mapping[str, Instrument]:
     made = {name: _from_data(name, row, data) for name, row in data["instruments"].items()}
     driver = made["LARGE_NEEDLE_DRIVER_400006"]
     made[_PROBE] = replace(driver, name=_PROBE, number="", end_effector=Probe())
+    spatula = made["PERMANENT_CAUTERY_SPATULA_400184"]
+    made[SUCTION_IRRIGATOR] = replace(
+        spatula,
+        name=SUCTION_IRRIGATOR,
+        number="",
+        source=f"{spatula.source} (shaft and wrist); robots.dvrk.end_effectors.suction_tube",
+        end_effector=SuctionTube(),
+    )
     made[_MUSHA] = _with_hand(_MUSHA, HAND, driver)
     source = f"{driver.source}; robots.dvrk.end_effectors.rolling_jaw"
     row = data["instruments"][driver.name]

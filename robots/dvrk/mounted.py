@@ -34,6 +34,7 @@ from robots.dvrk.end_effectors.jaw import Jaw
 from robots.dvrk.end_effectors.own_jaw import JawFile, with_own_jaw
 from robots.dvrk.end_effectors.probe import PROBE_RADIUS, Probe
 from robots.dvrk.end_effectors.scissors import Scissors
+from robots.dvrk.end_effectors.suction_tube import SuctionTube
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import Instrument, instrument
 from robots.dvrk.link import Link
@@ -63,7 +64,7 @@ DEFAULT_INSTRUMENT = "palpation-probe"
 
 _WRISTED = 3
 """Joints of an instrument with roll, wrist pitch and wrist yaw."""
-_EXCHANGED = (Jaw, Scissors, Electrode)
+_EXCHANGED = (Jaw, Scissors, Electrode, SuctionTube)
 """End effectors of instruments that may be exchanged: a jaw of the name `jaw`, or none."""
 
 _Published = tuple[Mapping[str, Inertia], Mapping[str, Drive], tuple[Disc, ...]]
@@ -125,6 +126,11 @@ class MountedArm(BaseModel):
     def by_owner(self, arm: str) -> Mapping[str, Self]:
         """Return the variants of `arm` by the prefix of names in a model: `PSM1`, `PSM1/<spare>`."""
         return {arm: self}
+
+    @property
+    def commanded_end_effector(self) -> EndEffector:
+        """End effector with the commanded joints: the instrument's, else the first spare's that has some."""
+        return next((one.end_effector for one in self.variants if one.end_effector.joints), self.end_effector)
 
     @property
     @abstractmethod

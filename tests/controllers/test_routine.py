@@ -134,6 +134,25 @@ def test_power_lasts_from_its_order_to_the_next_one(tmp_path):
         RoutineParams.model_validate({"steps": [watts[0] | {"power": "1 kW"}]})
 
 
+@pytest.mark.parametrize("what", ["suction", "irrigation"])
+def test_suction_and_irrigation_last_from_their_order_to_the_next_one(tmp_path, what):
+    shares = [{"do": what, "arm": "PSM1", "share": share} for share in (0.5, 0)]
+    run = Run(tmp_path, [shares[0], {"do": "wait", "time": "3 ms"}, shares[1]])
+    found = []
+    for _ in range(9):
+        run.step()
+        found.append(float(run.outputs[f"PSM1/{what}"][0]))
+    assert found[:5] == [0.5] * 5
+    assert found[-1] == 0.0
+    assert run.outputs["done"][0] == 1.0
+
+
+def test_an_exchange_is_asked_for_in_the_words_of_the_robot(tmp_path):
+    run = Run(tmp_path, [{"do": "exchange", "arm": "PSM1", "instrument": 400183}])
+    run.step()
+    assert [one.data for one in run.outputs["PSM1/set_tool_type"]] == ["PERMANENT_CAUTERY_HOOK:400183[..]"]
+
+
 def test_a_clip_is_closed_once_and_awaits_nothing(tmp_path):
     run = Run(tmp_path, [{"do": "clip", "arm": "PSM1"}, {"do": "wait", "time": "2 ms"}])
     found = []

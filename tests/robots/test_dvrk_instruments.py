@@ -6,8 +6,8 @@ from robots.dvrk.instruments import instrument, instruments
 from schemas.errors import MotionError
 
 
-def test_all_instruments_of_the_controller_are_there_with_probe_hand_and_roller():
-    assert len(instruments()) == 54 + 3
+def test_all_instruments_of_the_controller_are_there_with_probe_hand_roller_and_irrigator():
+    assert len(instruments()) == 54 + 4
     assert sum(one.has_snake_wrist for one in instruments().values()) == 3
 
 

@@ -154,8 +154,9 @@ def _simulated_arm(arm: CartArm, mounted: MountedPsm | MountedEcm, reference: st
     for ratio in ("ratio", "ratio_v", "ratio_a"):
         yield _state(arm, f"trajectory_j/{ratio}", Float64Message.ros_type)
     yield from (Row(f"/{arm}/{name}", type_, "serve", owner=arm) for name, type_ in _SERVICES.items())
-    if grasping := tuple(joint.name for joint in mounted.end_effector.joints):
-        gripper = mounted.end_effector.name
+    effector = mounted.commanded_end_effector
+    if grasping := tuple(joint.name for joint in effector.joints):
+        gripper = effector.name
         yield from _joint_states(arm, f"{gripper}/", grasping)
         gripper_commands = {f"{gripper}/{name}": type_ for name, type_ in crtk.GRIPPER_COMMANDS.items()}
         yield from _events_and_commands(arm, {}, gripper_commands, grasping)

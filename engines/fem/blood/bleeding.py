@@ -35,14 +35,18 @@ class Bleeding:
     tissue is not coagulated. An organ without anchors is supplied everywhere.
     """
 
-    def __init__(self, organ: Organ, params: OrganParams, gravity: float) -> None:
-        """Begin with an uncut, dry organ."""
+    def __init__(self, organ: Organ, params: OrganParams, gravity: float, *, irrigated: bool = False) -> None:
+        """Begin with an uncut, dry organ; `irrigated`: whether saline may come onto it."""
         self.organ = organ
         self._flows = _tissue_flows(params)
         """Flow out of an opened face of each layer, m/s."""
         self._clotting = None if params.bleeding is None else params.bleeding.clotting
         liquid = BILE if params.lumen is not None and params.lumen.liquid == "bile" else BLOOD
         self.film = Film(liquid, len(organ.nodes), gravity)
+        if irrigated:
+            self.film.may_be_irrigated()
+        self._saline: NDArray[np.int64] = np.zeros(3 if irrigated else 0, np.int64)
+        """Saline given, dripped off and sucked up, in parts of `QUANTUM`."""
         self.lumen: Lumen | None = None
         self.clips: Clips | None = None
         """Clips on a tube."""
@@ -80,12 +84,27 @@ class Bleeding:
     @property
     def on_surface(self) -> int:
         """Blood on the surface, in parts of `QUANTUM`."""
-        return int(self.film.amounts.sum())
+        return int(self.film.amounts.sum()) - self._saline_on_surface
+
+    @property
+    def _saline_on_surface(self) -> int:
+        return 0 if self.film.saline is None else int(self.film.saline.sum())
+
+    @property
+    def saline(self) -> Vector:
+        """Saline given in all; of it on the surface, dripped off, sucked up; ml, (4,)."""
+        given, dripped, sucked = self._saline.tolist()
+        return _ML * np.array([given, self._saline_on_surface, dripped, sucked], np.float64)
 
     @property
     def imbalance(self) -> int:
         """Blood emitted, less the blood that is somewhere, in parts of `QUANTUM`: always 0."""
         return int(self._book[_EMITTED] - self._book[_DRIPPED] - self._book[_SUCKED]) - self.on_surface
+
+    @property
+    def saline_imbalance(self) -> int:
+        """Saline given, less the saline that is somewhere, in parts of `QUANTUM`: always 0."""
+        return 2 * int(self._saline[:1].sum()) - int(self._saline.sum()) - self._saline_on_surface
 
     def step(self, t: int, seconds: float) -> None:
         """Bleed and run for `seconds` until `t` ns."""
@@ -97,7 +116,7 @@ class Bleeding:
                 self.tube.say_lost(lost)
         faces, nodes = self.organ.surface.faces, self.organ.nodes
         bleeds = self.organ.surface.kinds == FaceKind.CUT
-        if not bleeds.any() and not self._book[_EMITTED]:
+        if not bleeds.any() and not self._is_wet:
             return
         self._opened[bleeds & (self._opened == _CLOSED)] = t
         velocity = np.where(bleeds, self._velocity, 0.0)
@@ -108,7 +127,24 @@ class Bleeding:
         rates, emitted = self.film.emit(faces, nodes, velocity, seconds)
         self._book[_EMITTED] += emitted
         self._note(rates)
-        self._book[_DRIPPED] += self.film.run(faces, nodes, seconds)
+        before = self._saline_on_surface
+        self._enter(_DRIPPED, self.film.run(faces, nodes, seconds), before)
+
+    @property
+    def _is_wet(self) -> bool:
+        """Whether there has been liquid on the organ."""
+        return bool(self._book[_EMITTED]) or bool(self._saline.any())
+
+    def _enter(self, entry: int, gone: int, before: int) -> int:
+        """Enter liquid that has left the surface into the books.
+
+        `before`: saline on the surface before. Return the liquid.
+        """
+        saline = before - self._saline_on_surface
+        self._book[entry] += gone - saline
+        if saline:
+            self._saline[entry] += saline
+        return gone
 
     def _note(self, rates: Vector) -> None:
         """Take the flow out of each face (m^3/s, shape (f,)); say whether it begins or stops."""
@@ -129,13 +165,31 @@ class Bleeding:
         wet = np.flatnonzero(self.film.amounts)
         apart = self.organ.nodes[wet, None] - centres
         near = wet[(np.linalg.norm(apart, axis=2) < reach).any(axis=1)]
-        taken = self.film.take(near, most)
-        self._book[_SUCKED] += taken
-        return taken
+        before = self._saline_on_surface
+        return self._enter(_SUCKED, self.film.take(near, most), before)
+
+    def irrigate(self, centre: Vector, reach: float, amount: int) -> int:
+        """Let saline fall within `reach` (m) of `centre` (m, shape (3,)); return how much stays here."""
+        self._follow()
+        present = np.flatnonzero(self._present)
+        apart = self.organ.nodes[present] - centre
+        near = present[(apart * apart).sum(axis=1) < reach * reach]
+        if not near.size:
+            return 0
+        self.film.irrigate(near, amount)
+        self._saline[_EMITTED] += amount
+        return amount
+
+    @property
+    def _present(self) -> NDArray[np.bool_]:
+        """Whether each node is on the surface, shape (n,)."""
+        found = np.zeros(len(self.film.amounts), np.bool_)
+        found[self.organ.surface.present] = True
+        return found
 
     def picture(self, t: int) -> SurfaceFilm:
         """Return the message of the film at `t` ns; the same object as long as nothing has bled."""
-        if not self._book[_EMITTED]:
+        if not self._is_wet:
             return self._dry
         self._follow()
         return self._picture(t, self.film.thickness(self.organ.surface.faces, self.organ.nodes, FILM_STEP_M))
@@ -159,20 +213,29 @@ class Bleeding:
 
     @property
     def amounts(self) -> tuple[NDArray[np.int64], ...]:
-        """Liquid at every node, and the book, in parts of `QUANTUM`."""
-        return self.film.amounts, self._book
+        """Liquid at every node, and the book, in parts of `QUANTUM`; of saline too, if there may be any."""
+        return self.film.amounts, self._book, *self._saline_amounts
+
+    @property
+    def _saline_amounts(self) -> tuple[NDArray[np.int64], ...]:
+        return () if self.film.saline is None else (self.film.saline, self._saline)
 
     @property
     def state(self) -> tuple[NDArray[Any], ...]:
         """Arrays that the next step depends on."""
-        clips = () if self.clips is None or self.tube is None else (*self.clips.state, *self.tube.state)
-        return self.film.amounts, self._opened, self._book, self._rate, self._source, *clips
+        tube = () if self.clips is None or self.tube is None else (*self.clips.state, *self.tube.state)
+        more = (*self._saline_amounts, *tube)
+        return self.film.amounts, self._opened, self._book, self._rate, self._source, *more
 
     def restore(self, parts: Iterator[bytes]) -> None:
         """Go back to a saved `state`; the organ has gone back already."""
-        amounts, opened, book, rate, source, *clips = (
+        amounts, opened, book, rate, source, *more = (
             np.frombuffer(next(parts), array.dtype) for array in self.state
         )
+        if self.film.saline is not None:
+            self.film.saline, (self._saline[:], *clips) = more[0].copy(), more[1:]
+        else:
+            clips = more
         if self.clips is not None:
             self.clips.restore(*clips[:2])
         if self.tube is not None:
@@ -189,9 +252,9 @@ class Bleeding:
         self._opened = np.concatenate([self._opened, np.full(added, _CLOSED)])
         self.film.append(len(self.organ.nodes))
         self._take_mesh()
-        bare = np.ones(len(self.film.amounts), np.bool_)
-        bare[self.organ.surface.present] = False
-        self._book[_DRIPPED] += self.film.take(np.flatnonzero(bare), self.on_surface)
+        before = self._saline_on_surface
+        everything = int(self.film.amounts.sum())
+        self._enter(_DRIPPED, self.film.take(np.flatnonzero(~self._present), everything), before)
 
     def _take_mesh(self) -> None:
         """Find the flow out of each face, and the openings of a lumen."""

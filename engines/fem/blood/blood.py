@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from engines.fem.blood.bleeding import Bleeding
 from engines.fem.blood.clip import ClipApplier, clip_ports
 from engines.fem.blood.clip_markers import clip_markers
+from engines.fem.blood.irrigation import Irrigation, irrigation_ports, saline_outputs, saline_ports
 from engines.fem.blood.suction import Suction, suction_ports
 from engines.fem.blood.tube_events import tube_ports
 from engines.fem.blood.tube_line import line_port
@@ -21,6 +22,7 @@ from engines.tissue.params import PressedOrgansParams
 from hub.participant import Inputs, Value, signal_out
 from schemas.ports import Port
 from schemas.trocar_msgs import ShownMarkers, SurfaceFilm
+from schemas.vectors import Vector
 
 __all__ = ["Blood", "bleeds", "blood_ports"]
 
@@ -31,6 +33,7 @@ def blood_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
     if not organs:
         return ()
     suctions = [name for name, probe in params.probes.items() if probe.suction]
+    irrigations = [name for name, probe in params.probes.items() if probe.irrigation]
     clips = [name for name, probe in params.probes.items() if probe.clip]
     tubes = [name for name, organ in params.organs.items() if organ.lumen]
     return (
@@ -43,6 +46,8 @@ def blood_ports(params: PressedOrgansParams) -> tuple[Port, ...]:
             if organ.lumen and organ.lumen.volume
         ),
         *(port for name in suctions for port in suction_ports(name)),
+        *(port for name in irrigations for port in irrigation_ports(name)),
+        *(port for name in organs if irrigations for port in saline_ports(name)),
         *(port for name in clips for port in clip_ports(name)),
         *((_clip_bodies(params.node_period),) if clips else ()),
     )
@@ -81,8 +86,9 @@ class Blood:
         probes: Sequence[Probe],
     ) -> None:
         """Begin with dry organs."""
+        irrigated = any(params.probes[probe.name].irrigation for probe in probes)
         self.bleedings = [
-            Bleeding(organ, params.organs[organ.name], params.gravity)
+            Bleeding(organ, params.organs[organ.name], params.gravity, irrigated=irrigated)
             for organ in organs
             if bleeds(params.organs[organ.name])
         ]
@@ -90,6 +96,11 @@ class Blood:
             Suction(suction, probe)
             for probe in probes
             if (suction := params.probes[probe.name].suction) is not None
+        ]
+        self._irrigations = [
+            Irrigation(irrigation, probe)
+            for probe in probes
+            if (irrigation := params.probes[probe.name].irrigation) is not None
         ]
         self._appliers = [
             ClipApplier(clip, probe)
@@ -112,8 +123,8 @@ class Blood:
             self._elapsed[:] = 0.0
             for bleeding in self.bleedings:
                 bleeding.step(t, seconds)
-            for suction in self._suctions:
-                suction.step(inputs, self.bleedings, seconds)
+            for instrument in (*self._irrigations, *self._suctions):
+                instrument.step(inputs, self.bleedings, seconds)
             self.outputs = self._read()
         happened = ((f"{one.organ.name}/tube", one.tube) for one in self.bleedings if one.tube is not None)
         return self.outputs | {port: tube.finish(t) for port, tube in happened}
@@ -134,7 +145,7 @@ class Blood:
 
     def restore(self, parts: Iterator[bytes]) -> None:
         """Go back to a saved `state`; the organs have gone back already."""
-        for array in (self._elapsed, *(suction.taken for suction in self._suctions)):
+        for array in (self._elapsed, *self._totals):
             array[...] = np.frombuffer(next(parts), array.dtype)
         for bleeding in self.bleedings:
             bleeding.restore(parts)
@@ -150,9 +161,15 @@ class Blood:
             if bleeding.lumen is not None and (spilled := bleeding.lumen.spilled) is not None:
                 found[f"{name}/spilled"] = spilled
             found[f"{name}/blood/lost"], found[f"{name}/blood/surface"] = volumes[:1], volumes[1:2]
-        for suction in self._suctions:
-            found.update(suction.outputs)
+            found |= saline_outputs(bleeding) if self._irrigations else {}
+        for instrument in (*self._suctions, *self._irrigations):
+            found.update(instrument.outputs)
         return found
+
+    @property
+    def _totals(self) -> tuple[Vector, ...]:
+        """Liquid taken up and let out by each instrument, ml."""
+        return *(one.taken for one in self._suctions), *(one.given for one in self._irrigations)
 
     @property
     def amounts(self) -> tuple[NDArray[np.int64], ...]:
@@ -164,6 +181,6 @@ class Blood:
         """Arrays that the next step depends on."""
         return (
             self._elapsed,
-            *(suction.taken for suction in self._suctions),
+            *self._totals,
             *(array for bleeding in self.bleedings for array in bleeding.state),
         )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from schemas.vectors import Vector
 
-__all__ = ["BILE", "BLOOD", "QUANTUM", "Film", "Liquid"]
+__all__ = ["BILE", "BLOOD", "QUANTUM", "SALINE", "Film", "Liquid"]
 
 QUANTUM = 1e-18
 """Volume of a whole part of liquid, m^3, as in `_film.c`."""
@@ -40,6 +40,10 @@ BILE = Liquid("bile", 1010.0, 1.5e-3)
 """Assumed, between water and the bile of a gallbladder."""
 
 
+SALINE = Liquid("saline", 1005.0, 0.7e-3)
+"""Isotonic saline at 37 degrees C, as water but for 0.9 % of salt."""
+
+
 class Film:
     """Liquid at the nodes of a surface, in whole parts: what is there is only ever moved."""
 
@@ -51,13 +55,31 @@ class Film:
         self.liquid = liquid
         self.amounts: NDArray[np.int64] = np.zeros(nodes, np.int64)
         """Liquid at each node, in parts of `QUANTUM`, shape (n,)."""
+        self.saline: NDArray[np.int64] | None = None
+        """Saline in `amounts` at each node, well mixed with the rest, shape (n,); None: there is none."""
         self._mobility = liquid.density * gravity / (3.0 * liquid.viscosity)
+        self._thinner = SALINE.density * liquid.viscosity / (SALINE.viscosity * liquid.density)
         self._scratch: tuple[NDArray[np.generic], ...] = ()
 
     def append(self, nodes: int) -> None:
         """Let the surface have `nodes` nodes: new ones are dry."""
         added = nodes - len(self.amounts)
         self.amounts = np.concatenate([self.amounts, np.zeros(added, np.int64)])
+        if self.saline is not None:
+            self.saline = np.concatenate([self.saline, np.zeros(added, np.int64)])
+
+    def may_be_irrigated(self) -> None:
+        """Count saline apart from now on."""
+        self.saline = np.zeros(len(self.amounts), np.int64)
+
+    def irrigate(self, nodes: NDArray[np.int64], amount: int) -> None:
+        """Put saline onto nodes, to each as much as to the others, the first one takes the rest."""
+        if self.saline is None or not len(nodes):
+            return
+        each, rest = divmod(amount, len(nodes))
+        for amounts in (self.amounts, self.saline):
+            amounts[nodes] += each
+            amounts[nodes[0]] += rest
 
     def emit(
         self, faces: NDArray[np.int32], places: Vector, velocity: Vector, seconds: float
@@ -77,28 +99,47 @@ class Film:
         return rates, emitted
 
     def run(self, faces: NDArray[np.int32], places: Vector, seconds: float) -> int:
-        """Let the liquid run for `seconds`; return how much of it drips off."""
+        """Let the liquid run for `seconds`; return how much of it drips off, saline included."""
         sub_steps = max(1, round(seconds / _SUB_STEP_S))
+        saline = () if self.saline is None else (self.saline,)
         return self._compiled.run(
-            self._arrays(faces, places), self._mobility, _HANGING_M, _DOWN, seconds / sub_steps, sub_steps
+            (*self._arrays(faces, places, self.amounts), *saline),
+            self._mobility,
+            _HANGING_M,
+            _DOWN,
+            self._thinner,
+            seconds / sub_steps,
+            sub_steps,
         )
 
     def take(self, nodes: NDArray[np.int64], most: int) -> int:
-        """Take away up to `most` from these nodes, in proportion; return how much."""
+        """Take away up to `most` from these nodes, in proportion; return how much, saline included."""
         there = self.amounts[nodes]
         total = int(there.sum())
         taken = there if total <= most else (there * (most / total)).astype(np.int64)
+        if self.saline is not None:
+            saline = self.saline[nodes]
+            part = (taken * (saline / np.maximum(there, 1))).astype(np.int64)
+            self.saline[nodes] -= np.clip(
+                part, np.maximum(taken - (there - saline), 0), np.minimum(saline, taken)
+            )
         self.amounts[nodes] -= taken
         return int(taken.sum())
 
     def thickness(self, faces: NDArray[np.int32], places: Vector, step: float) -> NDArray[np.uint8]:
-        """Return the thickness at each node in steps of `step` (m), at most 255, shape (n,)."""
+        """Return the thickness at each node in steps of `step` (m), at most 255, shape (n,).
+
+        Saline is clear: diluted liquid is as thick as the liquid in it.
+        """
         found = np.zeros(len(self.amounts), np.uint8)
-        self._compiled.measure((*self._arrays(faces, places), found), step)
+        coloured = self.amounts if self.saline is None else self.amounts - self.saline
+        self._compiled.measure((*self._arrays(faces, places, coloured), found), step)
         return found
 
-    def _arrays(self, faces: NDArray[np.int32], places: Vector) -> tuple[NDArray[np.generic], ...]:
+    def _arrays(
+        self, faces: NDArray[np.int32], places: Vector, amounts: NDArray[np.int64]
+    ) -> tuple[NDArray[np.generic], ...]:
         n, f = len(self.amounts), len(faces)
         if not self._scratch or len(self._scratch[0]) != n or len(self._scratch[-1]) != f:
             self._scratch = (*(np.zeros(n) for _ in range(5)), np.zeros((f, 3)), np.zeros(f, np.int32))
-        return faces, places, self.amounts, *self._scratch
+        return faces, places, amounts, *self._scratch

@@ -29,7 +29,7 @@ def suction_ports(probe: str) -> tuple[Port, ...]:
             start=(0.0,),
             max_age_ns=_MOST_AGE_NS,
         ),
-        signal_out(f"{probe}/sucked", description="blood taken up since time 0", unit="ml"),
+        signal_out(f"{probe}/sucked", description="liquid taken up since time 0", unit="ml"),
     )
 
 
@@ -39,10 +39,10 @@ class Suction:
     def __init__(self, params: SuctionParams, probe: Probe) -> None:
         self._params, self._probe = params, probe
         self.taken: Vector = np.zeros(1)
-        """Blood taken up since time 0, ml."""
+        """Liquid taken up since time 0, ml."""
 
     def step(self, inputs: Inputs, bleedings: Sequence[Bleeding], seconds: float) -> None:
-        """Take up blood for `seconds`."""
+        """Take up liquid for `seconds`."""
         port = f"{self._probe.name}/suction"
         command = 0.0 if inputs.stale(port) else inputs.number(port, 0.0)
         if not command > 0.0:  # true of NaN
@@ -55,5 +55,5 @@ class Suction:
 
     @property
     def outputs(self) -> dict[str, Value]:
-        """Blood taken up."""
+        """Liquid taken up."""
         return {f"{self._probe.name}/sucked": self.taken.copy()}

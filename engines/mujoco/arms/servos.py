@@ -92,7 +92,7 @@ class Servos:
         shares: list[_Share] = []
         for arm, params in arms.items():
             variants = params.by_owner(arm)
-            effector = next((one.end_effector for one in params.variants if one.end_effector.joints), None)
+            effector = params.commanded_end_effector
             grasping = {
                 f"{owner}/{link.name}" for owner, one in variants.items() for link in one.end_effector_links
             }
@@ -109,7 +109,7 @@ class Servos:
             joints = _widest([one.chain.joints for one in params.variants])
             axes = _Axes(joints, params.start, motors)
             self._add_group(_Group(arm, f"{arm}/", fixed), axes, rows, shares)
-            if effector is not None:
+            if effector.joints:
                 motors = [
                     [(f"{owner}/{motor.name}", motor.joint, motor.share) for motor in one.end_effector.motors]
                     for owner, one in variants.items()

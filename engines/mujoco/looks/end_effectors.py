@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import singledispatch
 
-from engines.mujoco.looks import electrode, fingers, musha, own_jaw, rolling_jaw
+from engines.mujoco.looks import electrode, fingers, musha, own_jaw, rolling_jaw, suction_tube
 from engines.mujoco.looks.part import Collisions, Looks
 from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.end_effectors.end_effector import EndEffector, Mount
@@ -16,6 +16,7 @@ from robots.dvrk.end_effectors.hand import Hand
 from robots.dvrk.end_effectors.jaw import Jaw
 from robots.dvrk.end_effectors.own_jaw import OwnJaw
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
+from robots.dvrk.end_effectors.suction_tube import SuctionTube
 
 __all__ = ["collision", "parts"]
 
@@ -37,6 +38,7 @@ parts.register(OwnJaw, own_jaw.parts)
 parts.register(RollingJaw, rolling_jaw.parts)
 parts.register(Hand, musha.parts)
 parts.register(Electrode, electrode.parts)
+parts.register(SuctionTube, suction_tube.parts)
 collision.register(Jaw, fingers.collision)
 collision.register(OwnJaw, own_jaw.collision)
 collision.register(RollingJaw, rolling_jaw.collision)

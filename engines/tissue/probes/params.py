@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from engines.tissue.probes.clip import ClipParams
 from engines.tissue.probes.energy import EnergyParams
+from engines.tissue.probes.irrigation import IrrigationParams
 from engines.tissue.probes.suction import SuctionParams
 from schemas.quantity import Damping, Force, Length, Mass, Stiffness
 from schemas.vectors import Vector
@@ -161,6 +162,10 @@ class ProbeParams(BaseModel):
     )
     suction: SuctionParams | None = Field(
         default=None, description="lets the spheres take up blood, by the command `<probe>/suction`; kind fem"
+    )
+    irrigation: IrrigationParams | None = Field(
+        default=None,
+        description="lets saline out at the first sphere, by the command `<probe>/irrigation`; kind fem",
     )
     clip: ClipParams | None = Field(
         default=None, description="lets two jaws put clips on a tube, by the event `<probe>/clip`; kind fem"
