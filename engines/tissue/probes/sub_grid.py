@@ -50,6 +50,10 @@ _RIM_BEGINS, _RIM_ENDS = 1.0, 1.6
 half-space's, with an error of 5 % there (docs/decisions/0095-converged-truth.md).
 """
 
+_SWAYING, _LEAST_LOCAL = 0.5, 0.02
+"""Share of the yield of the mesh that is a motion of the whole body, from which on the spring follows by the
+rest alone; and the least such rest. A loose lobe sways in seconds, the spring follows in milliseconds.
+"""
 _RATIOS = (0.2, 2.0)
 """Limits of the ratio."""
 
@@ -219,6 +223,10 @@ class SubGrid:
             at_rim = compliance.of_body_at_rim(place.nodes, place.parts, -place.inward)
             body += self._rim * (at_rim - body)
         self._mesh_yields = self.ratio * mesh * forces
+        swaying = body / max(float(first @ between @ first), 1e-30)
+        if swaying > _SWAYING:
+            rest = self._mesh_yields - self.ratio * body * forces
+            self._mesh_yields = np.maximum(rest, _LEAST_LOCAL * self._mesh_yields)
         missing = self._depths + (body - self.ratio * mesh - 1.0 / self._coupling.stiffness) * forces
         return np.maximum.accumulate(np.maximum(missing, 0.0))
 
