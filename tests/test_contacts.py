@@ -120,6 +120,27 @@ def test_a_clip_applier_brings_its_clip_to_tissue_of_our_own(write):
     assert probe.clip is None
 
 
+def test_spare_instruments_bring_a_probe_each_to_tissue_that_bears_an_exchange(write):
+    change = ["scene.arms.PSM1.instrument='400230'", "scene.arms.PSM1.spares=[400183, SUCTION_IRRIGATOR]"]
+    with pytest.raises(ScenarioError, match="take kind fem"):
+        load(write(TOUCHES), [*change[:1], "scene.arms.PSM1.spares=[400183]"])
+    liver = "participants.tissue.organs.liver"
+    change += [f"{liver}.cutting={{toughness: 50 J/m^2}}", f"{liver}.bleeding={{}}"]
+    file = load(write(TOUCHES), [*change, "participants.tissue.kind=fem"])
+    probes = file.params["tissue"].probes
+    assert list(probes) == ["PSM1", "PSM1_PERMANENT_CAUTERY_HOOK_400183", "PSM1_SUCTION_IRRIGATOR"]
+    applier, hook, irrigator = probes.values()
+    assert applier.clip is not None
+    assert hook.energy.mode == "monopolar"
+    assert irrigator.suction is not None
+    assert irrigator.irrigation is not None
+    assert [str(bond.motion) for bond in file.scenario.bonds] == [
+        "robot.PSM1/contact",
+        "robot.PSM1/PERMANENT_CAUTERY_HOOK_400183/contact",
+        "robot.PSM1/SUCTION_IRRIGATOR/contact",
+    ]
+
+
 def test_an_instrument_that_passes_through_is_named_with_lines_to_add(write):
     text = TOUCHES.replace(", touches: [liver]", "")
     file = load(write(text))

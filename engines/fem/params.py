@@ -23,6 +23,7 @@ __all__ = ["FemParams"]
 class FemParams(PressedOrgansParams):
     """Tissue in explicit dynamics."""
 
+    bears_exchanges: ClassVar[bool] = True
     most_corrected_nodes: ClassVar[int] = MOST_NODES
 
     anatomy: AnatomyParams | None = Field(

@@ -61,4 +61,5 @@ def _tool(arm: str, owner: str, mounted: MountedPsm, base: Vector) -> Tool:
         base=base,
         reach=mounted.reach,
         spheres=mounted.sphere_centres,
+        is_spare=owner != arm,
     )

@@ -41,6 +41,8 @@ class Tool:
     """Largest distance of the tool's end from the remote centre of motion."""
     spheres: Vector
     """Centres of the contact spheres in the tip's frame, end effector closed, shape (n, 3)."""
+    is_spare: bool = False
+    """Whether the tool comes into the arm in an exchange alone: its spheres leap there from far away."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,8 @@ class TissueParams(Params):
 
     unused_of_tools: ClassVar[frozenset[str]] = frozenset()
     """Parameters of a tool's probe without meaning in this kind: planning leaves them out."""
+    bears_exchanges: ClassVar[bool] = False
+    """Whether probes may leap, as spheres do in an exchange of instruments."""
 
     @property
     @abstractmethod

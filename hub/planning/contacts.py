@@ -53,6 +53,11 @@ def add_contacts(source: Source, params: Mapping[str, Params]) -> list[str]:
             raise ScenarioError("this instrument has no contact spheres: it touches nothing", path=path)
         tissue = _tissue_of(tool, params, path)
         home = cast("TissueParams", params[tissue])
+        if tool.is_spare and not home.bears_exchanges:
+            raise ScenarioError(
+                f"'{tissue}' does not bear an exchange of instruments: take kind fem, or leave out `spares`",
+                path=path,
+            )
         _add_probe(source.tree["participants"][tissue], tool, home.unused_of_tools)
         bonds = cast("list[Any]", source.tree.get("bonds") or [])
         source.tree["bonds"] = bonds
