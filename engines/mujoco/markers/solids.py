@@ -45,6 +45,8 @@ class Solid:
     rgba: NDArray[np.float32]
     """Shape (4,)."""
     emission: float = _LIT
+    is_metal: bool = False
+    """Drawn as metal with shadows where the renderer can."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +118,8 @@ def solids(marker: ShownMarker, pose_of: PoseOf, camera: Vector, shapes_of: Shap
                 where = position + turn @ (scale * shape.position)
                 yield Solid(shape.type, scale * shape.size, where, turn @ shape.turn, marker.color)
         case _:
-            yield Solid(_SOLID[marker.type], half, position, turn, marker.color)
+            kind = _SOLID[marker.type]
+            yield Solid(kind, half, position, turn, marker.color, is_metal=marker.is_metal)
 
 
 _BOX, _ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)

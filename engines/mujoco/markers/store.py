@@ -27,6 +27,8 @@ __all__ = ["MOST_POINTS", "MarkerStore", "ShownMarker", "shown_markers"]
 MOST_POINTS = 20_000
 """Points and letters of all markers together."""
 _WORLD = "world"
+_CLIPS = "/clips"
+"""End of the namespace of an organ's clips."""
 _SHOWN_LETTERS = 40
 """Letters of a namespace shown in a reason."""
 
@@ -54,6 +56,8 @@ class ShownMarker:
     """Shape (n, 3), m, in the marker's own frame."""
     colors: NDArray[np.float32]
     """Shape (n, 4) or (n / 3, 4), or (0, 4)."""
+    is_metal: bool = False
+    """Whether it is a clip of an engine of tissue, not a sign for people."""
 
     @property
     def weight(self) -> int:
@@ -230,6 +234,7 @@ def shown_markers(shown: ShownMarkers) -> Iterator[ShownMarker]:
             shown.texts,
             np.split(points, np.cumsum(shown.point_counts[:-1].astype(np.int64))) if n else (),
             np.split(of_points, np.cumsum(shown.color_counts[:-1].astype(np.int64))) if n else (),
+            (name.endswith(_CLIPS) for name in shown.namespaces),
             strict=True,
         )
         made = [ShownMarker(*row) for row in rows]

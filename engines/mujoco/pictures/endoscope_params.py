@@ -107,10 +107,11 @@ class EndoscopeParams(SceneParams):
             " pictures with shadows take several times as long, those of an endoscope two thirds more"
         ),
     )
-    place: Literal["abdomen", "dry-lab", "none"] | None = Field(
+    place: Literal["abdomen", "subhepatic", "dry-lab", "none"] | None = Field(
         default=None,
         description=(
-            "surroundings with endoscope looks, none: an even grey; default: a dry lab for a scene with a"
+            "surroundings with endoscope looks, subhepatic: below the liver of a patient whose triangle of"
+            " Calot is at the origin, none: an even grey; default: a dry lab for a scene with a"
             " table, fixtures or objects, an abdomen for soft bodies alone, else none"
         ),
     )
@@ -142,7 +143,7 @@ class EndoscopeParams(SceneParams):
     )
 
     @property
-    def surroundings(self) -> Literal["abdomen", "dry-lab", "none"]:
+    def surroundings(self) -> Literal["abdomen", "subhepatic", "dry-lab", "none"]:
         """The place, chosen by the scene where it is not stated."""
         if self.place is not None:
             return self.place

@@ -14,7 +14,7 @@ from engines.mujoco.model import place as place_arms
 from engines.mujoco.model import spec
 from engines.mujoco.params import SceneParams
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
-from engines.mujoco.pictures.skin_params import SkinParams
+from engines.mujoco.pictures.skin_params import SkinParams, body_recipes
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.surroundings import make_place
 from engines.mujoco.place.dress import BRIGHT
@@ -45,12 +45,9 @@ def page_appearance(params: SceneParams, bodies: Mapping[str, RestBody]) -> Appe
     The textures of a body are those of its look in `params`, else of the tissue whose name ends its name.
     """
     noise, seen = Noise(SEED), _endoscope_params(params, bodies)
-    skins = seen.soft_bodies
+    recipes = body_recipes(seen.soft_bodies, {name: body.nodes for name, body in bodies.items()})
     return Appearance(
-        {
-            name: _skin(body, skins.get(name, SkinParams()).recipe(name), noise)
-            for name, body in bodies.items()
-        },
+        {name: _skin(body, recipes[name], noise) for name, body in bodies.items()},
         {kind: _coat(coat, noise) for kind, coat in KINDS.items()},
         {name: _coat(coat, noise) for name, coat in {**COATS, BRIGHT: _BRIGHT}.items()},
         _surroundings(seen, bodies, noise),

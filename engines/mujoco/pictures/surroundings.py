@@ -12,11 +12,13 @@ from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.place.abdomen import make_abdomen
 from engines.mujoco.place.dry_lab import make_dry_lab
 from engines.mujoco.place.part import PlacePart
+from engines.mujoco.place.subhepatic import make_subhepatic
 from robots.training.threads import THREAD
 from schemas.vectors import Vector
 
 __all__ = ["make_place"]
 
+_LIVER = "liver"
 _ALONE = 0.03
 """Half the side of the box where nothing lies in a scene, m."""
 
@@ -42,6 +44,9 @@ def make_place(
     points = [body.rest.astype(np.float64) for name, body in bodies.items() if name != THREAD]
     points += _set_points(params, model)
     cloud = np.concatenate(points) if points else np.array([[-_ALONE] * 3, [_ALONE] * 3])
+    if params.surroundings == "subhepatic":
+        liver = bodies[_LIVER].rest.astype(np.float64) if _LIVER in bodies else cloud
+        return make_subhepatic(liver.min(axis=0), liver.max(axis=0), seed)
     low, high = cloud.min(axis=0), cloud.max(axis=0)
     if params.surroundings == "dry-lab":
         return make_dry_lab(low, high, seed)

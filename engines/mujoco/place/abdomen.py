@@ -10,11 +10,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from engines.mujoco.place.bowel import bowel_tube
 from engines.mujoco.place.part import PlacePart, ripple, sheet
 from engines.mujoco.textures.tissues import TISSUES
 from schemas.vectors import Vector
 
-__all__ = ["make_abdomen"]
+__all__ = ["make_abdomen", "make_wall"]
 
 _LEAST_RADIUS, _LEAST_HEIGHT = 0.15, 0.13
 """Least radius and height of the dome, m."""
@@ -50,7 +51,7 @@ def make_abdomen(low: Vector, high: Vector, camera: Vector | None, seed: int = 0
     towards = float(np.arctan2(away[1], away[0])) if reach > 0.0 else -0.5 * np.pi
     return [
         _bed(centre, footprint, radius, seed),
-        _wall(centre, radius, height, seed),
+        make_wall(centre, radius, height, seed),
         *_loops(centre, footprint, radius, towards, seed),
     ]
 
@@ -72,7 +73,7 @@ def _bed(centre: Vector, footprint: float, radius: float, seed: int) -> PlacePar
     return sheet(place, (side, side), (44, 44), TISSUES["fat"], 0.09)
 
 
-def _wall(centre: Vector, radius: float, height: float, seed: int) -> PlacePart:
+def make_wall(centre: Vector, radius: float, height: float, seed: int) -> PlacePart:
     """Dome of the abdominal wall, seen from inside."""
 
     def place(u: Vector, v: Vector) -> Vector:
@@ -112,30 +113,4 @@ def _loops(centre: Vector, footprint: float, radius: float, towards: float, seed
             0.55 + 0.5 * np.sin(0.6 * bends * turn + 1.7 * loop + turned[loop])
         )
         z -= 2.5 * _LOOP_RADIUS * np.clip(1.0 - 9.0 * np.minimum(steps, 1.0 - steps), 0.0, 1.0)
-        yield _tube(centre + np.stack([x, y, z], axis=1), _LOOP_RADIUS, around, loop)
-
-
-def _tube(line: Vector, radius: float, around: int, seed: int) -> PlacePart:
-    """Return a tube of bowel along a line, shape (k, 3), m: narrower and wider by turns.
-
-    `around`: cells around it.
-    """
-    ways = np.gradient(line, axis=0)
-    steps = np.linalg.norm(ways, axis=1)
-    ahead = ways / steps[:, None]
-    aside = np.cross(ahead, [0.0, 0.0, 1.0])
-    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
-    up = np.cross(aside, ahead)
-    along = np.cumsum(steps)
-    width = radius * (1.0 + 0.10 * np.sin(along / 0.011 + seed) + 0.05 * np.sin(along / 0.004 + 3.0 * seed))
-    ends = np.minimum(along, along[-1] - along) / (1.5 * radius)
-    width *= np.sqrt(np.clip(2.0 * ends - ends * np.abs(ends), 0.0, 1.0)) * (ends < 1.0) + (ends >= 1.0)
-
-    def place(u: Vector, v: Vector) -> Vector:
-        index = np.rint(v * (len(line) - 1)).astype(np.int64)
-        turn = 2.0 * np.pi * (u - 0.25)  # the seam is below
-        across = np.cos(turn)[:, None] * aside[index] + np.sin(turn)[:, None] * up[index]
-        return line[index] + width[index, None] * across
-
-    part = sheet(place, (0.08, float(along[-1])), (around, len(line) - 1), TISSUES["bowel"], 0.08)
-    return part._replace(faces=part.faces[:, ::-1], is_shaded=False)
+        yield bowel_tube(centre + np.stack([x, y, z], axis=1), _LOOP_RADIUS, around, loop)

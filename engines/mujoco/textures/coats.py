@@ -8,10 +8,10 @@ from typing import NamedTuple
 from engines.mujoco.textures.noise import Noise
 from engines.mujoco.textures.surface import Maps, Recipe, make_tile
 from engines.mujoco.textures.things import brushed_steel, shaft_coat
-from engines.mujoco.textures.tissues import char, coagulum, cut_inside
+from engines.mujoco.textures.tissues import char, coagulum, cut_inside, cut_wall
 from schemas.soft_surface import FaceKind
 
-__all__ = ["COATS", "KINDS", "TISSUE_TILE", "Coat"]
+__all__ = ["COATS", "KINDS", "TISSUE_TILE", "Coat", "changed_coats"]
 
 TISSUE_TILE = 0.02
 """Side of the tiles of changed tissue, m."""
@@ -40,3 +40,8 @@ KINDS: Mapping[FaceKind, Coat] = {
     FaceKind.CHARRED: Coat(char, TISSUE_TILE),
 }
 """Coats of changed faces of tissue."""
+
+
+def changed_coats(tissue: str) -> Mapping[FaceKind, Coat]:
+    """Return the coats of changed faces of a tissue: the wall of a tube is pale inside."""
+    return {**KINDS, FaceKind.CUT: Coat(cut_wall, TISSUE_TILE)} if tissue in ("artery", "duct") else KINDS

@@ -18,7 +18,7 @@ def brushed_steel(noise: Noise, points: Points) -> Surface:
     """Steel with scratches along y of the texture, and stains of handling."""
     along = points * np.array([1.0, 0.06, 1.0], np.float32)
     scratches, stains = noise.at(along, 0.06 * _MM, 0), noise.octaves(points, 2.0 * _MM, 1, 2)
-    colour = np.full((len(points), 3), (0.86, 0.86, 0.88), np.float32)
+    colour = np.full((len(points), 3), (0.66, 0.66, 0.68), np.float32)
     colour = colour * (np.float32(1.0) + 0.004 * scratches + 0.008 * stains)[:, None]
     roughness = np.float32(0.27) + np.float32(0.008) * scratches + np.float32(0.02) * stains
     return Surface(colour, np.float32(0.0004 * _MM) * scratches, roughness)

@@ -14,7 +14,7 @@ import numpy as np
 from engines.mujoco.textures.noise import Noise, Points, Values
 from engines.mujoco.textures.surface import Colours, Recipe, Surface, blend, smooth_step
 
-__all__ = ["TISSUES", "char", "coagulum", "cut_inside", "tinted"]
+__all__ = ["TISSUES", "areolar", "char", "coagulum", "cut_inside", "cut_wall", "fatty_peritoneum", "tinted"]
 
 _MM = 1e-3
 _VESSEL, _VEIN = (0.50, 0.10, 0.09), (0.40, 0.17, 0.24)
@@ -43,13 +43,13 @@ def _wet(noise: Noise, points: Points, mean: float, channel: int = 90) -> Values
 
 
 def _liver(noise: Noise, points: Points) -> Surface:
-    broad, lobules = noise.octaves(points, 14.0 * _MM, 0, 2), noise.at(points, 0.55 * _MM, 5)
+    broad, lobules = noise.octaves(points, 16.0 * _MM, 0, 2), noise.at(points, 0.45 * _MM, 5)
     middle = noise.at(points, 2.5 * _MM, 6)
-    colour = blend(_base(points, (0.50, 0.235, 0.195)), (0.41, 0.175, 0.15), 0.5 + 0.35 * broad)
-    colour = blend(colour, (0.60, 0.37, 0.30), 0.15 * smooth_step(noise.at(points, 6.0 * _MM, 7), 0.5, 1.8))
-    colour = _mottled(colour, 0.07 * lobules, 0.05 * middle)
-    height = 0.05 * _MM * middle + 0.010 * _MM * lobules + 0.25 * _MM * noise.at(points, 7.0 * _MM, 8)
-    return Surface(colour, height, _wet(noise, points, 0.16))
+    colour = blend(_base(points, (0.445, 0.24, 0.19)), (0.375, 0.188, 0.152), 0.5 + 0.3 * broad)
+    colour = blend(colour, (0.56, 0.37, 0.29), 0.12 * smooth_step(noise.at(points, 6.0 * _MM, 7), 0.5, 1.8))
+    colour = _mottled(colour, 0.055 * lobules, 0.025 * middle)
+    height = 0.015 * _MM * middle + 0.005 * _MM * lobules + 0.2 * _MM * noise.at(points, 8.0 * _MM, 8)
+    return Surface(colour, height, _wet(noise, points, 0.36))
 
 
 def _kidney(noise: Noise, points: Points) -> Surface:
@@ -62,14 +62,52 @@ def _kidney(noise: Noise, points: Points) -> Surface:
 
 
 def _gallbladder(noise: Noise, points: Points) -> Surface:
-    broad, fine = noise.octaves(points, 12.0 * _MM, 0, 3), noise.at(points, 0.7 * _MM, 5)
-    colour = blend(_base(points, (0.50, 0.50, 0.36)), (0.66, 0.47, 0.38), 0.45 + 0.5 * broad)
-    fat = smooth_step(noise.octaves(points, 12.0 * _MM, 20, 2), 1.0, 1.4)
-    colour = blend(colour, _FAT, 0.8 * fat)
-    colour = blend(colour, _VESSEL, 0.75 * _vessels(noise, points, 7.0 * _MM, 0.07, 10, 0.65))
-    colour = blend(colour, _VESSEL, 0.45 * _vessels(noise, points, 2.6 * _MM, 0.13, 30, 0.5))
-    height = 0.15 * _MM * noise.at(points, 5.0 * _MM, 8) + 0.012 * _MM * fine + 0.5 * _MM * fat
-    return Surface(_mottled(colour, 0.04 * fine), height, _wet(noise, points, 0.14))
+    broad, fine = noise.octaves(points, 14.0 * _MM, 0, 3), noise.at(points, 0.7 * _MM, 5)
+    colour = blend(_base(points, (0.40, 0.43, 0.345)), (0.53, 0.49, 0.37), 0.45 + 0.5 * broad)
+    colour = blend(colour, (0.33, 0.385, 0.36), 0.5 * smooth_step(noise.at(points, 11.0 * _MM, 21), 0.2, 1.5))
+    flushed = smooth_step(noise.octaves(points, 9.0 * _MM, 22, 2), 0.6, 1.7)
+    colour = blend(colour, (0.62, 0.44, 0.38), 0.45 * flushed)
+    fat = smooth_step(noise.octaves(points, 8.0 * _MM, 20, 3), 1.0, 2.2)
+    colour = blend(colour, _FAT, 0.55 * fat)
+    colour = blend(colour, _VESSEL, 0.40 * _vessels(noise, points, 7.0 * _MM, 0.03, 10, 0.55))
+    colour = blend(colour, _VESSEL, 0.38 * _vessels(noise, points, 2.4 * _MM, 0.06, 30, 0.6))
+    colour = blend(colour, _VEIN, 0.25 * _vessels(noise, points, 1.2 * _MM, 0.10, 50, 0.5))
+    height = 0.15 * _MM * noise.at(points, 5.0 * _MM, 8) + 0.012 * _MM * fine + 0.35 * _MM * fat
+    return Surface(_mottled(colour, 0.03 * fine), height, _wet(noise, points, 0.12))
+
+
+def _duct(noise: Noise, points: Points) -> Surface:
+    """Bile duct: pale with a tint of bile, in loose fibres."""
+    broad, fine = noise.octaves(points, 5.0 * _MM, 0, 3), noise.at(points, 0.4 * _MM, 5)
+    colour = blend(_base(points, (0.78, 0.69, 0.53)), (0.70, 0.59, 0.41), 0.45 + 0.5 * broad)
+    colour = blend(colour, (0.86, 0.80, 0.68), 0.5 * noise.lines(points, 1.6 * _MM, 0.25, 6))
+    colour = blend(colour, (0.74, 0.50, 0.40), 0.5 * smooth_step(noise.at(points, 3.0 * _MM, 7), 0.5, 1.8))
+    colour = blend(colour, _VESSEL, 0.45 * _vessels(noise, points, 2.2 * _MM, 0.07, 10, 0.6))
+    height = 0.10 * _MM * noise.at(points, 1.4 * _MM, 8) + 0.012 * _MM * fine
+    return Surface(_mottled(colour, 0.04 * fine), height, _wet(noise, points, 0.2))
+
+
+def _artery(noise: Noise, points: Points) -> Surface:
+    """Artery in its sheath: pink, with pale fibres and fine vessels of its own."""
+    broad, fine = noise.octaves(points, 4.0 * _MM, 0, 3), noise.at(points, 0.4 * _MM, 5)
+    colour = blend(_base(points, (0.70, 0.39, 0.34)), (0.58, 0.24, 0.21), 0.4 + 0.5 * broad)
+    colour = blend(colour, (0.84, 0.66, 0.58), 0.55 * noise.lines(points, 1.5 * _MM, 0.25, 6))
+    colour = blend(colour, _VESSEL, 0.5 * _vessels(noise, points, 1.8 * _MM, 0.08, 10, 0.6))
+    height = 0.08 * _MM * noise.at(points, 1.2 * _MM, 8) + 0.012 * _MM * fine
+    return Surface(_mottled(colour, 0.04 * fine), height, _wet(noise, points, 0.2))
+
+
+def areolar(noise: Noise, points: Points) -> Surface:
+    """Loose tissue where organs join: peritoneum, fat in strands, torn fibres."""
+    bends = np.stack([noise.at(points, 1.5 * _MM, 40 + k) for k in range(3)], axis=1)
+    depth, number = noise.lobules(points + np.float32(0.6 * _MM) * bends, 2.6 * _MM)
+    full, fine = smooth_step(depth, -0.1, 0.6), noise.at(points, 0.4 * _MM, 5)
+    colour = blend(_base(points, (0.74, 0.49, 0.38)), (0.84, 0.66, 0.45), 0.3 + 0.7 * full)
+    colour = blend(colour, (0.90, 0.77, 0.62), 0.9 * (number - 0.3) * full)
+    colour = blend(colour, (0.72, 0.38, 0.32), 0.5 * smooth_step(noise.at(points, 4.0 * _MM, 7), 0.4, 1.6))
+    colour = blend(colour, _VESSEL, 0.45 * _vessels(noise, points, 2.4 * _MM, 0.07, 10, 0.5))
+    height = 0.30 * _MM * full + 0.012 * _MM * fine
+    return Surface(_mottled(colour, 0.03 * fine), height, _wet(noise, points, 0.2))
 
 
 def _bowel(noise: Noise, points: Points) -> Surface:
@@ -122,6 +160,15 @@ def _peritoneum(noise: Noise, points: Points) -> Surface:
     return Surface(_mottled(colour, 0.04 * fine), height, _wet(noise, points, 0.2))
 
 
+def fatty_peritoneum(noise: Noise, points: Points) -> Surface:
+    """Peritoneum over fat, pink where the fat is thin."""
+    fat, bare = areolar(noise, points), _peritoneum(noise, points)
+    thin = smooth_step(noise.octaves(points, 9.0 * _MM, 65, 3), -0.9, 1.1)
+    colour = bare.colour + (0.15 + 0.6 * thin)[:, None] * (fat.colour * np.float32(0.92) - bare.colour)
+    height = 0.6 * bare.height + (0.3 + 0.5 * thin) * fat.height
+    return Surface(colour, height, _wet(noise, points, 0.17))
+
+
 def _muscle(noise: Noise, points: Points) -> Surface:
     along = points * np.array([0.12, 1.0, 1.0], np.float32)
     fibres, bundles = noise.at(along, 0.45 * _MM, 0), noise.at(along, 1.8 * _MM, 1)
@@ -153,10 +200,18 @@ def _skin(noise: Noise, points: Points) -> Surface:
 def cut_inside(noise: Noise, points: Points) -> Surface:
     """Inside of a cut: raw, bloody, wet."""
     broad, grain = noise.octaves(points, 4.0 * _MM, 0, 3), noise.at(points, 0.5 * _MM, 5)
-    colour = blend(_base(points, (0.60, 0.10, 0.09)), (0.36, 0.03, 0.035), 0.5 + 0.5 * broad)
-    colour = blend(colour, (0.80, 0.38, 0.30), 0.35 * smooth_step(grain, 0.8, 1.8))
+    colour = blend(_base(points, (0.57, 0.16, 0.135)), (0.37, 0.05, 0.05), 0.45 + 0.5 * broad)
+    colour = blend(colour, (0.78, 0.46, 0.37), 0.45 * smooth_step(grain, 0.8, 1.8))
     height = 0.15 * _MM * noise.at(points, 1.5 * _MM, 8) + 0.05 * _MM * grain
     return Surface(colour, height, _wet(noise, points, 0.13))
+
+
+def cut_wall(noise: Noise, points: Points) -> Surface:
+    """Cut through the wall of a duct or an artery: pale, with a little blood."""
+    broad, grain = noise.octaves(points, 1.5 * _MM, 0, 3), noise.at(points, 0.3 * _MM, 5)
+    colour = blend(_base(points, (0.74, 0.56, 0.46)), (0.62, 0.30, 0.26), 0.3 + 0.5 * broad)
+    height = 0.08 * _MM * broad + 0.03 * _MM * grain
+    return Surface(_mottled(colour, 0.05 * grain), height, _wet(noise, points, 0.16))
 
 
 def coagulum(noise: Noise, points: Points) -> Surface:
@@ -177,8 +232,10 @@ def char(noise: Noise, points: Points) -> Surface:
 
 TISSUES: Mapping[str, Recipe] = {
     "adrenal": _fat,
+    "artery": _artery,
     "bowel": _bowel,
     "colon": _colon,
+    "duct": _duct,
     "fat": _fat,
     "gallbladder": _gallbladder,
     "kidney": _kidney,

@@ -6,6 +6,7 @@ burnt tissue have tiles, laid in the rest shape too.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from engines.mujoco.pictures.skin_mesh import SkinMesh
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.textures.atlas import SIDES, Atlas, Indices, facing_side
 from engines.mujoco.textures.burns import Burns
-from engines.mujoco.textures.coats import KINDS, TISSUE_TILE
+from engines.mujoco.textures.coats import TISSUE_TILE, Coat
 from engines.mujoco.textures.noise import Noise
 from engines.mujoco.textures.surface import Recipe
 from schemas.soft_surface import FaceKind
@@ -33,8 +34,16 @@ class DrawnBody:
     """One soft body in a scene."""
 
     def __init__(
-        self, context: mjrf.Context, scene: mjrf.Scene, body: SoftBody, recipe: Recipe, noise: Noise
+        self,
+        context: mjrf.Context,
+        scene: mjrf.Scene,
+        body: SoftBody,
+        recipe: Recipe,
+        coats: Mapping[FaceKind, Coat],
+        noise: Noise,
     ) -> None:
+        """`recipe`: of the outside; `coats`: of changed faces."""
+        self._coats = coats
         self._context, self._scene, self._body, self._noise = context, scene, body, noise
         triangles = body.triangles.astype(np.int64)
         self._rest = body.rest.astype(np.float64)
@@ -129,7 +138,7 @@ class DrawnBody:
             if first == last:
                 continue
             if kind not in self._textures:
-                self._textures[kind] = Textures.of_maps(self._context, KINDS[kind].maps(self._noise))
+                self._textures[kind] = Textures.of_maps(self._context, self._coats[kind].maps(self._noise))
             renderable = self._context.create_renderable(
                 mjrf.RenderableParams(cast_shadow=True, receive_shadow=True)
             )

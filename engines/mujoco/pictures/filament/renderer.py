@@ -20,9 +20,11 @@ from engines.mujoco.pictures.filament.drawn_place import DrawnPlace
 from engines.mujoco.pictures.filament.drawn_solids import DrawnSolids
 from engines.mujoco.pictures.filament.lamp import Lamp, RoomLamp
 from engines.mujoco.pictures.filament.light_control import LightControl
+from engines.mujoco.pictures.skin_params import body_recipes
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.variation import Variation
 from engines.mujoco.place.part import PlacePart
+from engines.mujoco.textures.coats import changed_coats
 from engines.mujoco.textures.noise import Noise
 from robots.dvrk.endoscope import StereoCamera
 from schemas.vectors import Vector
@@ -37,6 +39,7 @@ _TRIES = 6
 """Most pictures until the light of the first one is right."""
 _AMBIENT: Mapping[str, tuple[float, tuple[float, float, float]]] = {
     "abdomen": (9_000.0, (1.0, 0.76, 0.67)),
+    "subhepatic": (6_000.0, (1.0, 0.82, 0.74)),
     "dry-lab": (7_000.0, (0.92, 0.96, 1.0)),
     "none": (9_000.0, (1.0, 1.0, 1.0)),
 }
@@ -97,9 +100,15 @@ class FilamentRenderer:
         )
         self._brightness, colour = _AMBIENT[params.surroundings]
         self._ambient = _add_ambient(self._context, self._scene, self._brightness, colour)
+        recipes = body_recipes(skins, {name: body.rest for name, body in bodies.items()})
         self._bodies = [
             DrawnBody(
-                self._context, self._scene, body, variation.recolour(skins[name].recipe(name), name), noise
+                self._context,
+                self._scene,
+                body,
+                variation.recolour(recipes[name], name),
+                changed_coats(skins[name].tissue(name)),
+                noise,
             )
             for name, body in bodies.items()
         ]

@@ -76,6 +76,12 @@ def test_markers_are_added_changed_and_deleted_in_the_order_of_the_message() -> 
     assert names(store) == [("a", 7)]
 
 
+def test_clips_of_an_organ_are_of_metal_and_signs_are_not() -> None:
+    store = make()
+    send(store, marker(1, ns="cystic_duct/clips"), marker(2, ns="goal"))
+    assert [one.is_metal for one in shown_markers(store.shown)] == [True, False]
+
+
 def test_a_lifetime_ends_in_simulated_time() -> None:
     store = make()
     send(store, marker(1, lifetime=DurationMessage.from_ns(500)), marker(2), t_ns=1000)

@@ -152,6 +152,7 @@ def test_the_colour_is_that_of_the_tissue_whose_name_the_body_has() -> None:
     )
     assert SkinParams().rgb("organ") == SkinParams.model_validate({"colour": "tissue"}).rgb("liver")
     assert SkinParams.model_validate({"colour": [0.1, 0.2, 0.3]}).rgb("liver") == (0.1, 0.2, 0.3)
+    assert [SkinParams().tissue(name) for name in ("cystic_duct", "hepatic_artery")] == ["duct", "artery"]
     with pytest.raises(ValueError, match="less than or equal to 1"):
         SkinParams.model_validate({"colour": [255, 0, 0]})
 

@@ -51,3 +51,13 @@ def test_an_organ_has_an_abdomen_and_nothing_has_no_place() -> None:
     assert wall.vertices[:, 2].max() > 0.1
     empty = EndoscopeParams.model_validate(ARMS)
     assert make_place(empty, build(empty), {}, LENS) == []
+
+
+def test_below_a_liver_no_part_hides_the_triangle() -> None:
+    block, body = CutBlock(np.array([0.12, 0.118, 0.032]), 250), SoftBody("liver/nodes")
+    body.accept(nodes_of(block.mesh.nodes - [0.0, -0.03, 0.03], block.mesh.triangles))
+    params = EndoscopeParams.model_validate(ARMS | {"place": "subhepatic", "skins": {"liver": {}}})
+    _, *parts = make_place(params, build(params), {"liver": body}, LENS)
+    for part in parts:
+        near = np.linalg.norm(part.vertices[:, :2], axis=1) < 0.008
+        assert (part.vertices[near, 2] < -0.008).all()
