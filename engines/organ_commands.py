@@ -102,6 +102,16 @@ def import_files(
             help="Default material; `trocar organs` lists them. Of a label map: ORGAN=NAME, may be repeated.",
         ),
     ] = None,
+    tube: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ORGAN=WALL",
+            help=(
+                "Duct or vessel of a label map that becomes a hollow tube with a wall of this thickness,"
+                " such as 'cystic_duct=1 mm'. May be repeated."
+            ),
+        ),
+    ] = None,
     part: Annotated[
         int | None, typer.Option(min=1, help="Which part of a body in several, 1 for the largest.")
     ] = None,
@@ -137,11 +147,14 @@ def import_files(
                 surfaces=picks,
                 anchors=anchor or [],
                 materials=materials,
+                tubes=_parse_tubes(tube or []),
             )
         )
         return
-    if labels or len(materials) > 1:
-        raise typer.BadParameter("--labels and several materials are those of a label map", param_hint="FILE")
+    if labels or tube or len(materials) > 1:
+        raise typer.BadParameter(
+            "--labels, --tube and several materials are of a label map", param_hint="FILE"
+        )
     organ = import_organ(
         files,
         nodes=nodes,
@@ -169,6 +182,23 @@ def write_example_patient(
     require_place(file)
     write_example(file, seed)
     typer.echo(f"wrote {file}: {', '.join(f'{name}={label}' for name, label in LABELS.items())}")
+
+
+def _parse_tubes(texts: list[str]) -> dict[str, float]:
+    from pydantic import TypeAdapter, ValidationError
+
+    from engines.tissue.organs.tube import Wall
+
+    tubes: dict[str, float] = {}
+    for text in texts:
+        name, _, wall = text.partition("=")
+        try:
+            tubes[name] = TypeAdapter[float](Wall).validate_python(wall)
+        except ValidationError:
+            raise typer.BadParameter(
+                f"'{text}' is not ORGAN=WALL, such as 'cystic_duct=1 mm'", param_hint="--tube"
+            ) from None
+    return tubes
 
 
 def _check_materials(materials: list[str]) -> None:

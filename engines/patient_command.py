@@ -45,6 +45,7 @@ def import_labels(
     surfaces: Mapping[str, SurfacePick],
     anchors: Sequence[str],
     materials: Sequence[str],
+    tubes: Mapping[str, float],
 ) -> str:
     """Write organs and scenario, and return the report. Surfaces and anchors are `organ.name`."""
     from engines.tissue.patient_import import NODES, import_patient
@@ -66,6 +67,7 @@ def import_labels(
         surfaces=picks,
         anchors=held,
         materials=dict(one.split("=", 1) for one in materials),
+        tubes=tubes,
     )
     names = {name: output.with_name(f"{output.stem}-{name}.yaml") for name in patient.organs}
     for name, organ in patient.organs.items():
@@ -87,10 +89,11 @@ def _split(name: str, option: str) -> tuple[str, str]:
 
 def _tissue(patient: ImportedPatient, stem: str) -> dict[str, Any]:
     """Return the tissue of a scenario."""
-    organs = {
+    organs: dict[str, Any] = {
         name: {"mesh": f"{stem}-{name}.yaml", "anchors": [{"surface": one} for one in organ.anchors]}
         for name, organ in patient.organs.items()
     }
+    organs |= {tube.name: tube.params for tube in patient.tubes}
     attachments: dict[str, Any] = {}
     for contact in patient.contacts:
         first, second = contact.organs
@@ -101,6 +104,14 @@ def _tissue(patient: ImportedPatient, stem: str) -> dict[str, Any]:
             "within": f"{1e3 * contact.within:.2f} mm",
             **grown,
         }
+    for tube in patient.tubes:
+        for joint in tube.joints:
+            attachments[f"{tube.name}_on_{joint.organ}"] = {
+                "organs": [tube.name, joint.organ],
+                "surface": joint.end,
+                "within": f"{1e3 * joint.within:.2f} mm",
+                **_GROWN,
+            }
     return {"kind": "fem", "organs": organs, "attachments": attachments}
 
 
@@ -136,6 +147,8 @@ def _lines(patient: ImportedPatient, output: Path, names: Mapping[str, Path]) ->
     for organ in patient.organs.values():
         lines += [_organ_line(organ), *(f"  {line}" for line in organ.report)]
         lines.append(f"  {organ.material}; held at {', '.join(organ.anchors) or 'nothing but other organs'}")
+    for tube in patient.tubes:
+        lines += [f"{tube.name}: {len(tube.mesh.nodes)} nodes", *(f"  {line}" for line in tube.report)]
     for contact in patient.contacts:
         first, second = contact.organs
         lines.append(
@@ -182,7 +195,7 @@ def _cost(output: Path, patient: ImportedPatient) -> str:
             engine.step(k * _MS, _MS, Inputs({}))
             times.append(time.perf_counter() - begun)
     took = float(np.median(times))
-    nodes = sum(len(organ.mesh.nodes) for organ in patient.organs.values())
+    nodes = sum(len(organ.mesh.nodes) for organ in (*patient.organs.values(), *patient.tubes))
     fits = f"some {int(nodes * 1e-3 / took / 100) * 100} nodes" if took < 2e-3 else "fewer nodes"
     return (
         f"a step of 1 ms takes {1e3 * took:.2g} ms here, alone, with {nodes} nodes: {fits} of this size fit"
@@ -196,7 +209,7 @@ def _draw(patient: ImportedPatient, output: Path) -> str:
         return "no picture: pip install 'trocar[mujoco]' draws one"
     from engines.mujoco.pictures.mesh_picture import draw_mesh
 
-    organs = list(patient.organs.values())
+    organs = [*patient.organs.values(), *patient.tubes]
     starts = np.cumsum([0, *(len(organ.mesh.nodes) for organ in organs)])
     numbers = np.arange(int(starts[-1]))
     pictures = [output.with_suffix(".png")]
@@ -213,7 +226,7 @@ def _draw(patient: ImportedPatient, output: Path) -> str:
             },
             f"{output.stem}, {int(starts[-1])} nodes",
         )
-        for organ in organs:
+        for organ in patient.organs.values():
             pictures.append(output.with_name(f"{output.stem}-{organ.name}.png"))
             surfaces = {name: pick.nodes(organ.mesh) for name, pick in organ.surfaces.items()}
             title = f"{organ.name}, {len(organ.mesh.nodes)} nodes"

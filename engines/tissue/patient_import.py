@@ -14,11 +14,13 @@ from engines.tissue.files.label_file import LabelMap, read_labels
 from engines.tissue.meshing.tet_mesh import TetMesh
 from engines.tissue.organs.label_body import LabelBody, cut_out
 from engines.tissue.organs.label_mesh import LabelMesh, mesh_body
+from engines.tissue.organs.label_tube import LabelTube, trace_tube
 from engines.tissue.organs.materials import presets
 from engines.tissue.organs.organ_file import OrganFile
 from engines.tissue.organs.picks import NodePick, SurfacePick
 from engines.tissue.organs.shape import ROUNDING_DIGITS, SIDES
 from engines.tissue.organs.touching import Contact, join
+from engines.tissue.patient_tube import PatientTube, make_tube
 from schemas.errors import ScenarioError, did_you_mean
 from schemas.files import file_hash
 from schemas.keys import valid_name
@@ -79,6 +81,8 @@ class ImportedPatient:
     organs: dict[str, PatientOrgan]
     contacts: list[Contact]
     """Attachments: organs that touch."""
+    tubes: list[PatientTube]
+    """Ducts and vessels, hollow."""
     source: dict[str, Any]
     report: list[str]
     """Sentences about file and frame."""
@@ -94,6 +98,7 @@ def import_patient(
     surfaces: Mapping[str, Mapping[str, SurfacePick]] | None = None,
     anchors: Mapping[str, Sequence[str]] | None = None,
     materials: Mapping[str, str] | None = None,
+    tubes: Mapping[str, float] | None = None,
 ) -> ImportedPatient:
     """Return the organs of a label map.
 
@@ -106,20 +111,24 @@ def import_patient(
         surfaces: named parts of the surface, by organ.
         anchors: held surfaces by organ; default: the bottom of the largest of those that hang together.
         materials: presets by organ; default: one of the organ's name, or liver.
+        tubes: thickness of the wall (m) of ducts and vessels that become hollow tubes.
 
     Raises ScenarioError with the file, the reason and the remedy where there are no usable organs.
     """
     try:
         found = read_labels(path, unit)
         chosen = _choose(found, labels)
+        _check_names(tubes or {}, list(chosen))
         for given in (surfaces, anchors, materials):
-            for name in given or ():
-                if name not in chosen:
-                    raise ValueError(f"there is no organ '{name}'.{did_you_mean(name, chosen)}")
+            _check_names(given or {}, [name for name in chosen if name not in (tubes or {})])
         shift = np.zeros(3) if keep_origin else _middle_of_top(found, list(chosen.values()))
         moved = np.column_stack([found.affine[:, :3], found.affine[:, 3] - shift])
         bodies = [cut_out(replace(found, affine=moved), name, label) for name, label in chosen.items()]
-        organs, contacts = _make_organs(bodies, nodes)
+        lines = [trace_tube(body) for body in bodies if body.name in (tubes or {})]
+        solid = [body for body in bodies if body.name not in (tubes or {})]
+        organs, contacts = _make_organs(solid, lines, nodes)
+        made = [organ.made for organ in organs.values()]
+        hollow = [make_tube(line, (tubes or {})[line.body.name], made) for line in lines]
         for organ in organs.values():
             organ.surfaces |= (surfaces or {}).get(organ.name, {})
             organ.material = (materials or {}).get(organ.name) or _default_material(organ.name)
@@ -128,7 +137,14 @@ def import_patient(
         prefix = "" if str(error).startswith("mesh ") else f"mesh {path}: "
         raise ScenarioError(f"{prefix}{error}") from error
     source = {"files": {path.name: file_hash(path)}, "origin_m": shift.tolist()}
-    return ImportedPatient(organs, contacts, source, [*found.notes, *_frame_sentences(found, shift)])
+    return ImportedPatient(organs, contacts, hollow, source, [*found.notes, *_frame_sentences(found, shift)])
+
+
+def _check_names(given: Mapping[str, Any], known: list[str]) -> None:
+    """Raise ValueError for a name of no organ; tubes have neither surfaces nor materials to state."""
+    for name in given:
+        if name not in known:
+            raise ValueError(f"there is no organ '{name}'.{did_you_mean(name, known)}")
 
 
 def _choose(found: LabelMap, labels: Mapping[str, str]) -> dict[str, int]:
@@ -197,7 +213,9 @@ def _frame_sentences(found: LabelMap, shift: Vector) -> list[str]:
     return sentences
 
 
-def _make_organs(bodies: list[LabelBody], nodes: int) -> tuple[dict[str, PatientOrgan], list[Contact]]:
+def _make_organs(
+    bodies: list[LabelBody], lines: list[LabelTube], nodes: int
+) -> tuple[dict[str, PatientOrgan], list[Contact]]:
     """Return the organs in the order of the bodies, joined where they touch."""
     weights = {body.name: body.field.raw_volume**_BY_VOLUME for body in bodies}
     wanted = {
@@ -205,7 +223,7 @@ def _make_organs(bodies: list[LabelBody], nodes: int) -> tuple[dict[str, Patient
     }
     made: dict[str, LabelMesh] = {}
     for body in sorted(bodies, key=lambda body: body.field.raw_volume):
-        made[body.name] = mesh_body(body, list(made.values()), wanted[body.name])
+        made[body.name] = mesh_body(body, [*lines, *made.values()], wanted[body.name])
     contacts, missed = join(made)
     organs = {body.name: PatientOrgan(made[body.name]) for body in bodies}
     for organ in organs.values():

@@ -158,7 +158,11 @@ def _parse_nifti(file: IO[bytes]) -> dict[str, NDArray[Any]]:
     start = file.read(4)
     is_second = 540 in (int.from_bytes(start, "little"), int.from_bytes(start, "big"))
     kind: Any = nibabel.Nifti2Header if is_second else nibabel.Nifti1Header
-    header: Any = kind(start + file.read(kind.template_dtype.itemsize - 4), check=False)
+    size = int(kind.template_dtype.itemsize)
+    start += file.read(size - 4)
+    if len(start) < size:
+        raise ValueError("it ends within its header")
+    header: Any = kind(start, check=False)
     magic = bytes(header["magic"])
     if not magic.startswith(b"n+"):
         pair = magic.startswith(b"ni")

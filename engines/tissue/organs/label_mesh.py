@@ -15,6 +15,7 @@ from engines.tissue.meshing.mesh_check import MOST_NODES, checked_mesh
 from engines.tissue.meshing.surface import Surface, bisect_long_edges
 from engines.tissue.meshing.tet_mesh import TetMesh
 from engines.tissue.organs.label_body import LabelBody
+from engines.tissue.organs.label_tube import LabelTube
 from engines.tissue.organs.shape import mesher
 from schemas.vectors import Vector
 
@@ -54,7 +55,10 @@ class LabelMesh:
         return float(max(out.max(), back.max())), float(np.quantile(out, 0.95))
 
 
-def mesh_body(body: LabelBody, others: Sequence[LabelMesh], nodes: int) -> LabelMesh:
+Neighbour = LabelMesh | LabelTube
+
+
+def mesh_body(body: LabelBody, others: Sequence[Neighbour], nodes: int) -> LabelMesh:
     """Return tetrahedra with the volume of the voxels.
 
     Args:
@@ -79,7 +83,7 @@ def mesh_body(body: LabelBody, others: Sequence[LabelMesh], nodes: int) -> Label
     return LabelMesh(body, found, offset)
 
 
-def _first_mesh(body: LabelBody, others: Sequence[LabelMesh], nodes: int) -> tuple[TetMesh, float]:
+def _first_mesh(body: LabelBody, others: Sequence[Neighbour], nodes: int) -> tuple[TetMesh, float]:
     """Return a sound mesh and for how many nodes it was made. Raises ValueError, naming the organ."""
     problem, wanted = "", float(nodes)
     for _ in range(_TRIES):
@@ -110,14 +114,14 @@ def _problem(mesh: TetMesh) -> str:
     return ""
 
 
-def _mesh(body: LabelBody, others: Sequence[LabelMesh], nodes: int, offset: float) -> TetMesh:
+def _mesh(body: LabelBody, others: Sequence[Neighbour], nodes: int, offset: float) -> TetMesh:
     """Return a mesh, perhaps with flaws. Raises ValueError where there is none."""
     low, high = body.field.bounds
     field = _field(body, others, offset)
     return mesher(field, lambda points: points, _corner(low - offset), _corner(high + offset))(nodes)
 
 
-def _field(body: LabelBody, others: Sequence[LabelMesh], offset: float) -> Field:
+def _field(body: LabelBody, others: Sequence[Neighbour], offset: float) -> Field:
     """Return the field of a body, larger by `offset` (m), with a gap to others."""
     gap = _GAP * body.field.spacing
 

@@ -18,7 +18,7 @@ from engines.tissue.organs.shape import ROUNDING_DIGITS, Shape
 from schemas.quantity import Length
 from schemas.vectors import Vector
 
-__all__ = ["TubeParams", "tube_shape"]
+__all__ = ["TubeParams", "Wall", "tube_shape"]
 
 _LAYOUTS = [
     (along, around, layers) for layers in (1, 2) for around in range(6, 41, 2) for along in range(4, 201, 2)

@@ -13,8 +13,10 @@ from engines.tissue.meshing.label_field import LabelField
 from engines.tissue.meshing.label_repair import repair_voxels
 from engines.tissue.meshing.tet_mesh import shape_quality
 from engines.tissue.organs.label_body import cut_out
+from engines.tissue.organs.label_tube import trace_tube
 from engines.tissue.organs.params import OrganParams
 from engines.tissue.patient_import import import_patient
+from engines.tissue.patient_tube import make_tube
 from hub.participant import Inputs, Setup
 from hub.planning import scenario_file
 from schemas.errors import ScenarioError
@@ -154,16 +156,17 @@ def test_the_command_writes_a_patient_that_runs(scan, tmp_path):
     output = tmp_path / "mine.yaml"
     arguments = ["import", str(scan), "-o", str(output), "--nodes", "300"]
     arguments += ["--labels", "gb=Gallbladder,duct=3", "--surface", "gb.fundus={normal: +y}"]
+    arguments += ["--tube", "duct=1 mm"]
     done = CliRunner().invoke(app, [*arguments, "--anchor", "gb.bottom", "--material", "gb=colon"])
     assert done.exit_code == 0, done.output
-    assert "duct touches gb over" in done.output
+    assert "left at gb, right at no organ: held" in done.output
     assert "held at bottom" in done.output
     assert "a step of 1 ms takes" in done.output
     assert (tmp_path / "mine.png").is_file() or "no picture: no OpenGL works here" in done.output
     assert scenario_file.load(output).scenario.participants["tissue"].kind == "fem"
     organ = OrganParams.model_validate({"mesh": "mine-gb.yaml"}, context=Files(tmp_path).context)
     assert organ.material_name == "colon"
-    assert {"fundus", "to_duct", "bottom"} <= set(organ.body.names)
+    assert {"fundus", "bottom"} <= set(organ.body.names)
     fundus = organ.body.picks["fundus"].nodes(organ.local)
     assert organ.local.nodes[fundus, 1].min() > organ.local.nodes[:, 1].mean()
 
@@ -188,6 +191,53 @@ def test_the_organs_hang_at_rest_by_their_attachments(patient, tmp_path):
     weight = 9.81 * 1060.0 * sum(patient.organs[name].mesh.volume for name in ("gallbladder", "cystic_duct"))
     assert np.abs(outputs["plate/force"]) == pytest.approx([0.0, 0.0, weight], abs=0.1 * weight)
     assert outputs["plate/freed"] == outputs["neck/freed"] == 0.0
+
+
+def bent_tube(radius=3.0):
+    """Return the body of a tube along a quarter of a circle of 20 mm, in voxels of 1 mm."""
+    places = np.moveaxis(np.indices((36, 36, 15)), 0, -1) - [6.3, 6.3, 7.3]
+    around = np.hypot(places[..., 0], places[..., 1]) - 20.0
+    inside = np.hypot(around, places[..., 2]) < radius
+    inside &= (places[..., :2] > 0.0).all(axis=-1)
+    return cut_out(LabelMap(inside.astype(np.uint16), MM, np.zeros((2, 3), np.bool_), {}, []), "duct", 1)
+
+
+def test_a_tube_has_its_middle_line_and_diameters():
+    tube = trace_tube(bent_tube())
+    centred = 1e3 * tube.path - [6.3, 6.3, 7.3]
+    assert np.hypot(centred[:, 0], centred[:, 1]) == pytest.approx(20.0, abs=1.0)
+    assert centred[:, 2] == pytest.approx(0.0, abs=0.3)
+    assert 1e3 * tube.diameters == pytest.approx(6.0, abs=0.7)
+    length = 1e3 * np.linalg.norm(np.diff(tube.path, axis=0), axis=1).sum()
+    assert length == pytest.approx(10.0 * np.pi, abs=1.5)
+
+
+def test_what_is_no_tube_is_refused():
+    crossed = ball(3.0, (1, 30, 30)).repeat(30, axis=0)
+    crossed |= crossed.transpose(1, 0, 2)
+    for inside in (ball(8.0), crossed):
+        labels = LabelMap(inside.astype(np.uint16), MM, np.zeros((2, 3), np.bool_), {}, [])
+        with pytest.raises(ValueError, match="no tube without branches"):
+            trace_tube(cut_out(labels, "duct", 1))
+    with pytest.raises(ValueError, match=r"3 mm leaves no lumen.* mm at most"):
+        make_tube(trace_tube(bent_tube()), 3e-3, [])
+
+
+def test_a_duct_becomes_a_hollow_tube_on_its_organ(scan):
+    chosen = {"gb": "2", "duct": "3"}
+    patient = import_patient(scan, chosen, nodes=300, tubes={"duct": 1e-3})
+    (duct,) = patient.tubes
+    assert list(patient.organs) == ["gb"]
+    (joint,) = duct.joints
+    assert (joint.organ, joint.end) == ("gb", "left")
+    assert 0.2e-3 < joint.within < 4e-3
+    assert duct.params["anchors"] == [{"surface": "right"}]
+    assert duct.params["lumen"]["liquid"] == "bile"
+    organ = OrganParams.model_validate(duct.params)
+    assert organ.inner_wall is not None
+    assert 4e-3 < np.mean(duct.params["tube"]["diameters"]) < 8e-3
+    with pytest.raises(ScenarioError, match="no organ 'duct'"):
+        import_patient(scan, chosen, anchors={"duct": ["left"]}, tubes={"duct": 1e-3})
 
 
 @pytest.mark.parametrize(
