@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from hub.participant import Record, number
+from hub.participant import Record, array, number
 from schemas.trocar_msgs import ScoreValue
 from tasks.cholecystectomy.organs import FAT_BED, GALLBLADDER, ORGANS, PLATE, TARGETS
 from tasks.cholecystectomy.tissue_seen import TissueSeen
@@ -39,6 +39,8 @@ class CriticalViewState(Record):
     """Share of the whole plate that is free."""
     at_clip = number(-1.0)
     """Number of criteria that were met at the first clip; -1: no clip yet."""
+    view = array(3)
+    """Structures, and shares of fat and plate, now or, once there is a clip, at the first one."""
 
 
 class CriticalView(Watch[CriticalViewState]):
@@ -76,18 +78,20 @@ class CriticalView(Watch[CriticalViewState]):
         state.freed = self._seen.shares.get(PLATE, 0.0)
         if self.is_freed and not was_freed:
             yield Event("gallbladder freed", place=ORGANS.index(GALLBLADDER), value=state.freed)
-        if state.at_clip < 0.0 and is_clipped:
-            state.at_clip = float(self.met)
+        if state.at_clip < 0.0:
+            state.view[:] = state.structures, state.cleared, state.plate
+            state.at_clip = float(self.met) if is_clipped else state.at_clip
 
     def values(self) -> Iterator[ScoreValue]:
-        """Yield number of structures, shares, and number of criteria met at the first clip."""
+        """Yield structures and shares up to the first clip, and the number of criteria met there."""
         state, seen = self.state, self._seen
+        structures, cleared, plate = state.view.tolist()
         reason = "" if self.has_tubes else "no lines of cystic duct and artery: connect tissue/<organ>/line"
-        yield value_or_reason("cvs/structures", state.structures, "", reason)
+        yield value_or_reason("cvs/structures", structures, "", reason)
         reason = "" if seen.triangle_cleared is not None else _NO_TRIANGLE
-        yield value_or_reason("cvs/triangle_cleared", state.cleared, "", reason)
+        yield value_or_reason("cvs/triangle_cleared", cleared, "", reason)
         reason = "" if seen.plate_freed is not None else _NO_PLATE
-        yield value_or_reason("cvs/plate_freed", state.plate, "", reason)
+        yield value_or_reason("cvs/plate_freed", plate, "", reason)
         reason = "" if PLATE in seen.shares else _NO_PLATE
         yield value_or_reason("plate_freed", state.freed, "", reason)
         reason = "" if state.at_clip >= 0.0 else "nothing has been clipped yet"

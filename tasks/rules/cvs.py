@@ -28,7 +28,7 @@ class CvsState(Record):
 
 
 class CvsDoublet(Rules[CvsState]):
-    """Points by what the metrics `cvs/...` say now."""
+    """Points by the metrics `cvs/...`: before the first clip."""
 
     name: ClassVar[str] = "cvs-doublet"
 

@@ -323,6 +323,8 @@ def test_the_critical_view_comes_from_the_state():
     assert (trial.rule("cvs-doublet", "total"), trial.rule("cvs-doublet", "satisfactory")) == (6.0, 1.0)
     trial.clip("cystic_duct", 5e-3)
     assert trial.metric("cvs/met_at_first_clip") == 3.0
+    trial.cut("cystic_duct", 8e-3)
+    assert trial.metric("cvs/structures") == trial.rule("cvs-doublet", "two_structures") == 2.0
     dissection = Operation(phase="calot-dissection")
     shares = {
         "tissue/cystic_plate/lower_third": [0.95],
