@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from anatomy.drape import drape
 from anatomy.layout import Layout, Line
 from anatomy.patient import (
     ARTERY_WALL,
@@ -16,6 +17,7 @@ from anatomy.patient import (
     HEPATIC_ARTERY_WALL,
     Patient,
 )
+from anatomy.phase import Phase
 
 __all__ = ["attachments_of", "organs_of"]
 
@@ -34,15 +36,27 @@ _SOFT: dict[str, Any] = {"poisson_ratio": 0.45, "friction": 0.2}
 _DUCT_CUTTING: dict[str, Any] = {"toughness": 300.0}
 """Between a sharp cut of aorta (290 J/m^2) and a tear (1.7 kJ/m^2); estimated."""
 _BILE: dict[str, Any] = {"liquid": "bile", "pressure": 10.0 * _MMHG, "supply": ["right"]}
+_BILE_VOLUME = 28e-6
+"""Fasting, m^3: 26.5 ml of women, 29.9 ml of men in ultrasound of 400 adults (Zanco J. Med. Sci.)."""
 _BILE_MOVES = 4.0
-"""Inertia of the gallbladder: some 16 g of wall carry 50 ml of bile with them."""
+"""Inertia of the gallbladder: 16 g of wall move with 28 ml of bile (3), and a little more."""
 _TUBE_INERTIA = 25.0
 """Inertia of ducts and vessels, for sub-steps of 0.1 ms: 0.3 g of duct move as 8 g."""
 _JOINT: dict[str, Any] = {"strength": 1e6, "toughness": 1000.0}
 """As a duct or vessel itself; assumed."""
 
 
-def organs_of(patient: Patient) -> dict[str, dict[str, Any]]:
+_FAT: dict[str, Any] = {"strength": 5e3, "toughness": 20.0}
+"""Areolar tissue between fat and what lies below; assumed."""
+_FAT_OFF, _FAT_SIZE = np.array([-0.003, 0.006]), (0.034, 0.034)
+"""Middle of the fat beside that of the cystic duct, along x and y, and its extent, m."""
+_FAT_THICKNESS, _FAT_FLOOR, _FAT_HEIGHTS = 0.003, -0.012, 13
+"""Thickness of peritoneum and fat over the triangle, lowest height of the underside, m; heights a side."""
+_FAT_GAP = 0.0008
+_UNDER_FAT = "gallbladder", "cystic_duct", "common_bile_duct"
+
+
+def organs_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
     """Return the organs by name."""
     layout = Layout(patient)
     makers: dict[str, Callable[[Patient, Layout], dict[str, Any]]] = {
@@ -53,20 +67,42 @@ def organs_of(patient: Patient) -> dict[str, dict[str, Any]]:
         "common_bile_duct": _common_bile_duct,
         "hepatic_artery": _hepatic_artery,
     }
-    return {name: make(patient, layout) for name, make in makers.items()}
+    made = {name: make(patient, layout) for name, make in makers.items()}
+    if phase in ("calot-dissection", "cholecystectomy"):
+        made["fat"] = _fat(patient, layout)
+    if phase in ("gallbladder-bed", "cholecystectomy"):
+        made["liver"] |= {"cutting": {}, "bleeding": {}}
+    if phase == "gallbladder-bed":
+        del made["cystic_duct"], made["cystic_artery"]
+    return made
 
 
-def attachments_of(patient: Patient) -> dict[str, dict[str, Any]]:
-    """Return the attachments by name, for a triangle that has been dissected."""
-    touching = 0.25 * patient.common_duct_diameter + 0.001
+def attachments_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
+    """Return the attachments by name."""
+    found = _plate(patient, 0.0 if phase in ("calot-dissection", "cholecystectomy") else _OPENED)
+    if phase != "gallbladder-bed":
+        found |= _joints(patient)
+    if phase in ("calot-dissection", "cholecystectomy"):
+        for name in _UNDER_FAT:
+            found[f"fat_{name}"] = {"organs": ["fat", name], "surface": "underside", "within": 0.002, **_FAT}
+    return found
+
+
+def _plate(patient: Patient, opened: float) -> dict[str, dict[str, Any]]:
     return {
         "cystic_plate": {
             "organs": ["gallbladder", "liver"],
             "surface": "bed",
             "within": 0.006,
             "lower_end": np.round(Layout(patient).neck, _DIGITS).tolist(),
-            "opened": _OPENED,
-        },
+            "opened": opened,
+        }
+    }
+
+
+def _joints(patient: Patient) -> dict[str, dict[str, Any]]:
+    touching = 0.25 * patient.common_duct_diameter + 0.001
+    return {
         "neck_duct": {"organs": ["cystic_duct", "gallbladder"], "surface": "left", "within": 0.002, **_JOINT},
         "duct_confluence": {
             "organs": ["cystic_duct", "common_bile_duct"],
@@ -129,7 +165,40 @@ def _gallbladder(patient: Patient, layout: Layout) -> dict[str, Any]:
         "inertia": _BILE_MOVES,
         "anchors": [{"surface": "right"}],
         "cutting": _DUCT_CUTTING,
-        "lumen": _BILE,
+        "lumen": {**_BILE, "volume": _BILE_VOLUME},
+    }
+
+
+def _fat(patient: Patient, layout: Layout) -> dict[str, Any]:
+    tubes = [
+        (layout.gallbladder, 0.5 * layout.gallbladder_diameters),
+        *(
+            (line, np.full(len(line), 0.5 * diameter))
+            for line, diameter in (
+                (layout.cystic_duct, patient.duct_diameter),
+                (layout.cystic_artery, patient.artery_diameter),
+                (layout.common_duct, patient.common_duct_diameter),
+            )
+        ),
+    ]
+    shares = np.linspace(-0.5, 0.5, _FAT_HEIGHTS)
+    middle = np.append(0.5 * (layout.neck + layout.confluence)[:2] + _FAT_OFF, 0.0)
+    xs, ys = (middle[i] + _FAT_SIZE[i] * shares for i in (0, 1))
+    heights = drape(xs, ys, tubes, _FAT_GAP, _FAT_FLOOR)
+    return {
+        "sheet": {
+            "size": _FAT_SIZE,
+            "thickness": _FAT_THICKNESS,
+            "heights": np.round(heights, _DIGITS).tolist(),
+        },
+        "nodes": 500,
+        "position": np.round(middle, _DIGITS).tolist(),
+        "young_modulus": 10e3,
+        "density": 911.0,
+        "inertia": 4.0,
+        **_SOFT,
+        "anchors": [],
+        "cutting": {"toughness": 100.0},
     }
 
 

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from anatomy.organs import attachments_of, organs_of
 from anatomy.patient import Patient, Variations, draw_patient
+from anatomy.phase import Phase
 
 __all__ = ["AnatomyParams"]
 
@@ -18,9 +19,13 @@ class AnatomyParams(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     patient: int = Field(default=0, ge=0, le=2**53, description="seed of sizes, stiffness and variations")
-    phase: Literal["clip-and-cut"] = Field(
+    phase: Phase = Field(
         default="clip-and-cut",
-        description="clip-and-cut: the triangle is dissected, the lower third of the cystic plate is free",
+        description=(
+            "calot-dissection: fat and peritoneum lie over the triangle; clip-and-cut: it is dissected, the"
+            " lower third of the cystic plate is free; gallbladder-bed: duct and artery have been divided;"
+            " cholecystectomy: all, from the fat on, with a liver that may be cut and bleeds"
+        ),
     )
     artery: Literal["cranial", "front", "behind"] | None = Field(
         default=None, description="course of the cystic artery about the duct; default: as the seed draws it"
@@ -40,9 +45,9 @@ class AnatomyParams(BaseModel):
     @property
     def organs(self) -> dict[str, dict[str, Any]]:
         """The organs by name, as a scenario states them."""
-        return organs_of(self.drawn)
+        return organs_of(self.drawn, self.phase)
 
     @property
     def attachments(self) -> dict[str, dict[str, Any]]:
         """The attachments by name, as a scenario states them."""
-        return attachments_of(self.drawn)
+        return attachments_of(self.drawn, self.phase)

@@ -11,7 +11,6 @@ from anatomy.spread import Spread
 __all__ = ["GALLBLADDER_LENGTH", "Patient", "Variations", "draw_patient"]
 
 ArteryCourse = Literal["cranial", "front", "behind"]
-CalotPhase = Literal["clip-and-cut"]
 
 GALLBLADDER_LENGTH = Spread(0.085, 0.008, 0.070, 0.100)
 """Fasting: 70 to 100 mm (StatPearls; The Common Vein); the deviation is assumed."""

@@ -9,7 +9,7 @@ from anatomy.params import AnatomyParams
 
 __all__ = ["add_anatomy"]
 
-_FORMS = frozenset({"size", "shape", "mesh", "tube", "visceral_face"})
+_FORMS = frozenset({"size", "shape", "mesh", "tube", "visceral_face", "sheet"})
 _MATERIALS = frozenset({"material", "material_file", "young_modulus"})
 _OF_MODULUS = frozenset({"poisson_ratio", "density"})
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from hub.participant import Record, array, number
 from schemas.trocar_msgs import ScoreValue
-from tasks.cholecystectomy.organs import FAT_BED, GALLBLADDER, ORGANS, PLATE, TARGETS
+from tasks.cholecystectomy.organs import FAT_BEDS, GALLBLADDER, ORGANS, PLATE, TARGETS
 from tasks.cholecystectomy.tissue_seen import TissueSeen
 from tasks.cholecystectomy.tubes import TubeWatch
 from tasks.cholecystectomy.watch import Watch, value_or_reason
@@ -23,7 +23,7 @@ CLEARED = 0.9
 _FREED = 0.99
 """Share of the whole plate that counts as all; ours."""
 _NO_PLATE = f"no cystic plate with a `lower_end`: connect or record tissue/{PLATE}/lower_third"
-_NO_TRIANGLE = f"not known: connect tissue/<organ>/line of the tubes and tissue/{FAT_BED}/*"
+_NO_TRIANGLE = f"not known: connect tissue/<organ>/line of the tubes and tissue/{FAT_BEDS[0]}/*"
 
 
 class CriticalViewState(Record):

@@ -12,7 +12,7 @@ __all__ = [
     "COMMON_DUCT",
     "DUCT",
     "FAT",
-    "FAT_BED",
+    "FAT_BEDS",
     "GALLBLADDER",
     "HEPATIC_ARTERY",
     "JOINTS",
@@ -38,8 +38,10 @@ ORGANS = (GALLBLADDER, *TUBES, LIVER, FAT, BOWEL)
 BILE = (GALLBLADDER, DUCT, COMMON_DUCT)
 """Organs whose openings let out bile."""
 
-PLATE, FAT_BED = "cystic_plate", "fat_bed"
-"""Attachments of the gallbladder to the liver, and of the fat over the triangle to what lies below."""
+PLATE = "cystic_plate"
+"""Attachment of the gallbladder to the liver."""
+FAT_BEDS = "fat_gallbladder", "fat_cystic_duct", "fat_common_bile_duct"
+"""Attachments of the fat over the triangle to what lies below."""
 JOINTS: Mapping[str, str] = MappingProxyType(
     {"neck_duct": DUCT, "duct_confluence": DUCT, "neck_artery": ARTERY, "artery_origin": ARTERY}
 )

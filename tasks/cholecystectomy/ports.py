@@ -8,7 +8,7 @@ from hub.participant import event_in, signal_in, signal_out
 from schemas.ports import Port
 from schemas.ros import Float64Message, StringMessage
 from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeEvent, TubeLine
-from tasks.cholecystectomy.organs import BOWEL, FAT_BED, JOINTS, LIVER, ORGANS, PLATE, TUBES
+from tasks.cholecystectomy.organs import BOWEL, FAT_BEDS, JOINTS, LIVER, ORGANS, PLATE, TUBES
 
 __all__ = ["operation_outputs", "tissue_inputs"]
 
@@ -28,7 +28,7 @@ def tissue_inputs(arms: Mapping[str, Sequence[str]]) -> Iterator[Port]:
         yield signal_in(
             f"tissue/{organ}/nodes", SoftBodyState, "for distances of burns", frame="world", start=()
         )
-    for attachment in (PLATE, FAT_BED, *JOINTS):
+    for attachment in (PLATE, *FAT_BEDS, *JOINTS):
         for part, meaning in (("freed", "area that has parted"), ("tied", "area that is tied")):
             yield signal_in(f"tissue/{attachment}/{part}", description=meaning, unit="m^2", start=(0.0,))
     third = "share that is free of the lower third"

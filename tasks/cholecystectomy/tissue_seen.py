@@ -11,7 +11,7 @@ import numpy as np
 from hub.participant import Inputs
 from schemas.trocar_msgs import SoftBodyState, TissueEvent, TissueGrasp, TubeEvent, TubeLine
 from schemas.vectors import Vector
-from tasks.cholecystectomy.organs import BILE, FAT, FAT_BED, JOINTS, ORGANS, PLATE, TARGETS, TUBES
+from tasks.cholecystectomy.organs import BILE, FAT, FAT_BEDS, JOINTS, ORGANS, PLATE, TARGETS, TUBES
 from tasks.cholecystectomy.tube_line import Tube
 
 __all__ = ["ArmSeen", "OrganSeen", "TissueSeen"]
@@ -83,6 +83,8 @@ class TissueSeen:
         self._arm_of = {probe: i for i, probes in enumerate(arms.values()) for probe in probes}
         self.freed: dict[str, float] = {}
         """Parted area of each connected attachment, m^2."""
+        self.areas: dict[str, float] = {}
+        """Area of each connected attachment, parted or not, m^2."""
         self.shares: dict[str, float] = {}
         """Parted share of each connected attachment."""
         self.plate_freed: float | None = None
@@ -100,8 +102,8 @@ class TissueSeen:
             arm.has_energy = f"{arm.name}/energy" in connected and not heats.isdisjoint(connected)
             arm.can_exchange = f"{arm.name}/set_tool_type" in connected
             arm.has_grasp = any(f"tissue/{probe}/held" in connected for probe in arm.probes)
-        known = [name for name in (PLATE, FAT_BED, *JOINTS) if f"tissue/{name}/freed" in connected]
-        self.freed, self.shares = dict.fromkeys(known, 0.0), dict.fromkeys(known, 0.0)
+        known = [name for name in (PLATE, *FAT_BEDS, *JOINTS) if f"tissue/{name}/freed" in connected]
+        self.freed, self.shares, self.areas = (dict.fromkeys(known, 0.0) for _ in range(3))
         self._has_third = f"tissue/{PLATE}/lower_third" in connected
         self._with_nodes = [name for name in ORGANS if f"tissue/{name}/nodes" in connected]
 
@@ -126,7 +128,8 @@ class TissueSeen:
             self._read_arm(inputs, arm)
         for name in self.freed:
             freed, tied = (float(inputs[f"tissue/{name}/{part}"][0]) for part in ("freed", "tied"))
-            self.freed[name], self.shares[name] = freed, freed / max(freed + tied, 1e-12)
+            self.freed[name], self.areas[name] = freed, freed + tied
+            self.shares[name] = freed / max(freed + tied, 1e-12)
         if self._has_third:
             self.plate_freed = float(inputs[f"tissue/{PLATE}/lower_third"][0])
 
@@ -153,7 +156,11 @@ class TissueSeen:
         """Share of the fat over the triangle that is free; None: not known."""
         if not all(self.organs[name].has_line for name in TARGETS):
             return None
-        return self.shares.get(FAT_BED) if self.organs[FAT].is_known else 1.0
+        if not self.organs[FAT].is_known:
+            return 1.0
+        beds = [name for name in FAT_BEDS if name in self.areas]
+        whole = sum(self.areas[name] for name in beds)
+        return sum(self.freed[name] for name in beds) / max(whole, 1e-12) if beds else None
 
     def lost(self, *, bile: bool) -> float | None:
         """Return the bile or the blood lost by all organs, ml; None: not known."""

@@ -328,8 +328,8 @@ def test_the_critical_view_comes_from_the_state():
     dissection = Operation(phase="calot-dissection")
     shares = {
         "tissue/cystic_plate/lower_third": [0.95],
-        "tissue/fat_bed/freed": [0.95],
-        "tissue/fat_bed/tied": [0.05],
+        "tissue/fat_gallbladder/freed": [0.95],
+        "tissue/fat_gallbladder/tied": [0.05],
     }
     dissection.set(**shares).wait(0.05)
     assert dissection.kinds == ["triangle cleared", "plate opened"]

@@ -30,6 +30,7 @@ from engines.tissue.organs.materials import TissueDensity, TissueModulus, Tissue
 from engines.tissue.organs.organ_file import OrganFile
 from engines.tissue.organs.prony import PronySeries, PronyTerm
 from engines.tissue.organs.shape import Shape
+from engines.tissue.organs.sheet import SheetParams, sheet_shape
 from engines.tissue.organs.surface_mesh import mesh_surface
 from engines.tissue.organs.tube import TubeParams, tube_shape
 from engines.tissue.organs.visceral_face import VisceralFaceParams, visceral_shape
@@ -75,6 +76,9 @@ class OrganParams(BaseModel):
     tube: TubeParams | None = Field(default=None, description="instead: a duct, a vessel or a pouch")
     visceral_face: VisceralFaceParams | None = Field(
         default=None, description="instead: the part of a liver about the gallbladder"
+    )
+    sheet: SheetParams | None = Field(
+        default=None, description="instead: peritoneum with fat, draped over what lies below"
     )
     unit: Literal["m", "mm"] | None = Field(
         default=None, description="of the file of tetrahedra or of a surface; default: m"
@@ -159,11 +163,11 @@ class OrganParams(BaseModel):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Self:
-        forms = self.size, self.shape, self.mesh, self.tube, self.visceral_face
+        forms = self.size, self.shape, self.mesh, self.tube, self.visceral_face, self.sheet
         if sum(form is not None for form in forms) != 1:
             raise ValueError(
-                f"an organ has a size (a block), a shape ({', '.join(SHAPES)}), a mesh (a file), a tube or a"
-                " visceral_face, one of them"
+                f"an organ has a size (a block), a shape ({', '.join(SHAPES)}), a mesh (a file), a tube, a"
+                " visceral_face or a sheet, one of them"
             )
         if self.lumen is not None and (self.tube is None) != bool(self.lumen.line):
             raise ValueError(
@@ -293,6 +297,8 @@ class OrganParams(BaseModel):
             return tube_shape(self.tube)
         if self.visceral_face is not None:
             return visceral_shape(self.visceral_face)
+        if self.sheet is not None:
+            return sheet_shape(self.sheet)
         if self.mesh is not None:
             return _from_file(self.mesh, _UNITS[self.unit or "m"], self.nodes or _NODES)
         return SHAPES[self.shape or ""]

@@ -1,0 +1,7 @@
+"""Phases of the operation."""
+
+from typing import Literal
+
+__all__ = ["Phase"]
+
+Phase = Literal["calot-dissection", "clip-and-cut", "gallbladder-bed", "cholecystectomy"]
