@@ -81,4 +81,4 @@ class Appearance(NamedTuple):
     """Coats of rigid parts, by `Part.coat`."""
     surroundings: Sequence[Surrounding]
     place: str
-    """Name of the place, which says how it is lit: `abdomen`, `dry-lab` or `none`."""
+    """Name of the place, which says how it is lit: `abdomen`, `subhepatic`, `dry-lab`, `none`."""

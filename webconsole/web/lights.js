@@ -9,7 +9,12 @@ const HALF_ANGLE = (52 * Math.PI) / 180 // of the cone of a lens: engines/mujoco
 const XENON = 0xfff7eb
 const SHADOW_PX = 1024
 // Shares of the light at the work, by place: lens, room, shoulder, all sides.
-const SHARES = { abdomen: [0.9, 0, 0.12, 0.14], "dry-lab": [0.5, 0.5, 0.05, 0.2], none: [0.65, 0, 0.35, 0.25] }
+const SHARES = {
+  abdomen: [0.9, 0, 0.12, 0.14],
+  subhepatic: [0.92, 0, 0.1, 0.12],
+  "dry-lab": [0.5, 0.5, 0.05, 0.2],
+  none: [0.65, 0, 0.35, 0.25],
+}
 const ALONE = [0, 0.8, 0.2, 0.25] // without an endoscope
 const SIMPLER = 2.2 // factor of the light from all sides where it reflects nowhere
 const ROOM_WAY = [-0.45, -0.3, 1] // to the lamp of the room
