@@ -2,9 +2,11 @@
 
     python -m bench.baselines                           # 100 seeds; trains the clones if there are none
     python -m bench.baselines --exercises NeedlePick --seeds 20 --difficulties nominal,latency-100
+    python -m bench.baselines --curve clones/NeedlePick-pictures.csv docs/pictures/picture-training.svg
 
-Expert: the oracle. Clone: behaviour cloning from state (learning/policies). Replay: the oracle's actions of
-one demonstration, whatever is seen. Random: uniform actions. Trials have seeds from 0 on, demonstrations from
+Expert: the oracle. Clone: behaviour cloning from state (learning/policies). Pictures: behaviour cloning from
+pictures, where clones/ has a network; its training wants a GPU. Replay: the oracle's actions of one
+demonstration, whatever is seen. Random: uniform actions. Trials have seeds from 0 on, demonstrations from
 10000 on. The same command goes on with an interrupted table.
 """
 
@@ -35,6 +37,7 @@ from learning.policies.demonstrations import demonstrate
 POLICIES = {
     "expert": "expert",
     "clone": "learning.policies.cloned_policy:ClonedPolicy",
+    "pictures": "learning.policies.picture_policy:PicturePolicy",
     "replay": "bench.baselines:Replay",
     "random": "random",
 }
@@ -107,15 +110,47 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--directory", type=Path, default=Path("build/baselines"))
+    parser.add_argument("--curve", type=Path, nargs=2, metavar=("CSV", "FILE"), help="draw a curve only")
     asked = parser.parse_args()
+    if asked.curve:
+        draw_curve(*asked.curve)
+        return
     policies = asked.policies.split(",")
     print("| exercise | difficulty |", " | ".join(policies), "|")
     print("|" + "---|" * (2 + len(policies)))
     for name in exercises_of(asked.exercises):
         if "clone" in policies and not (Path("clones") / f"{kind_of(name)}.npz").is_file():
             subprocess.run([sys.executable, "-m", "learning.policies", name], check=True)
-        for row in zip(*(judge(policy, name, asked) for policy in policies), strict=True):
-            print(f"| {name} | {row[0].difficulty} |", " | ".join(map(cell, row)), "|", flush=True)
+        results = [measured(policy, name, asked) for policy in policies]
+        for i, difficulty in enumerate(difficulties_of(asked.difficulties)):
+            cells = [cell(each[i]) if each else "not measured" for each in results]
+            print(f"| {name} | {difficulty} |", " | ".join(cells), "|", flush=True)
+
+
+def measured(policy: str, exercise: str, asked: argparse.Namespace) -> list[Result]:
+    """Return the results by difficulty; none of a policy from pictures without its network."""
+    if policy == "pictures" and not (Path("clones") / f"{kind_of(exercise)}-pictures.npz").is_file():
+        return []
+    return judge(policy, exercise, asked)
+
+
+def draw_curve(table: Path, file: Path) -> None:
+    """Draw the errors of a training from pictures over its batches."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    mpl.rcParams["svg.hashsalt"] = "trocar"
+    from matplotlib import pyplot as plt
+
+    batches, training, held_out = np.loadtxt(table, delimiter=",", skiprows=1).T
+    figure, axes = plt.subplots(figsize=(5.5, 3.0), layout="constrained")
+    axes.plot(batches, training, color="#1f6f8b", label="demonstrations trained on")
+    axes.plot(batches, held_out, color="#c8553d", label="held out")
+    axes.set(xlabel="batches of 256 steps", ylabel="mean absolute error of actions", ylim=(0.0, None))
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(axis="y", alpha=0.3)
+    axes.legend(frameon=False)
+    figure.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else None)
 
 
 def kind_of(exercise: str) -> str:

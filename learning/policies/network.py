@@ -5,12 +5,14 @@ from __future__ import annotations
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from schemas.errors import ScenarioError
-from schemas.vectors import Vector
+
+if TYPE_CHECKING:
+    from schemas.vectors import Vector
 
 __all__ = ["Network"]
 

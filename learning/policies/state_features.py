@@ -11,9 +11,9 @@ from learning.environments.environment import Environment, Observation
 from learning.environments.oracles.waypoints import Seen, yaw_of
 from schemas.vectors import Vector
 
-__all__ = ["StateFeatures"]
+__all__ = ["UNIT", "StateFeatures", "offset"]
 
-_UNIT, _TURN = 10e-3, pi / 6.0
+UNIT, _TURN = 10e-3, pi / 6.0
 """Displacement, m, and turn, rad, of an action of 1."""
 _MULTIPLES = (1, 2, 3, 6)
 """Multiples of a turn: a jaw looks the same after half a turn, a ring after a third."""
@@ -36,12 +36,12 @@ class StateFeatures:
         """Return the features, shape (n,)."""
         seen = Seen(self._layout, observation)
         achieved = np.asarray(observation["achieved_goal"], np.float64)[:3]
-        parts = [*_offset(seen.goal[:3] - achieved)]
+        parts = [*offset(seen.goal[:3] - achieved)]
         for hand in self._hands:
-            parts += [seen[f"{hand}/tip/position"] / _UNIT, seen[f"{hand}/jaw"]]
+            parts += [seen[f"{hand}/tip/position"] / UNIT, seen[f"{hand}/jaw"]]
             parts += [_turns(_yaw(seen, hand))]
         for first, second in combinations(self._hands, 2):
-            parts += [(seen[f"{second}/tip/position"] - seen[f"{first}/tip/position"]) / _UNIT]
+            parts += [(seen[f"{second}/tip/position"] - seen[f"{first}/tip/position"]) / UNIT]
         for thing in self._things:
             turn = seen.matrix(thing)
             parts += [turn.ravel(), _turns(yaw_of(turn))]
@@ -57,9 +57,9 @@ class StateFeatures:
         across = np.array([cos(yaw) * off[0] + sin(yaw) * off[1], cos(yaw) * off[1] - sin(yaw) * off[0]])
         nearest = [remainder(angle, pi), remainder(angle + pi / 2.0, pi), remainder(angle + _TURN, pi / 3.0)]
         return [
-            *_offset(off),
-            *_offset(achieved - tip),
-            across / _UNIT,
+            *offset(off),
+            *offset(achieved - tip),
+            across / UNIT,
             seen[f"{thing}/held_by/{hand}"],
             _turns(angle),
             np.clip(np.array(nearest) / _TURN, -1.0, 1.0),
@@ -71,9 +71,9 @@ def _yaw(seen: Seen, hand: str) -> float:
     return yaw_of(seen.matrix(f"{hand}/tip"), 1)
 
 
-def _offset(metres: Vector) -> list[Vector]:
+def offset(metres: Vector) -> list[Vector]:
     """Return an offset as such, cut off, and enlarged."""
-    off = metres / _UNIT
+    off = metres / UNIT
     return [off, np.clip(off, -1.0, 1.0), np.clip(_FINE * off, -1.0, 1.0)]
 
 

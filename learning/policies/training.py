@@ -4,34 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
 import torch
 from torch import nn
 
-from learning.policies.demonstrations import Demonstration
+from learning.policies.demonstration import STEPS, Demonstration, chunks
 from learning.policies.network import Network
-from schemas.vectors import Vector
 
-__all__ = ["STEPS", "chunks", "train"]
+__all__ = ["train"]
 
-STEPS = 4
-"""Number of steps that a network predicts: 0.8 s."""
 _WIDTH, _BATCH = 384, 256
 _RATE, _DECAY = 1e-3, 1e-4
-
-
-def chunks(demonstrations: Sequence[Demonstration]) -> tuple[Vector, Vector]:
-    """Return features, shape (m, n), and the actions of the next STEPS steps, shape (m, STEPS * 5 hands).
-
-    The last action of an episode goes on after the end.
-    """
-    features = np.concatenate([each.features for each in demonstrations])
-    ahead = np.arange(STEPS)
-    actions = [
-        each.actions[np.minimum(np.arange(len(each.actions))[:, None] + ahead, len(each.actions) - 1)]
-        for each in demonstrations
-    ]
-    return features, np.concatenate(actions).reshape(len(features), -1)
 
 
 def train(demonstrations: Sequence[Demonstration], iterations: int, seed: int = 0) -> Network:

@@ -1,11 +1,33 @@
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Self
 
-from torch import Tensor
+from torch import Tensor, device
 from torch.nn import functional as functional
+from torch.nn import utils as utils
 
 class Module:
-    def __call__(self, inputs: Tensor) -> Tensor: ...
+    def __call__(self, *inputs: Tensor) -> Tensor: ...
+    def eval(self) -> Self: ...
+    def load_state_dict(self, values: Mapping[str, Tensor]) -> object: ...
     def parameters(self) -> Iterator[Tensor]: ...
+    def register_buffer(self, name: str, values: Tensor) -> None: ...
+    def state_dict(self) -> dict[str, Tensor]: ...
+    def to(self, device: device) -> Self: ...
+
+class Conv2d(Module):
+    def __init__(
+        self,
+        inputs: int,
+        outputs: int,
+        kernel_size: int,
+        *,
+        stride: int = ...,
+        padding: int = ...,
+        dilation: int = ...,
+    ) -> None: ...
+
+class GroupNorm(Module):
+    def __init__(self, groups: int, channels: int) -> None: ...
 
 class Linear(Module):
     weight: Tensor
