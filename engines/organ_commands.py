@@ -90,8 +90,8 @@ def import_files(
         typer.Option(
             metavar="NAME",
             help=(
-                "Surface that is held; default: bottom. Of a label map: ORGAN.NAME; default: the bottom of"
-                " the largest of those that hang together. May be repeated."
+                "Surface that is held; default: bottom. Of a label map: ORGAN.NAME; default: the"
+                " underside of what larger organs do not carry. May be repeated."
             ),
         ),
     ] = None,

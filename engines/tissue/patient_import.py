@@ -15,7 +15,7 @@ from engines.tissue.meshing.tet_mesh import TetMesh
 from engines.tissue.organs.label_body import LabelBody, cut_out
 from engines.tissue.organs.label_mesh import LabelMesh, mesh_body
 from engines.tissue.organs.label_tube import LabelTube, trace_tube
-from engines.tissue.organs.materials import presets
+from engines.tissue.organs.materials import preset, presets
 from engines.tissue.organs.organ_file import OrganFile
 from engines.tissue.organs.picks import NodePick, SurfacePick
 from engines.tissue.organs.shape import ROUNDING_DIGITS, SIDES
@@ -24,6 +24,7 @@ from engines.tissue.patient_tube import PatientTube, make_tube
 from schemas.errors import ScenarioError, did_you_mean
 from schemas.files import file_hash
 from schemas.keys import valid_name
+from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
 __all__ = ["NODES", "ImportedPatient", "PatientOrgan", "import_patient"]
@@ -35,6 +36,10 @@ _BY_VOLUME = 0.5
 """Power of the volume by which nodes are shared out: smaller organs get smaller edges."""
 _COUNT_TOLERANCE = 0.15
 """Deviation of the number of nodes that is reported."""
+_MOST_CARRIED, _GRAVITY = 500.0, 9.81
+"""Weight over the area of attachments that an organ hangs on, Pa, a tenth of its modulus; gravity, m/s^2."""
+_UNDERSIDE, _STEEP = "posterior", np.pi / 3.0
+"""Surface that is held by default, and largest angle of its faces to -z, rad."""
 _MATERIAL = "liver"
 _MOST_ORGANS = 12
 _LONGEST_NAME = 24
@@ -109,7 +114,7 @@ def import_patient(
         unit: unit of the file, m; None: as the file states.
         keep_origin: whether the origin stays that of the scan; else the middle of the top of all organs.
         surfaces: named parts of the surface, by organ.
-        anchors: held surfaces by organ; default: the bottom of the largest of those that hang together.
+        anchors: held surfaces by organ; default: the underside, unless larger organs carry the organ.
         materials: presets by organ; default: one of the organ's name, or liver.
         tubes: thickness of the wall (m) of ducts and vessels that become hollow tubes.
 
@@ -254,15 +259,19 @@ def _differences(made: LabelMesh, wanted: int) -> list[str]:
 def _hold(
     organs: Mapping[str, PatientOrgan], contacts: list[Contact], anchors: Mapping[str, Sequence[str]]
 ) -> None:
-    """Anchor organs as stated, else the largest of those that hang together. Raises ValueError."""
-    group = {name: name for name in organs}
-    for contact in contacts:
-        one, other = (group[name] for name in contact.organs)
-        group = {name: one if root == other else root for name, root in group.items()}
-    for root in set(group.values()):
-        members = [organs[name] for name, own in group.items() if own == root]
-        if not any(organ.name in anchors for organ in members):
-            max(members, key=lambda organ: organ.mesh.volume).anchors = ("bottom",)
+    """Anchor organs as stated, or at their underside if no larger ones carry them. Raises ValueError."""
+    order = sorted(organs.values(), key=lambda organ: -organ.mesh.volume)
+    for i, organ in enumerate(order):
+        larger = {other.name for other in order[:i]}
+        area = plain_sum(
+            contact.area
+            for contact in contacts
+            if organ.name in contact.organs and larger & {*contact.organs}
+        )
+        weight = _GRAVITY * preset(organ.material).density * organ.mesh.volume
+        if organ.name not in anchors and weight > _MOST_CARRIED * area:
+            organ.surfaces.setdefault(_UNDERSIDE, SurfacePick(normal=(0.0, 0.0, -1.0), within=_STEEP))
+            organ.anchors = (_UNDERSIDE,)
     for name, stated in anchors.items():
         organs[name].anchors = tuple(stated)
     for organ in organs.values():

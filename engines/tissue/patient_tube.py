@@ -28,8 +28,8 @@ _LUMENS: Mapping[bool, Mapping[str, Any]] = {
 }
 _WALL = {"young_modulus": "60 kPa", "poisson_ratio": 0.45, "inertia": 25}
 """Wall of a duct, and inertia for sub-steps of 0.1 ms (docs/decisions/0149-patients.md)."""
-_TOUCHING = 2.0
-"""Distance of an end from the organ that it joins, in voxels beyond the radius."""
+_TOUCHING, _WITHIN = 1.5, 0.25
+"""Distance of an end's middle from the organ that it joins: voxels, and a share of the radius more."""
 _SPARE = 1.2
 _THICKEST = 0.45
 """Largest wall over the least diameter."""
@@ -102,7 +102,9 @@ def make_tube(tube: LabelTube, wall: float, organs: Sequence[LabelMesh]) -> Pati
 def _organ_at(place: Vector, diameter: float, organs: Sequence[LabelMesh]) -> LabelMesh | None:
     """Return the organ that touches an end; None: none does."""
     depths = {
-        i: float(organ.body.field(place[None])[0]) + 0.5 * diameter + _TOUCHING * organ.body.field.spacing
+        i: float(organ.body.field(place[None])[0])
+        + 0.5 * _WITHIN * diameter
+        + _TOUCHING * organ.body.field.spacing
         for i, organ in enumerate(organs)
     }
     best = max(depths, key=lambda i: depths[i], default=None)
