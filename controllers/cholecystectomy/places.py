@@ -1,0 +1,48 @@
+"""Places of clips and cut along a tube.
+
+Two clips stay on the patient's side of the cut, one goes with the gallbladder. Wanted are a gap of 2 mm or more
+between clips, a cuff of 1 to 3 mm at the cut, and 5 mm to the common bile duct (decision 148 has the sources).
+On a short tube all distances shrink alike, down to the least.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from schemas.errors import MotionError
+from schemas.vectors import Vector
+
+__all__ = ["LEAST_LENGTH", "Places", "choose_places"]
+
+_WANTED = np.array([3.5e-3, 3.0e-3, 3.0e-3, 4.0e-3, 5.6e-3])
+"""Gallbladder to clip 3, to the cut, to clip 2, to clip 1, to the end of the tube; middles of clips, m."""
+_LEAST = np.array([2.4e-3, 1.7e-3, 1.7e-3, 3.2e-3, 2.4e-3])
+"""Least of these distances, m: half the width of a jaw beside the organs, 1.1 mm cuffs, gap of 2 mm."""
+LEAST_LENGTH = float(_LEAST.sum())
+"""Length of the shortest tube with room for three clips and the cut, m."""
+
+
+class Places(NamedTuple):
+    """Distances along a tube at rest, from the gallbladder's end, m."""
+
+    clips: Vector
+    """Clips 1 and 2, on the patient's side, and clip 3, shape (3,)."""
+    cut: float
+
+
+def choose_places(length: float) -> Places:
+    """Return the places on a tube of `length`, m: near the gallbladder if there is a choice.
+
+    Raises MotionError for a tube without room.
+    """
+    if length < LEAST_LENGTH:
+        raise MotionError(
+            f"a tube of {1e3 * length:.1f} mm has no room for three clips and a cut: {1e3 * LEAST_LENGTH:.1f} mm"
+            " at least"
+        )
+    wanted = float(_WANTED.sum())
+    share = min(1.0, (length - LEAST_LENGTH) / (wanted - LEAST_LENGTH))
+    third, cut, second, first = np.cumsum(_LEAST + share * (_WANTED - _LEAST))[:4].tolist()
+    return Places(np.array([first, second, third]), cut)

@@ -1,0 +1,164 @@
+"""State of the routine, and what all its steps share."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.cholecystectomy.params import ClipAndCutParams
+from controllers.cholecystectomy.sight import Sight
+from controllers.cholecystectomy.sub_task import FAILURES, Failure, Step, SubTask
+from controllers.cholecystectomy.surgeon_hand import SurgeonHand
+from hub.participant import Record, array, choice, flag, integer, number
+
+__all__ = ["GENTLE", "GRASP", "Procedure", "SurgeonHands", "SurgeonState"]
+
+GRASP = -1
+"""Number of the tube while the gallbladder is grasped."""
+GENTLE = 0.3
+"""Share of the speed near tissue."""
+OPENING_TIME = 0.4
+"""Time for a jaw to open, s."""
+_NONE = -1.0
+
+
+class SurgeonState(Record):
+    """State of the routine."""
+
+    sub_task = choice(SubTask.START)
+    step = choice(Step.PLAN)
+    failure = choice(Failure.NONE)
+    reason = choice(Failure.NONE)
+    """Why the present sub-task was tried again last."""
+    tube = integer(GRASP)
+    job = integer()
+    """Job on the tube: clip 0 to 2, or cut."""
+    goal = array(7)
+    """Pose of the tip at the tissue."""
+    along = number()
+    """Place on the tube at rest, m."""
+    attempts = integer()
+    """Failed attempts at the present sub-task."""
+    aims = integer()
+    """Corrections of the present approach."""
+    elapsed = number()
+    """Time in the step, s."""
+    spent = number()
+    """Time in the sub-task, s."""
+    succeeded = flag()
+    """Whether the present attempt has succeeded."""
+    slipped = flag()
+    """Whether the clip of the present attempt has slipped."""
+    clip_places = array(2, 3)
+    """Place of each clip on its tube at rest, m; -1: none."""
+    clips = integer()
+    cuts = integer()
+    parted = array(2)
+    """1 for each parted tube."""
+    grasped = flag()
+    taut = flag()
+    """Whether the gallbladder has been pulled aside for the present tube."""
+    pulled = number()
+    """Way of the gallbladder, m."""
+    slips = integer()
+    """Grasps and clips lost later."""
+    recoveries = integer()
+    rests = array(3, 7)
+    """Resting pose of each hand."""
+    done = flag()
+    failed = flag()
+
+
+class SurgeonHands(NamedTuple):
+    """The three hands."""
+
+    applier: SurgeonHand
+    grasper: SurgeonHand
+    scissors: SurgeonHand
+
+
+class Procedure:
+    """The hands, what they see, and the beginning and end of steps."""
+
+    def __init__(self, params: ClipAndCutParams, hands: SurgeonHands) -> None:
+        self.params, self.hands = params, hands
+        self.state = SurgeonState()
+        self.state.clip_places[:] = _NONE
+        self.sight: Sight | None = None
+        self.fires = False
+        """Whether a clip is closed in this step."""
+        self.failure = ""
+        """Sentence after giving up."""
+        self._status: list[str] = []
+
+    @property
+    def seen(self) -> Sight:
+        """The sight of this step."""
+        assert self.sight is not None
+        return self.sight
+
+    @property
+    def hand(self) -> SurgeonHand:
+        """The hand at work."""
+        if self.state.tube == GRASP:
+            return self.hands.grasper
+        return self.hands.applier if self.state.job < self.state.clip_places.shape[1] else self.hands.scissors
+
+    def statuses(self) -> tuple[str, ...]:
+        """Return and clear the statuses of this step."""
+        said = tuple(self._status)
+        self._status.clear()
+        return said
+
+    def say(self, text: str) -> None:
+        """Add a status."""
+        self._status.append(text)
+
+    def enter(self, step: Step) -> None:
+        """Begin a step."""
+        self.state.step, self.state.elapsed = step, 0.0
+
+    def describe(self) -> str:
+        """Return the present sub-task in words."""
+        return f"sub-task {self.state.sub_task:d}, {self.state.sub_task.name.lower().replace('_', ' ')}"
+
+    def retry(self, reason: Failure, why: str) -> None:
+        """End an attempt that has failed: open the jaw and go back before the tissue, or give up."""
+        state = self.state
+        state.reason, state.attempts = reason, state.attempts + 1
+        if state.attempts >= self.params.attempts:
+            self.fail(reason, f"{why}, {state.attempts} attempts")
+            return
+        state.recoveries += 1
+        state.succeeded = False
+        self.say(f"{self.describe()}: {FAILURES[reason]}, {why}; it is tried again")
+        self.open_jaw()
+
+    def open_jaw(self) -> None:
+        """Open the jaw at the tissue."""
+        self.hand.stay()
+        self.hand.move_jaw(opening(self.hand))
+        self.enter(Step.OPEN)
+
+    def fail(self, failure: Failure, why: str) -> None:
+        """Give up: all hands stay."""
+        state = self.state
+        self.failure = f"given up in {self.describe()}: {FAILURES[failure]}: {why}"
+        self.say(self.failure)
+        state.failure, state.failed = failure, True
+        for hand in self.hands:
+            hand.stay()
+        state.sub_task = SubTask.FAILED
+
+
+def opening(hand: SurgeonHand) -> float:
+    """Return the angle of the open jaw of a hand, rad."""
+    return min(hand.jaw.upper - 0.02, radians(50.0))
+
+
+def nearest_clip(places: np.ndarray, along: float) -> int | None:
+    """Return the number of the clip nearest to a place, of those that are closed; None: none is."""
+    apart = np.where(places >= 0.0, np.abs(places - along), np.inf)
+    return int(apart.argmin()) if np.isfinite(apart).any() else None

@@ -1,0 +1,82 @@
+"""What the routine sees and feels in a step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+
+from controllers.cholecystectomy.approach import Obstacles
+from controllers.cholecystectomy.params import ClipAndCutParams
+from controllers.cholecystectomy.surgeon_hand import SurgeonHand
+from controllers.cholecystectomy.tube import Tube
+from controllers.expert.reach import LINK_RADII, links
+from hub.participant import Inputs
+from schemas.trocar_msgs import SoftBodyState, TissueEvent, TubeLine
+from schemas.vectors import Vector
+
+__all__ = ["Sight"]
+
+
+class Sight:
+    """Lines of the tubes, nodes of the organs, and the state of the grasp."""
+
+    def __init__(self, params: ClipAndCutParams, inputs: Inputs) -> None:
+        self._params, self._inputs = params, inputs
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all organs have been seen."""
+        params = self._params
+        seen = [f"{tube}/line" for tube in params.tubes]
+        seen += [f"{organ}/nodes" for organ in (params.gallbladder, *params.avoid)]
+        return all(self._inputs.message(port) is not None for port in seen)
+
+    def tube(self, index: int) -> Tube:
+        """Return a tube by its number."""
+        return Tube(cast("TubeLine", self._inputs.message(f"{self._params.tubes[index]}/line")))
+
+    def events(self, tube: int) -> tuple[TissueEvent, ...]:
+        """Return what has happened to a tube."""
+        return cast("tuple[TissueEvent, ...]", self._inputs.events(f"{self._params.tubes[tube]}/events"))
+
+    @property
+    def gallbladder(self) -> Vector:
+        """Nodes of the gallbladder, m, shape (n, 3)."""
+        return self._nodes(self._params.gallbladder)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the grasper holds tissue."""
+        return float(self._inputs[f"{self._params.grasper}/held"][0]) > 0.0
+
+    @property
+    def pull(self) -> float:
+        """Force of the grasper on the tissue, N."""
+        return float(np.linalg.norm(self._inputs[f"{self._params.grasper}/pull"]))
+
+    def obstacles(self, hand: SurgeonHand, hands: Sequence[SurgeonHand], tube: int | None) -> Obstacles:
+        """Return what a hand keeps away from at work on a tube, or, with None, at the gallbladder."""
+        params = self._params
+        organs = params.avoid if tube is None else dict.fromkeys((params.gallbladder, *params.avoid))
+        parts = [self._organ(organ) for organ in organs if organ not in params.tubes]
+        parts += [self._line(other) for other in range(len(params.tubes)) if other != tube]
+        parts += [_shaft(other) for other in hands if other is not hand]
+        return Obstacles.join(parts)
+
+    def _organ(self, name: str) -> Obstacles:
+        nodes = self._nodes(name)
+        return Obstacles(nodes, np.zeros(len(nodes)))
+
+    def _line(self, index: int) -> Obstacles:
+        tube = self.tube(index)
+        return Obstacles(tube.points, tube.radii)
+
+    def _nodes(self, organ: str) -> Vector:
+        state = cast("SoftBodyState", self._inputs.message(f"{organ}/nodes"))
+        return state.nodes_m.astype(np.float64).reshape(-1, 3)
+
+
+def _shaft(hand: SurgeonHand) -> Obstacles:
+    return Obstacles(links(hand.chain, hand.base, hand.joints[None])[0], LINK_RADII)

@@ -1,0 +1,64 @@
+"""A duct or vessel as a surgeon sees it: its present middle line. SI units, in the world."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.trocar_msgs import TubeLine
+from schemas.vectors import Vector
+
+__all__ = ["Tube"]
+
+_BESIDE = 2.0e-3
+"""Distance along the tube, to both sides, over which its direction is measured, m."""
+
+
+class Tube:
+    """The present line; places are distances along the line at rest, from the gallbladder's end."""
+
+    def __init__(self, line: TubeLine) -> None:
+        self.points: Vector = line.points_m.reshape(-1, 3)
+        """Middles of the rings, m, shape (r, 3)."""
+        self._along, self._diameters, self._parted = line.along_m, line.diameters_m, line.parted
+
+    @property
+    def length(self) -> float:
+        """Length at rest, m."""
+        return float(self._along[-1])
+
+    @property
+    def is_parted(self) -> bool:
+        """Whether the tube is parted anywhere."""
+        return bool(np.any(self._parted))
+
+    @property
+    def slack(self) -> float:
+        """Present length over the distance of the ends; 1: straight."""
+        chord = float(np.linalg.norm(self.points[-1] - self.points[0]))
+        present = float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+        return present / max(chord, 1e-9)
+
+    @property
+    def radii(self) -> Vector:
+        """Outer radius of each ring at rest, m, shape (r,)."""
+        return 0.5 * self._diameters
+
+    def point(self, along: float) -> Vector:
+        """Return the present middle at a place, m, shape (3,)."""
+        return np.array([np.interp(along, self._along, self.points[:, axis]) for axis in range(3)])
+
+    def direction(self, along: float) -> Vector:
+        """Return the present direction at a place, away from the gallbladder, shape (3,)."""
+        ends = np.clip([along - _BESIDE, along + _BESIDE], self._along[0], self._along[-1])
+        way = self.point(float(ends[1])) - self.point(float(ends[0]))
+        return way / max(float(np.linalg.norm(way)), 1e-9)
+
+    def nearest(self, point: Vector) -> float:
+        """Return the place nearest to a point (m, shape (3,))."""
+        starts, ways = self.points[:-1], np.diff(self.points, axis=0)
+        squares = np.maximum((ways * ways).sum(axis=1), 1e-18)
+        shares = np.clip(((point - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
+        feet = starts + shares[:, None] * ways
+        best = int(np.linalg.norm(feet - point, axis=1).argmin())
+        share = float(shares[best])
+        return float(self._along[best] + share * (self._along[best + 1] - self._along[best]))
