@@ -1,4 +1,4 @@
-"""Poses of open jaws around a tube: across it, in reach, and clear of everything else. SI units, in the world."""
+"""Poses of open jaws across a tube, in reach, and clear of everything else. SI units, in the world."""
 
 from __future__ import annotations
 
@@ -42,7 +42,9 @@ class Obstacles(NamedTuple):
     def join(parts: Sequence[Obstacles]) -> Obstacles:
         """Return all obstacles of several."""
         points = [np.zeros((0, 3)), *(part.points for part in parts)]
-        return Obstacles(np.concatenate(points), np.concatenate([np.zeros(0), *(part.radii for part in parts)]))
+        return Obstacles(
+            np.concatenate(points), np.concatenate([np.zeros(0), *(part.radii for part in parts)])
+        )
 
     def near(self, point: Vector) -> Obstacles:
         """Return the obstacles near a point (m, shape (3,))."""
@@ -102,8 +104,8 @@ def choose_pose(
     if margins.max() < MARGIN:
         x, y, z = (1e3 * poses[int(margins.argmax()), :3, 3]).tolist()
         raise MotionError(
-            f"{hand.arm} does not reach {what}: with the tip at ({x:.0f}, {y:.0f}, {z:.0f}) mm the joints have"
-            f" {max(0.0, float(margins.max())):.2f} of their ranges left, {MARGIN} at least is needed"
+            f"{hand.arm} does not reach {what}: with the tip at ({x:.0f}, {y:.0f}, {z:.0f}) mm the joints"
+            f" have {max(0.0, float(margins.max())):.2f} of their ranges left, {MARGIN} at least is needed"
         )
     clearances = np.array(
         [

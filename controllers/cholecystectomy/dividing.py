@@ -61,7 +61,9 @@ class Dividing(Procedure):
         state, before = self.state, self.state.goal.copy()
         self._choose()
         shift = float(np.linalg.norm(state.goal[:3] - before[:3]))
-        turn = float(np.linalg.norm(rotation.log(rotation.product(state.goal[3:], rotation.conjugate(before[3:])))))
+        turn = float(
+            np.linalg.norm(rotation.log(rotation.product(state.goal[3:], rotation.conjugate(before[3:]))))
+        )
         if (shift < _SHIFTED and turn < _TURNED) or state.aims >= _MOST_AIMS:
             return True
         state.aims += 1

@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.cholecystectomy.approach import choose_pose, withdraw
 from controllers.cholecystectomy.grasp_place import grasp_poses
-from controllers.cholecystectomy.procedure import GENTLE, Procedure, opening
+from controllers.cholecystectomy.procedure import Procedure, opening
 from controllers.cholecystectomy.sub_task import Failure, Step
 from robots.transform import matrix_to_pose
 from schemas.vectors import Vector
@@ -60,9 +60,7 @@ class Grasping(Procedure):
         if not hand.has_arrived:
             return
         pull, goal = self.seen.pull, hand.line()
-        straight = all(
-            self.seen.tube(tube).slack < _STRAIGHT for tube in range(2) if not state.parted[tube]
-        )
+        straight = all(self.seen.tube(tube).slack < _STRAIGHT for tube in range(2) if not state.parted[tube])
         if pull > 1.3 * most and state.pulled > 0.0:
             stride = -_STRIDE
         elif pull < most and not (straight and pull >= least) and state.pulled < self.params.farthest:

@@ -36,7 +36,8 @@ class ClipAndCutParams(Params):
         default=(), max_length=16, description="organs that jaws and shafts keep away from where they can"
     )
     pull: tuple[Force, Force] = Field(
-        default=(0.3, 1.0), description="least and largest pull at the gallbladder while the tubes are worked at"
+        default=(0.3, 1.0),
+        description="least and largest pull at the gallbladder while the tubes are worked at",
     )
     farthest: Length = Field(
         default=20e-3, gt=0, le=0.1, description="longest way of the gallbladder when it is pulled aside"

@@ -1,8 +1,8 @@
 """Places of clips and cut along a tube.
 
-Two clips stay on the patient's side of the cut, one goes with the gallbladder. Wanted are a gap of 2 mm or more
-between clips, a cuff of 1 to 3 mm at the cut, and 5 mm to the common bile duct (decision 148 has the sources).
-On a short tube all distances shrink alike, down to the least.
+Two clips stay on the patient's side of the cut, the third goes with the gallbladder. Wanted are a gap of 2 mm
+or more between clips, a cuff of 1 to 3 mm at the cut, and 5 mm to the common bile duct. On a short tube all
+distances shrink alike, down to the least. Sources: docs/how-to/clip-and-cut.md.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ def choose_places(length: float) -> Places:
     """
     if length < LEAST_LENGTH:
         raise MotionError(
-            f"a tube of {1e3 * length:.1f} mm has no room for three clips and a cut: {1e3 * LEAST_LENGTH:.1f} mm"
-            " at least"
+            f"a tube of {1e3 * length:.1f} mm has no room for three clips and a cut:"
+            f" {1e3 * LEAST_LENGTH:.1f} mm at least"
         )
     wanted = float(_WANTED.sum())
     share = min(1.0, (length - LEAST_LENGTH) / (wanted - LEAST_LENGTH))

@@ -105,7 +105,8 @@ class Surgeon(Grasping, Dividing):
             places[clip] = -1.0
             state.clips -= 1
             self._lose(
-                Failure.CLIP_LOST, f"clip {clip + 1} has come off {self.params.tubes[tube]} at {event.size:.1f} N"
+                Failure.CLIP_LOST,
+                f"clip {clip + 1} has come off {self.params.tubes[tube]} at {event.size:.1f} N",
             )
 
     def _lose(self, failure: Failure, why: str) -> None:

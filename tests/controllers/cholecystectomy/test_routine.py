@@ -1,0 +1,156 @@
+"""The clip-and-cut routine without physics: to the end, and after everything that goes wrong."""
+
+import numpy as np
+import pytest
+
+from controllers.cholecystectomy.sub_task import Failure, Step, SubTask
+from schemas.errors import ScenarioError
+from tests.controllers.cholecystectomy.world import FAR, NECK, World
+
+
+def lengths(far=FAR):
+    return np.linalg.norm(far - NECK, axis=1)
+
+
+def test_the_17_sub_tasks_follow_each_other_and_clips_and_cuts_are_where_they_should_be():
+    world = World()
+    assert world.run() is SubTask.DONE
+    assert world.tasks == [SubTask(number) for number in range(1, 19)]
+    assert world.state.recoveries == 0
+    assert world.routine.ended == "both tubes are clipped and cut, after 0 recoveries"
+    for tube, length in enumerate(lengths()):
+        first, second, third = world.clips[tube]
+        assert first - second > 3.2e-3  # a gap of 2 mm between clips of 1.2 mm
+        for clip in (second, third):
+            assert 1.6e-3 < abs(clip - world.cuts[tube]) < 3.6e-3  # a cuff of 1 to 3 mm
+        assert third < world.cuts[tube] < second
+        assert length - first > 5e-3
+
+
+def test_the_gallbladder_is_pulled_away_from_the_ducts_within_the_limits():
+    world = World()
+    world.run(lambda world: world.is_at(SubTask.CLIP_1_LEFT) and world.state.step is Step.HOVER)
+    assert world.shift[0] < -4e-3
+    assert 0.3 <= 60.0 * float(np.linalg.norm(world.shift)) < 1.1
+
+
+def test_missed_grasps_are_tried_again_elsewhere_and_deeper():
+    world = World()
+    world.misses = 2
+    assert world.run() is SubTask.DONE
+    assert world.state.recoveries == 2
+    world = World()
+    world.misses = 99
+    world.run()
+    assert world.state.failure is Failure.GRASP_MISSED
+    assert "given up in sub-task 1, grasp gallbladder: grasp missed: nothing is held" in world.routine.ended
+
+
+def test_a_grasp_that_slips_is_taken_again_before_the_work_goes_on():
+    world = World()
+    world.run(lambda world: world.is_at(SubTask.CLIP_2_LEFT))
+    world.lose_grasp()
+    assert world.run() is SubTask.DONE
+    assert world.tasks.count(SubTask.GRASP_GALLBLADDER) == 2
+    assert [len(clips) for clips in world.clips] == [3, 3]
+
+
+def test_a_grasp_that_slips_again_and_again_is_given_up():
+    world = World()
+    for _ in range(6):
+        world.run(lambda world: world.state.grasped)
+        world.lose_grasp()
+        world.step()
+    world.run()
+    assert world.state.failure is Failure.GRASP_SLIPPED
+
+
+def test_a_clip_that_slips_is_set_beside_its_place_or_given_up():
+    world = World()
+    world.slips = 1
+    assert world.run() is SubTask.DONE
+    assert world.state.recoveries == 1
+    world = World()
+    world.slips = 99
+    world.run()
+    assert world.state.failure is Failure.CLIP_SLIPPED
+    assert "clip 1 left: clip slipped" in world.routine.ended
+
+
+def test_a_clip_that_comes_off_later_is_replaced():
+    world = World()
+    world.run(lambda world: world.is_at(SubTask.BACK_FROM_CLIP_2_LEFT))
+    world.pull_off(0, 0)
+    assert world.run() is SubTask.DONE
+    assert world.tasks.count(SubTask.CLIP_1_LEFT) == 2
+    assert len(world.clips[0]) == 3
+
+
+def test_a_cut_that_leaves_the_tube_together_is_made_again():
+    world = World()
+    world.blunt = 2
+    assert world.run() is SubTask.DONE
+    assert world.state.recoveries == 2
+    world = World()
+    world.blunt = 99
+    world.run()
+    assert world.state.failure is Failure.NOT_PARTED
+
+
+def test_a_tube_that_moves_is_aimed_at_anew():
+    world = World()
+    world.run(lambda world: world.is_at(SubTask.CLIP_1_LEFT) and world.state.step is Step.HOVER)
+    world.sway = np.array([2e-3, -3e-3, 2e-3])
+    assert world.run() is SubTask.DONE
+    assert world.state.recoveries == 0
+
+
+def test_a_tube_without_room_is_named():
+    far = NECK + (FAR - NECK) * np.array([[0.4], [1.0]])
+    world = World(far=far)
+    world.run()
+    assert world.state.failure is Failure.TOO_SHORT
+    assert "a tube of 10.0 mm has no room for three clips and a cut: 11.4 mm at least" in world.routine.ended
+
+
+def test_a_tube_out_of_reach_is_named():
+    world = World()
+    world.run(lambda world: world.is_at(SubTask.BACK_FROM_CUT_LEFT))
+    world.sway = np.array([0.0, 0.2, 0.0])
+    assert world.run() is SubTask.FAILED
+    assert world.state.failure is Failure.OUT_OF_REACH
+    assert "PSM1 does not reach cystic_artery" in world.routine.ended
+
+
+def test_a_refused_command_ends_the_routine_with_its_text():
+    world = World()
+    world.run(lambda world: world.is_at(SubTask.CLIP_1_LEFT))
+    world.refused.append(("PSM1", "servo_cp refused"))
+    world.run()
+    assert world.state.failure is Failure.REFUSED
+    assert world.routine.ended.endswith("command refused: PSM1: servo_cp refused")
+
+
+def test_a_saved_routine_goes_on_to_the_bit():
+    world, other = World(), World()
+    for each in (world, other):
+        each.run(lambda world: world.is_at(SubTask.CLIP_2_LEFT))
+    saved = world.routine.save()
+    other.routine._surgeon.state.values[:] = 0.0
+    other.routine.restore(saved)
+    for _ in range(500):
+        world.step()
+        other.step()
+    assert world.routine.state_hash() == other.routine.state_hash()
+
+
+@pytest.mark.parametrize(
+    ("setting", "reason"),
+    [
+        ("scissors=PSM1", "three arms"),
+        ("pull=[1 N, 0.5 N]", "the least, then the largest"),
+    ],
+)
+def test_parameters_that_make_no_sense_are_refused(setting, reason):
+    with pytest.raises(ScenarioError, match=reason):
+        World(setting)
