@@ -99,7 +99,7 @@ class Surgeon(Grasping, Dividing):
         if event.kind == "clipped" and event.instrument == self.params.applier and tube == state.tube:
             places[state.job], state.succeeded = along, True
             state.clips += 1
-        elif event.kind == "clip slipped" and event.instrument == self.params.applier:
+        elif event.kind in ("clip slipped", "clip not across") and event.instrument == self.params.applier:
             state.slipped = True
         elif event.kind == "clip pulled off" and (clip := nearest_clip(places, along)) is not None:
             places[clip] = -1.0
