@@ -18,8 +18,8 @@ __all__ = ["LEAST_LENGTH", "Places", "choose_places"]
 
 _WANTED = np.array([3.5e-3, 3.0e-3, 3.0e-3, 4.0e-3, 5.6e-3])
 """Gallbladder to clip 3, to the cut, to clip 2, to clip 1, to the end of the tube; middles of clips, m."""
-_LEAST = np.array([2.4e-3, 1.7e-3, 1.7e-3, 3.2e-3, 2.4e-3])
-"""Least of these distances, m: half the width of a jaw beside the organs, 1.1 mm cuffs, gap of 2 mm."""
+_LEAST = np.array([1.5e-3, 1.6e-3, 1.6e-3, 2.0e-3, 1.5e-3])
+"""Least of these distances, m: room for half a jaw in soft tissue, cuffs of 1 mm, clips side by side."""
 LEAST_LENGTH = float(_LEAST.sum())
 """Length of the shortest tube with room for three clips and the cut, m."""
 

@@ -106,11 +106,11 @@ def test_a_tube_that_moves_is_aimed_at_anew():
 
 
 def test_a_tube_without_room_is_named():
-    far = NECK + (FAR - NECK) * np.array([[0.4], [1.0]])
+    far = NECK + (FAR - NECK) * np.array([[0.3], [1.0]])
     world = World(far=far)
     world.run()
     assert world.state.failure is Failure.TOO_SHORT
-    assert "a tube of 10.0 mm has no room for three clips and a cut: 11.4 mm at least" in world.routine.ended
+    assert "a tube of 7.5 mm has no room for three clips and a cut: 8.2 mm at least" in world.routine.ended
 
 
 def test_a_tube_out_of_reach_is_named():
