@@ -3,8 +3,8 @@
     python -m bench.clip_and_cut --rows rows.jsonl --patients 0 1 2    runs the patients not in the file yet
     python -m bench.clip_and_cut --rows rows.jsonl --patients          prints what is in the file
 
-A row for each patient: the end in words, recoveries, harm to organs that must be spared, liquids lost, and the
-state hash.
+A row for each patient: the end in words, recoveries, harm to organs that must be spared, liquids lost, and
+the state hash.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-import trocar
+import trocar.sessions
 from anatomy.params import AnatomyParams
 from schemas.trocar_msgs import TissueEvent
 

@@ -114,12 +114,12 @@ def choose_pose(
         ]
     )
     turns = np.abs(np.linspace(-1.0, 1.0, len(poses)))
-    score = np.minimum(margins / _ROOMY, 1.0) + np.minimum(clearances / _CLEAR, 1.0) - 0.3 * turns
+    score = np.minimum(margins / _ROOMY, 1.0) + np.clip(clearances / _CLEAR, -2.0, 1.0) - 0.3 * turns
     return poses[int(np.where(margins < MARGIN, -np.inf, score).argmax())]
 
 
 def clearance(hand: SurgeonHand, pose: Vector, joints: Vector, opening: float, obstacles: Obstacles) -> float:
-    """Return the distance of an instrument with open jaws from the nearest obstacle, m."""
+    """Return the distance of an instrument from the nearest obstacle, which is not between its open jaws, m."""
     if not len(obstacles.points):
         return _CLEAR
     half = 0.5 * opening + radians(5.0)
@@ -128,8 +128,10 @@ def clearance(hand: SurgeonHand, pose: Vector, joints: Vector, opening: float, o
         pose[:3, 3] + ways * (np.cos(half) * pose[:3, 2] + side * np.sin(half) * pose[:3, 1])
         for side in (1.0, -1.0)
     ]
+    between = pose[:3, 3] + ways * np.cos(half) * pose[:3, 2]
     body = links(hand.chain, hand.base, joints[None])[0]
-    points = np.concatenate([*fingers, body])
-    radii = np.concatenate([np.full(2 * len(ways), FINGER_HALF_WIDTH), LINK_RADII])
+    points = np.concatenate([*fingers, between, body])
+    gaps = ways[:, 0] * np.sin(half)
+    radii = np.concatenate([np.full(2 * len(ways), FINGER_HALF_WIDTH), gaps, LINK_RADII])
     apart = np.linalg.norm(points[:, None] - obstacles.points, axis=2) - radii[:, None] - obstacles.radii
     return float(apart.min())

@@ -15,7 +15,7 @@ __all__ = ["grasp_poses"]
 
 _FROM_NECK = (10.0e-3, 12.5e-3, 8.0e-3, 15.0e-3)
 """Distance of the place from the neck, by attempt, m."""
-_DEPTH, _DEEPER = 4.0e-3, 2.0e-3
+_DEPTH, _DEEPER = 6.0e-3, 2.0e-3
 """Depth of the ends of the fingers below the surface, and what each attempt adds, m."""
 _COLUMN = 3.0e-3
 """Radius about the line of approach within which the surface is looked for, m."""

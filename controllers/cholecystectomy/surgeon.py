@@ -96,9 +96,13 @@ class Surgeon(Grasping, Dividing):
         at = np.array([event.position.x, event.position.y, event.position.z])
         along = self.seen.tube(tube).nearest(at)
         places = state.clip_places[tube]
-        if event.kind == "clipped" and event.instrument == self.params.applier and tube == state.tube:
-            places[state.job], state.succeeded = along, True
-            state.clips += 1
+        if event.kind == "clipped" and event.instrument == self.params.applier:
+            if tube == state.tube:
+                places[state.job], state.succeeded = along, True
+                state.clips += 1
+            else:
+                state.slipped = True
+                self.say(f"the clip is on {self.params.tubes[tube]}")
         elif event.kind in ("clip slipped", "clip not across") and event.instrument == self.params.applier:
             state.slipped = True
         elif event.kind == "clip pulled off" and (clip := nearest_clip(places, along)) is not None:
