@@ -11,7 +11,7 @@ import numpy as np
 from controllers.cholecystectomy.reach import path_margins
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.expert.reach import LINK_RADII, links
-from robots.dvrk.end_effectors.contact_sphere import FINGER_HALF_WIDTH
+from robots.dvrk.end_effectors.contact_sphere import FINGER_HALF_WIDTH, JAW_ROOT
 from robots.transform import pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
@@ -22,6 +22,10 @@ MARGIN = 0.06
 """Least share of each joint's range, from its middle to its end, that stays free."""
 _ROOMY, _CLEAR = 0.3, 4.0e-3
 """Margin, and distance from obstacles (m), beyond which more is no better."""
+_ALONE = 2.0e-3
+"""Distance of other tissue from the space between the jaws beyond which more is no better, m."""
+_HALF_CLIP, _HALF_GAP = 1.0e-3, 2.5e-3
+"""Half the size of that space along the tube, and from jaw to jaw, m."""
 _NEAR = 0.06
 """Obstacles farther from the goal do not count, m."""
 _TILTS = np.radians(np.arange(-75.0, 76.0, 15.0))
@@ -113,13 +117,28 @@ def choose_pose(
             for way, angles in zip(np.stack([before, poses], axis=1), joints, strict=True)
         ]
     )
+    gaps = np.array([gap_between(hand, pose, obstacles) for pose in poses])
     turns = np.abs(np.linspace(-1.0, 1.0, len(poses)))
-    score = np.minimum(margins / _ROOMY, 1.0) + np.clip(clearances / _CLEAR, -2.0, 1.0) - 0.3 * turns
+    travel = np.abs(joints[:, 0] - hand.joints).max(axis=1)
+    score = (
+        np.minimum(margins / _ROOMY, 1.0)
+        + np.clip(clearances / _CLEAR, -0.5, 1.0)
+        + np.clip(gaps / _ALONE, -2.0, 1.0)
+        - 0.3 * turns
+        - 0.1 * travel
+    )
     return poses[int(np.where(margins < MARGIN, -np.inf, score).argmax())]
 
 
+def gap_between(hand: SurgeonHand, pose: Vector, obstacles: Obstacles) -> float:
+    """Return the distance of the nearest obstacle from the space between the closing jaws, m."""
+    local = (obstacles.points - pose[:3, 3]) @ pose[:3, :3]
+    nearest = np.clip(local, [-_HALF_CLIP, -_HALF_GAP, JAW_ROOT], [_HALF_CLIP, _HALF_GAP, hand.jaw.length])
+    return float((np.linalg.norm(local - nearest, axis=1) - obstacles.radii).min(initial=_ALONE))
+
+
 def clearance(hand: SurgeonHand, pose: Vector, joints: Vector, opening: float, obstacles: Obstacles) -> float:
-    """Return the distance of an instrument from the nearest obstacle, which is not between its open jaws, m."""
+    """Return the distance of an instrument with open jaws from the nearest obstacle, m."""
     if not len(obstacles.points):
         return _CLEAR
     half = 0.5 * opening + radians(5.0)
@@ -128,10 +147,8 @@ def clearance(hand: SurgeonHand, pose: Vector, joints: Vector, opening: float, o
         pose[:3, 3] + ways * (np.cos(half) * pose[:3, 2] + side * np.sin(half) * pose[:3, 1])
         for side in (1.0, -1.0)
     ]
-    between = pose[:3, 3] + ways * np.cos(half) * pose[:3, 2]
     body = links(hand.chain, hand.base, joints[None])[0]
-    points = np.concatenate([*fingers, between, body])
-    gaps = ways[:, 0] * np.sin(half)
-    radii = np.concatenate([np.full(2 * len(ways), FINGER_HALF_WIDTH), gaps, LINK_RADII])
+    points = np.concatenate([*fingers, body])
+    radii = np.concatenate([np.full(2 * len(ways), FINGER_HALF_WIDTH), LINK_RADII])
     apart = np.linalg.norm(points[:, None] - obstacles.points, axis=2) - radii[:, None] - obstacles.radii
     return float(apart.min())

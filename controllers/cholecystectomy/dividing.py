@@ -18,10 +18,13 @@ __all__ = ["Dividing"]
 
 BEFORE_TUBE = 22.0e-3
 """Length of the straight way to a tube, m."""
-_BITE = 9.0e-3
-"""Distance of the tube from the hinge between the jaws, m: the middle of their contact spheres."""
-_DEEPER, _BESIDE = 1.5e-3, 1.0e-3
-"""What each further attempt goes deeper, and beside the last place, m."""
+_BITES = (11.0e-3, 9.0e-3, 12.0e-3, 8.0e-3)
+"""Distance of the tube from the hinge between the jaws, by attempt, m.
+
+The ends of the jaws pass the tube, and what lies close behind stays outside.
+"""
+_BESIDE = 1.0e-3
+"""Way of further attempts beside the place of the first, m."""
 _SQUEEZED, _SNIPPED = radians(12.0), radians(-10.0)
 """Angle of the jaw on a tube before the clip is closed, and of closed scissors."""
 _CLOSING = 0.5
@@ -108,7 +111,7 @@ class Dividing(Procedure):
         state, hand, seen = self.state, self.hand, self.seen
         tube = seen.tube(state.tube)
         point, along = tube.point(state.along), tube.direction(state.along)
-        bite = _BITE - _DEEPER * min(2, state.attempts)
+        bite = _BITES[state.attempts % len(_BITES)]
         obstacles = seen.obstacles(hand, self.hands, state.tube).near(point)
         what = f"{self.params.tubes[state.tube]} {1e3 * state.along:.0f} mm from the gallbladder"
         poses = jaw_poses(hand, point, along, bite)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from controllers.cholecystectomy.surgeon_hand import SurgeonHand
-from robots import rotation
-from robots.dvrk.inverse import branches
-from robots.transform import inverse_transform, pose_to_matrix
+from controllers.cholecystectomy.surgeon_hand import SurgeonHand, line_poses
+from robots.transform import pose_to_matrix
 from schemas.vectors import Vector
 
 __all__ = ["path_margins"]
 
-_SHARES = (0.25, 0.5, 0.75)
+_SHARES = np.array([0.25, 0.5, 0.75])
 """Checked parts of the line from the present pose to the first pose of a path."""
 
 
@@ -27,20 +25,8 @@ def path_margins(hand: SurgeonHand, paths: Vector) -> tuple[Vector, Vector]:
         paths: poses of the tip, shape (n, poses, 4, 4).
     """
     start, chain = pose_to_matrix(hand.line()), hand.chain
-    lines = np.array([[_between(start, path[0], share) for share in _SHARES] for path in paths])
-    into_base = inverse_transform(hand.base)
-    now = branches(chain, into_base @ start)
-    branch = int((np.abs(now - hand.joints) / (chain.upper - chain.lower)).max(axis=-1).argmin())
-    q = branches(chain, into_base @ np.concatenate([lines, paths], axis=1))[branch]
+    lines = np.array([line_poses(start, path[0], _SHARES) for path in paths])
+    q = hand.joints_at(np.concatenate([lines, paths], axis=1))
     free = 2.0 * np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)
     least: Vector = free.min(axis=(-2, -1))
     return least, q[:, len(_SHARES) :]
-
-
-def _between(start: Vector, end: Vector, share: float) -> Vector:
-    """Return the pose, shape (4, 4), at a share of a straight line with an even turn."""
-    turn = rotation.log(rotation.from_matrix(end[:3, :3] @ start[:3, :3].T))
-    pose = np.eye(4)
-    pose[:3, :3] = rotation.matrix(rotation.exp(share * turn)) @ start[:3, :3]
-    pose[:3, 3] = start[:3, 3] + share * (end[:3, 3] - start[:3, 3])
-    return pose

@@ -1,15 +1,24 @@
-"""A robot hand that knows its joints."""
+"""A robot hand that knows its joints: no joint turns too fast on its lines. SI units, poses in the world."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from controllers.expert.hand import RobotHand
+from robots import rotation
 from robots.dvrk.instruments import Jaw
+from robots.dvrk.inverse import branches
 from robots.serial_chain import SerialChain
+from robots.transform import inverse_transform, pose_to_matrix
 from schemas.vectors import Vector
 
-__all__ = ["SurgeonHand"]
+__all__ = ["SurgeonHand", "line_poses"]
+
+_SHARES = np.linspace(0.0, 1.0, 13)
+_PEAK_SPEED = 1.875
+"""Largest speed of a least-jerk motion over a length of 1 in a time of 1."""
+_TURN = 1.5
+"""Largest speed of a revolute joint, rad/s; the servo lags behind faster ones."""
 
 
 class SurgeonHand(RobotHand):
@@ -19,3 +28,28 @@ class SurgeonHand(RobotHand):
         super().__init__(arm, base, chain, jaw)
         self.joints: Vector = np.zeros(len(chain.joints))
         """Measured joint positions, rad and m, shape (6,)."""
+
+    def joints_at(self, poses: Vector) -> Vector:
+        """Return the joints at poses of the tip, shape (..., 4, 4), on the present branch, shape (..., 6)."""
+        chain, into_base = self.chain, inverse_transform(self.base)
+        now = branches(chain, into_base @ pose_to_matrix(self.line()))
+        branch = int((np.abs(now - self.joints) / (chain.upper - chain.lower)).max(axis=-1).argmin())
+        return branches(chain, into_base @ poses)[branch]
+
+    def go(self, goal: Vector, share: float = 1.0) -> None:
+        """Begin a line to `goal`, shape (7,), at a fraction of the speed, slower where joints turn far."""
+        poses = line_poses(pose_to_matrix(self.line()), pose_to_matrix(goal), _SHARES)
+        q = self.joints_at(poses)
+        steps = np.abs(np.diff(np.delete(q, 2, axis=1), axis=0)).max(initial=0.0) * (len(_SHARES) - 1)
+        super().go(goal, share)
+        self.state.duration = max(self.state.duration, _PEAK_SPEED * float(steps) / _TURN)
+
+
+def line_poses(start: Vector, end: Vector, shares: Vector) -> Vector:
+    """Return the poses at shares of a straight line with an even turn, shape (n, 4, 4)."""
+    turn = rotation.log(rotation.from_matrix(end[:3, :3] @ start[:3, :3].T))
+    poses: Vector = np.tile(np.eye(4), (len(shares), 1, 1))
+    for pose, share in zip(poses, shares.tolist(), strict=True):
+        pose[:3, :3] = rotation.matrix(rotation.exp(share * turn)) @ start[:3, :3]
+        pose[:3, 3] = start[:3, 3] + share * (end[:3, 3] - start[:3, 3])
+    return poses
