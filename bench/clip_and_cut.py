@@ -16,8 +16,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-import trocar.sessions
+import trocar
 from anatomy.params import AnatomyParams
+from schemas.ros import StringMessage
 from schemas.trocar_msgs import TissueEvent
 
 __all__ = ["clip_and_cut"]
@@ -47,7 +48,7 @@ def run_patient(patient: int, **settings: str) -> dict[str, Any]:
         )
         recording = trocar.Recording(Path(folder) / "run")
         harm = {organ: found for organ in SPARED if (found := list(_harm(recording, organ)))}
-        said = [message.data for _, message in recording["routine.status"].messages()]
+        said = [cast("StringMessage", one).data for _, one in recording["routine.status"].messages()]
     return {
         "patient": patient,
         "variations": variations,

@@ -104,7 +104,7 @@ class Dividing(Procedure):
         if self.cuts:
             return places.cut
         outwards = 1.0 if state.job < CUT - 1 else -1.0
-        beside = _BESIDE * min(1, state.attempts)
+        beside = _BESIDE if state.attempts and places.is_roomy else 0.0
         return float(places.clips[state.job] + outwards * beside)
 
     def _choose(self) -> None:

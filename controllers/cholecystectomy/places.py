@@ -30,6 +30,8 @@ class Places(NamedTuple):
     clips: Vector
     """Clips 1 and 2, on the patient's side, and clip 3, shape (3,)."""
     cut: float
+    is_roomy: bool
+    """Whether there is room for all wanted distances."""
 
 
 def choose_places(length: float) -> Places:
@@ -45,4 +47,4 @@ def choose_places(length: float) -> Places:
     wanted = float(_WANTED.sum())
     share = min(1.0, (length - LEAST_LENGTH) / (wanted - LEAST_LENGTH))
     third, cut, second, first = np.cumsum(_LEAST + share * (_WANTED - _LEAST))[:4].tolist()
-    return Places(np.array([first, second, third]), cut)
+    return Places(np.array([first, second, third]), cut, share == 1.0)

@@ -17,7 +17,7 @@ __all__ = ["SurgeonHand", "line_poses"]
 _SHARES = np.linspace(0.0, 1.0, 13)
 _PEAK_SPEED = 1.875
 """Largest speed of a least-jerk motion over a length of 1 in a time of 1."""
-_TURN = 1.5
+_TURN = 2.0
 """Largest speed of a revolute joint, rad/s; the servo lags behind faster ones."""
 
 
