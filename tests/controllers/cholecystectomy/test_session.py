@@ -18,7 +18,7 @@ def test_the_duct_is_clipped_three_times_and_parted(tmp_path):
     assert 0.2 < summary.measures["pull_n"] < 1.5
     events = told(trocar.Recording(run), "cystic_duct")
     assert [event.kind for event in events if event.instrument == "PSM1"] == ["clipped"] * 3
-    assert {event.kind for event in events if event.instrument == "PSM3"} == {"cut"}
+    assert "cut" in {event.kind for event in events if event.instrument == "PSM3"}
     assert not told(trocar.Recording(run), "cystic_artery")
 
 
