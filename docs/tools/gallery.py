@@ -16,6 +16,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+import numpy as np
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -40,7 +41,8 @@ class Shot(NamedTuple):
     """Simulated time of a film's last picture, s; None: a picture."""
     speed: float = 1.0
     """Simulated seconds in a second of a film."""
-    camera: Literal["overview", "left"] = "left"
+    camera: Literal["overview", "left", "both"] = "left"
+    """both: the pictures of both eyes, side by side."""
     looks: Literal["plain", "endoscope"] = "endoscope"
     size: tuple[int, int] = (640, 512)
     position: Point | None = None
@@ -57,10 +59,11 @@ class Shot(NamedTuple):
         return RECORDINGS / f"{self.scenario}-{self.until:g}s"
 
 
-_FILM = (480, 384)
+_FILM, _EYE = (480, 384), (400, 320)
 _NEAR, _TABLE = (0.075, -0.1, 0.085), (0.0, -0.008, 0.048)
 """Where a camera stands, and looks at, beside the needle of `pick` and `hand-over`, m."""
 SHOTS = (
+    Shot("clip-and-cut", "clip-and-cut", 58.0, 1.0, 55.5, 5.0, camera="both", size=_EYE),
     Shot("cart", "cart", 2.0, 1.0, camera="overview", looks="plain"),
     Shot("teleop", "teleop", 8.0, 4.0),
     Shot("palpation", "palpation", 8.0, 5.0, camera="overview"),
@@ -113,7 +116,10 @@ def draw(shot: Shot) -> int:
     last = shot.start if shot.end is None else shot.end
     step_ns = round(shot.speed * 1e9 / FILM_PER_S)
     times = range(round(shot.start * 1e9), round(last * 1e9) + 1, step_ns)
-    drawn = scene.pictures(times, shot.camera, shot.size, shot.position, shot.target)
+    if shot.camera == "both":
+        drawn = (np.hstack(eyes) for eyes in scene.stereo(times, shot.size))
+    else:
+        drawn = scene.pictures(times, shot.camera, shot.size, shot.position, shot.target)
     pictures = [Image.fromarray(one) for one in drawn]
     shot.file.parent.mkdir(parents=True, exist_ok=True)
     if shot.end is None:
