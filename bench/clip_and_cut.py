@@ -25,7 +25,7 @@ __all__ = ["clip_and_cut"]
 
 PATIENTS = range(20)
 LEAST = 18
-"""Patients of `PATIENTS` on whom the routine is to succeed."""
+"""Patients of `PATIENTS` on whom the score card is to count a success."""
 SPARED = ("common_bile_duct", "hepatic_artery", "liver")
 _HARM = {"cut", "torn", "burnt", "clipped", "bleeding", "leaking"}
 _MEASURES = ("done", "given_up", "recoveries", "sub_task", "success", "errors", "blood", "bile", "pull_n")
@@ -78,10 +78,10 @@ def report(rows: Sequence[dict[str, Any]]) -> int:
             f" harm {row['harm'] or 'none'}: {end}"
         )
     done, hurt = (
-        sum(bool(row["done"]) for row in rows),
+        sum(bool(row["done"] and row["success"]) for row in rows),
         sum("common_bile_duct" in row["harm"] for row in rows),
     )
-    print(f"done: {done} of {len(rows)}; common bile duct hurt: {hurt}")
+    print(f"successes by the card: {done} of {len(rows)}; common bile duct hurt: {hurt}")
     return int(done * len(PATIENTS) < LEAST * len(rows)) + int(hurt > 0)
 
 
