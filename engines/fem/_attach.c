@@ -6,6 +6,9 @@ opened the less it bears: nothing at twice its work over its strength. Below its
 to its opening. So the work of separation is the work of the tie. Impulses by projected Gauss and Seidel, as in
 `_touch.c`: any sub-step will do. Work is taken and none given back, but for the recovery of an opening.
 
+Where an instrument holds nodes of both sides, a push is borne by the instrument: what is left of the face would move by
+the push over its share, which may be small.
+
 Where one of two bodies pushes every so many sub-steps, its push comes in one of them: strength bounds the impulse of a
 tie over all of these, its cycle.
 */
@@ -25,6 +28,7 @@ typedef struct {
     const int32_t *face; /* nodes */
     int cycle; /* sub-steps */
     int is_whole;
+    int is_clamped; /* nodes of both sides cannot move, as an instrument holds them */
     double normal[3], turn[3][3]; /* how a motion of each node of the face along the normal turns the normal */
     double mass[9], open[3], opening, most, pushed[3];
 } Tie;
@@ -96,6 +100,17 @@ void begin_attach(Attach *attach, int bodies)
         }
 }
 
+/* Whether neither the node nor all of the face can move, and an instrument holds some of them. */
+static int is_clamped(const Tie *tie)
+{
+    int held = tie->body->holder[tie->node] >= 0, still = 0;
+    for (int a = 0; a < 3; a++) {
+        still |= tie->other->inverse_mass[tie->face[a]] == 0.0f;
+        held |= tie->other->holder[tie->face[a]] >= 0;
+    }
+    return held && still && tie->body->inverse_mass[tie->node] == 0.0f;
+}
+
 static void place_of(const Attach *attach, int body, int32_t node, double x[3])
 {
     const Body *own = attach->body[body];
@@ -145,6 +160,7 @@ static int open_tie(const Attach *attach, int k, double seconds)
     double corner[3][3], x[3], u[3], v[3];
     if (!find_nodes(attach, k))
         return 0;
+    tie->is_clamped = is_clamped(tie);
     place_of(attach, place[0], tie->node, x);
     for (int a = 0; a < 3; a++)
         place_of(attach, place[2], tie->face[a], corner[a]);
@@ -215,7 +231,8 @@ static double resolve(const Attach *attach, int k)
     double along = dot(wanted, tie->normal), push = along > 0.0 ? along : 0.0, pull = pull_of(tie, wanted);
     double kept = pull > tie->most ? tie->most / pull : 1.0;
     for (int i = 0; i < 3; i++) {
-        double impulse = push * tie->normal[i] + kept * (wanted[i] - push * tie->normal[i]);
+        double along_normal = push * tie->normal[i];
+        double impulse = (tie->is_clamped ? 0.0 : along_normal) + kept * (wanted[i] - along_normal);
         change[i] = impulse - tie->pushed[i];
         tie->pushed[i] = impulse;
     }
