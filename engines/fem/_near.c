@@ -38,11 +38,29 @@ static double nearest_point(const double *centre, double reach, const double *no
     return distance < reach ? distance : INFINITY;
 }
 
+/* Get the numbers of an array of 64-bit integers; return -1 with an error for another type. */
+static int get_integers(PyObject *array, Py_buffer *buffer)
+{
+    if (PyObject_GetBuffer(array, buffer, PyBUF_FORMAT | PyBUF_C_CONTIGUOUS))
+        return -1;
+    if (buffer->itemsize == 8 && buffer->format && strchr("lq", buffer->format[0]))
+        return 0;
+    PyErr_Format(PyExc_TypeError, "faces are of type int64, not '%s' in the buffer protocol", buffer->format);
+    PyBuffer_Release(buffer);
+    return -1;
+}
+
 PyObject *find_near_faces(PyObject *Py_UNUSED(module), PyObject *args)
 {
     Py_buffer centres, reach, nodes, faces, spheres, near, weights, distances;
-    if (!PyArg_ParseTuple(args, "y*y*y*y*w*w*w*w*", &centres, &reach, &nodes, &faces, &spheres, &near, &weights, &distances))
+    PyObject *corners = PyTuple_GET_SIZE(args) > 3 ? PyTuple_GET_ITEM(args, 3) : Py_None, *unused;
+    if (get_integers(corners, &faces))
         return NULL;
+    if (!PyArg_ParseTuple(args, "y*y*y*Ow*w*w*w*", &centres, &reach, &nodes, &unused, &spheres, &near, &weights,
+                          &distances)) {
+        PyBuffer_Release(&faces);
+        return NULL;
+    }
     int64_t found = 0, room = (int64_t)(spheres.len / 8);
     for (int64_t s = 0; s < (int64_t)(reach.len / 8); s++)
         for (int64_t f = 0; f < (int64_t)(faces.len / 24); f++) {

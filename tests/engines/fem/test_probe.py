@@ -70,6 +70,12 @@ def test_near_faces_are_those_of_numpy(seed, room):
     np.testing.assert_allclose(found.weights, expected.weights, atol=1e-3)
 
 
+def test_faces_of_another_type_are_refused():
+    mesh, centre = block(np.array([0.04, 0.04, 0.02]), 60), np.zeros((1, 3))
+    with pytest.raises(TypeError, match="faces are of type int64, not 'i'"):
+        near_faces(centre, np.full(1, 5e-3), mesh.nodes, mesh.triangles.astype(np.int32))
+
+
 @given(st.integers(0, 2**32 - 1))
 def test_a_place_on_a_surface_is_that_of_numpy(seed):
     """To the bit where einsum of numpy has no fused products, so recordings of either verify."""
