@@ -6,6 +6,7 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
+from controllers.teleoperation.clip_trigger import ClipTrigger
 from controllers.teleoperation.contact_model import ContactModelBuilder
 from controllers.teleoperation.engagement import Engagement, EngagementPhase
 from controllers.teleoperation.jaw import JawGhost
@@ -20,7 +21,7 @@ from robots.inverse_kinematics import LastFrames
 from robots.limits import TOLERANCE, distinct
 from schemas.crtk import OperatingState
 from schemas.ports import Port
-from schemas.ros import BoolMessage, Header, JointState, Joy, StringMessage, Time
+from schemas.ros import BoolMessage, EmptyMessage, Header, JointState, Joy, StringMessage, Time
 from schemas.trocar_msgs import ContactModel
 from schemas.vectors import Vector
 
@@ -79,6 +80,7 @@ class Teleoperation(Controller):
         )
         self._view, self._engagement = View(params), Engagement(params)
         self._ghost = None if params.tool.jaw is None else JawGhost(params.tool.jaw)
+        self._trigger = None if params.tool.clip is None else ClipTrigger()
         self._contact = ContactModelBuilder(params.force, params.planes)
         self._now = TeleoperationState(n=n, jaw=len(params.tool.jaw_joints))
         self._command, self._goal, self._tip = self._now.command, self._now.goal, self._now.tip
@@ -89,6 +91,7 @@ class Teleoperation(Controller):
             *self._engagement.state,
             *(() if self._law is None else (self._law.state,)),
             *(() if self._ghost is None else (self._ghost.state,)),
+            *(() if self._trigger is None else (self._trigger.state,)),
         )
         self._found = b""
         """Bits of the command of `tip`."""
@@ -112,6 +115,7 @@ class Teleoperation(Controller):
             "state": (),
             "warning": (),
             **dict.fromkeys(self._streams, ()),
+            **({} if self._trigger is None else {"clip": ()}),
         }
         return self._outputs
 
@@ -137,6 +141,9 @@ class Teleoperation(Controller):
         if follows:
             self._lead(inputs, to_base, seconds)
         self._lead_jaw(gripper, seconds, follows=follows)
+        if self._trigger is not None:
+            fires = follows and self._trigger.fires(float(self._jaw[0]), seconds)
+            self._outputs["clip"] = (EmptyMessage(),) if fires else ()
         self._publish(phase, warnings + self._engagement.warnings)
         header = Header.model_construct(stamp=Time.from_ns(t + h), frame_id="")
         self._stream(header, follows=follows)

@@ -10,6 +10,7 @@ from schemas.crtk import OperatingState
 from schemas.ports import Port
 from schemas.ros import (
     BoolMessage,
+    EmptyMessage,
     Float64Message,
     JointState,
     Joy,
@@ -115,4 +116,5 @@ def _published_ports(p: TeleoperationParams) -> tuple[Port, ...]:
         signal_out("following", BoolMessage, "whether the arm follows the hand"),
         event_out("state", StringMessage, phases),
         event_out("warning", StringMessage, "why the arm holds, and what to do"),
+        *(() if p.tool.clip is None else (event_out("clip", EmptyMessage, "the hand has shut the jaw"),)),
     )
