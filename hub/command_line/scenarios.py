@@ -38,7 +38,7 @@ def print_scenarios() -> None:
         results.print(f"[bold]{escape(family)}[/]")
         for name in names:
             what, leads, long = _columns(read(installed[name]))
-            start = f"  {name:18}{long:13}"
+            start = f"  {name:21}{long:13}"
             if not results.is_terminal:  # a file has any width
                 results.print(Text(f"{start}{leads:29}{what}"), soft_wrap=True)
                 continue
