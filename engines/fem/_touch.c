@@ -161,6 +161,18 @@ static int are_tied(const Pairs *pairs, const Vertex *vertex, const Pair *pair)
            other->flags[node[0]] & other->flags[node[1]] & other->flags[node[2]] & TIED;
 }
 
+/* Whether neither a vertex nor all of a face of another body can move, and an instrument holds some of them: it keeps
+them apart. What is left of the face would move by the push over its share, which may be small. */
+static int are_clamped(const Body *body, int32_t vertex, const Body *other, const int32_t *node)
+{
+    int held = body->holder[vertex] >= 0, still = 0;
+    for (int a = 0; a < 3; a++) {
+        still |= other->inverse_mass[node[a]] == 0.0f;
+        held |= other->holder[node[a]] >= 0;
+    }
+    return body != other && held && still && body->inverse_mass[vertex] == 0.0f;
+}
+
 /* Fill in whom vertex k meets; return 0 for nobody. */
 static int meet(const Touch *touch, int k, Meeting *meeting)
 {
@@ -187,6 +199,8 @@ static int meet(const Touch *touch, int k, Meeting *meeting)
     meeting->vertex = vertex, meeting->body = pairs->body[vertex->body];
     meeting->other = pairs->body[best->pair->body], meeting->other_body = best->pair->body;
     meeting->node = meeting->other->surface + 3 * best->pair->slot;
+    if (are_clamped(meeting->body, vertex->node, meeting->other, meeting->node))
+        return 0;
     meeting->gap = side * best->distance;
     for (int i = 0; i < 3; i++) {
         int is_clear = !best->is_inside && best->distance > SAME_POINT;
