@@ -198,7 +198,7 @@ def test_an_unknown_anchor_or_an_empty_pick_is_refused(tmp_path):
 def test_the_parser_limits_its_memory(tmp_path):
     """A result above the limit ends the parser, not the parent."""
     code = (
-        "from engines.tissue.files import parser; parser._MEMORY = 10**9; parser._limit_resources();"
+        "from engines.tissue.files import parser; parser._MEMORY = 10**9; parser.limit_resources();"
         "import numpy; numpy.ones(10**9)"
     )
     if sys.platform == "win32":
