@@ -251,6 +251,7 @@ class DueOutputs:
     def put_initial_again(self) -> None:
         """Publish the values at time 0 once more."""
         for publisher, value in self._initial:
+            publisher.look()
             publisher.put(INITIAL, 0, value, again=True)
 
 

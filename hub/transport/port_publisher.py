@@ -84,6 +84,11 @@ class PortPublisher:
         bundled = any(bundle.needs(index) for bundle, index in self._bundles)
         return bool(self._takers or bundled or self._pages.needed)
 
+    def look(self) -> None:
+        """Look for readers on Zenoh now, so that the first events reach all that are there."""
+        for publisher in self._publishers:
+            publisher.look()
+
     def keep_first(self, value: Any) -> None:
         """Keep the value at time 0 for later pages, if later values may lack something."""
         self._pages.keep_first(0, value)

@@ -43,10 +43,16 @@ class Publisher:
         self.needed = always
         """Whether there is a subscriber."""
         self._changed = changed
+        self._always = always
         if not always:
             self._listener = self._publisher.declare_matching_listener(
                 Callback(self._note_match, indirect=False)
             )
+            self.look()
+
+    def look(self) -> None:
+        """Look for subscribers now: on a busy machine Zenoh tells of a new one some steps late."""
+        if not self._always:
             self._note_match(self._publisher.matching_status)
 
     def _note_match(self, status: Any) -> None:
