@@ -15,6 +15,7 @@ NAMES = (
     "trocar",
     "schemas",
     "robots",
+    "anatomy",
     "hub",
     "engines",
     "controllers",

@@ -102,6 +102,8 @@ def options(
         handler, layout = logging.StreamHandler(), "%(asctime)s %(levelname)s %(message)s"
     handler.setFormatter(_Printable(layout))
     logging.basicConfig(level=level, handlers=[handler])
+    # where MUJOCO_GL is set, the import of MuJoCo reports that an optional package is not there
+    logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)
     if context.invoked_subcommand is None:
         typer.echo(_WELCOME)
 

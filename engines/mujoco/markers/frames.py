@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engines.mujoco.model.seats import arm_tips
 from engines.mujoco.params import SceneParams
 from robots.dvrk.crtk import CART_FRAME, WORLD_FRAME
 from robots.dvrk.ecm import tip
@@ -48,6 +47,8 @@ class SceneFrames:
 
     def __init__(self, scene: SceneParams, model: mujoco.MjModel) -> None:
         """`model`: made of `scene`."""
+        from engines.mujoco.model.seats import arm_tips  # the kind can be described without MuJoCo
+
         self.fixed = frozenset(_fixed_frames(scene))
         """Those that never move."""
         self._site = {f"{arm}_base": model.site(f"{arm}/base").id for arm in scene.arms}
