@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from anatomy.organs import attachments_of, organs_of
-from anatomy.patient import Patient, Variations, draw_patient
+from anatomy.patient import ArteryCourse, Patient, Variations, draw_patient
 from anatomy.phase import Phase
 
 __all__ = ["AnatomyParams"]
@@ -27,7 +27,7 @@ class AnatomyParams(BaseModel):
             " cholecystectomy: all, from the fat on, with a liver that may be cut and bleeds"
         ),
     )
-    artery: Literal["cranial", "front", "behind"] | None = Field(
+    artery: ArteryCourse | None = Field(
         default=None, description="course of the cystic artery about the duct; default: as the seed draws it"
     )
     short_duct: bool | None = Field(

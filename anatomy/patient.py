@@ -8,9 +8,10 @@ from typing import Literal
 
 from anatomy.spread import Spread
 
-__all__ = ["GALLBLADDER_LENGTH", "Patient", "Variations", "draw_patient"]
+__all__ = ["GALLBLADDER_LENGTH", "ArteryCourse", "Patient", "Variations", "draw_patient"]
 
 ArteryCourse = Literal["cranial", "front", "behind"]
+"""Course of the cystic artery about the cystic duct."""
 
 GALLBLADDER_LENGTH = Spread(0.085, 0.008, 0.070, 0.100)
 """Fasting: 70 to 100 mm (StatPearls; The Common Vein); the deviation is assumed."""

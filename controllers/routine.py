@@ -162,9 +162,14 @@ class SetPower(_Command):
     power: Power = Field(ge=0, le=400)
 
     @property
-    def port(self) -> str:
+    def output(self) -> Port:
         """Output with the power."""
-        return f"{self.arm}/energy"
+        return signal_out(f"{self.arm}/energy", description="power of the generator", unit="W")
+
+    @property
+    def level(self) -> float:
+        """Power, W."""
+        return self.power
 
 
 class SetFlow(_Command):
@@ -174,9 +179,14 @@ class SetFlow(_Command):
     share: float = Field(ge=0, le=1, description="of the most")
 
     @property
-    def port(self) -> str:
+    def output(self) -> Port:
         """Output with the share."""
-        return f"{self.arm}/{self.do}"
+        return signal_out(f"{self.arm}/{self.do}", description="share of the most")
+
+    @property
+    def level(self) -> float:
+        """Share of the most."""
+        return self.share
 
 
 class Wait(Params):
@@ -253,17 +263,17 @@ class Routine(Controller):
         )
         self._now = RoutineState(arms=len(self._arms))
         self._busy = self._now.busy
-        self._powers = {step.port: np.zeros(1) for step in params.steps if isinstance(step, SetPower)}
-        """Power of every generator, W, by output."""
-        self._flows = {step.port: np.zeros(1) for step in params.steps if isinstance(step, SetFlow)}
-        """Share of the most suction or irrigation, by output."""
-        self.keep(self._now, *self._powers.values(), *self._flows.values())
+        set_levels = [step.output for step in params.steps if isinstance(step, SetPower | SetFlow)]
+        self._set_levels = {port.name: port for port in set_levels}
+        """Outputs of generators and suction irrigators."""
+        self._levels = {name: np.zeros(1) for name in self._set_levels}
+        """Power, W, or share of the most flow, by output."""
+        self.keep(self._now, *self._levels.values())
         self._outputs: dict[str, Any] = {
             "step": self._now.part("step"),
             "done": self._now.part("done"),
             **dict.fromkeys(self._commands, ()),
-            **self._powers,
-            **self._flows,
+            **self._levels,
         }
 
     @property
@@ -282,8 +292,7 @@ class Routine(Controller):
         return (
             *(event_in(f"{arm}/{name}", type_) for arm in self._arms for name, type_ in events),
             *(event_out(name, types[name]) for name in self._commands),
-            *(signal_out(name, description="power of the generator", unit="W") for name in self._powers),
-            *(signal_out(name, description="share of the most") for name in self._flows),
+            *self._set_levels.values(),
             signal_out("step", Float64Message, "number of the present step, from 0"),
             signal_out("done", Float64Message, "1 when all steps are done"),
         )
@@ -313,10 +322,8 @@ class Routine(Controller):
 
     def _begin(self, step: Step, t: int) -> None:
         self._now.begun_ns = t
-        if isinstance(step, SetPower):
-            self._powers[step.port][0] = step.power
-        if isinstance(step, SetFlow):
-            self._flows[step.port][0] = step.share
+        if isinstance(step, SetPower | SetFlow):
+            self._levels[step.output.name][0] = step.level
         for command in _commands(step):
             port, message = command.message()
             self._outputs[port] += (message,)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from robots.polyline import nearest_feet
 from schemas.trocar_msgs import TubeLine
 from schemas.vectors import Vector
 
@@ -55,10 +56,7 @@ class Tube:
 
     def nearest(self, point: Vector) -> float:
         """Return the place nearest to a point (m, shape (3,))."""
-        starts, ways = self.points[:-1], np.diff(self.points, axis=0)
-        squares = np.maximum((ways * ways).sum(axis=1), 1e-18)
-        shares = np.clip(((point - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
-        feet = starts + shares[:, None] * ways
-        best = int(np.linalg.norm(feet - point, axis=1).argmin())
+        shares, distances = nearest_feet(self.points, point)
+        best = int(distances.argmin())
         share = float(shares[best])
         return float(self._along[best] + share * (self._along[best + 1] - self._along[best]))

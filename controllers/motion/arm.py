@@ -195,21 +195,25 @@ class Arm:
         self._lifecycle.watch(self._period)
         awaited = self._execute_arrived(inputs, arrived)
         self._lifecycle.step(self._period)
-        exchanging = self._step_exchange()
+        self._step_exchange()
         following = self._drives.step(self._period)
-        state, homed, busy = self._lifecycle.condition
-        busy = busy or exchanging
-        self._condition = state, homed, busy
+        state, homed, busy = self._condition = self._present_condition
         if awaited or self._condition != before:
             self._messages.operating_state(state, homed=homed, busy=busy)
         self._update_modes()
         self._rests = not busy
         return following
 
-    def _step_exchange(self) -> bool:
-        """Go on with an exchange; return whether one is under way."""
+    @property
+    def _present_condition(self) -> tuple[State, bool, bool]:
+        """State, whether the arm is homed, and whether a motion or an exchange is under way."""
+        state, homed, busy = self._lifecycle.condition
+        return state, homed, busy or (self._exchange is not None and self._exchange.is_busy)
+
+    def _step_exchange(self) -> None:
+        """Go on with an exchange, if one is under way."""
         if self._exchange is None or not self._exchange.is_busy:
-            return False
+            return
         state, homed, _ = self._lifecycle.condition
         if state is State.ENABLED and homed:
             held = self._exchange.held
@@ -218,7 +222,6 @@ class Arm:
                 self._equipment.publish()
         elif state is not State.PAUSED:
             self._exchange.stop()
-        return self._exchange.is_busy
 
     def drive(self) -> None:
         """Command the final setpoints of the step, through encoders with offsets."""
@@ -242,9 +245,7 @@ class Arm:
         self._fit()
         for axes in self._drives.groups:
             axes.setpoint.recompute_derived()
-        state, homed, busy = self._lifecycle.condition
-        busy = busy or (self._exchange is not None and self._exchange.is_busy)
-        self._condition = (state, homed, busy) if self._now.started else None
+        self._condition = self._present_condition if self._now.started else None
         self._update_modes()
         self._rests = False
         self.drive()

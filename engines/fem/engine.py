@@ -105,10 +105,8 @@ class FemEngine(Stepped):
         longest = [organ.solid.longest_step for organ in self._organs]
         plan = common_sub_steps(seconds, longest, fewest)
         if self.params.own_sub_steps:
-            names, nodes = (
-                [organ.name for organ in self._organs],
-                [len(organ.nodes) for organ in self._organs],
-            )
+            names = [organ.name for organ in self._organs]
+            nodes = [len(organ.nodes) for organ in self._organs]
             pairs = (attachment.organs for attachment in self.params.attachments.values())
             tied = [(names.index(one), names.index(other)) for one, other in pairs]
             plan = own_sub_steps(seconds, longest, plan.total, nodes, tied)

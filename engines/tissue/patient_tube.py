@@ -5,17 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from engines.tissue.meshing.surface import Surface, bisect_long_edges
 from engines.tissue.meshing.tet_mesh import TetMesh
 from engines.tissue.organs.label_mesh import LabelMesh
 from engines.tissue.organs.label_tube import LabelTube
 from engines.tissue.organs.params import OrganParams
 from engines.tissue.organs.shape import ROUNDING_DIGITS
+from engines.tissue.organs.touching import nearest_places
 from schemas.vectors import Vector
 
 __all__ = ["PatientTube", "TubeJoint", "make_tube"]
@@ -31,6 +30,8 @@ _WALL = {"young_modulus": "60 kPa", "poisson_ratio": 0.45, "inertia": 25}
 _TOUCHING, _WITHIN = 1.5, 0.25
 """Distance of an end's middle from the organ that it joins: voxels, and a share of the radius more."""
 _SPARE = 1.2
+_STEP = 5e-4
+"""Distance of the places of a surface to which ends are drawn, m."""
 _THICKEST = 0.45
 """Largest wall over the least diameter."""
 
@@ -75,7 +76,7 @@ def make_tube(tube: LabelTube, wall: float, organs: Sequence[LabelMesh]) -> Pati
     path = path.copy()
     for i, other in zip((0, -1), found, strict=True):
         if other is not None:
-            path[i] = _nearest(path[[i]], other.mesh)[0]
+            path[i] = nearest_places(path[[i]], other.mesh, _STEP)[0]
     ends: dict[str, LabelMesh | None] = dict(zip(("left", "right"), found, strict=True))
     params = {
         "tube": {
@@ -94,7 +95,7 @@ def make_tube(tube: LabelTube, wall: float, organs: Sequence[LabelMesh]) -> Pati
         if other is not None:
             nodes = np.unique(organ.local.triangles)
             ring = organ.local.nodes[nodes[organ.body.surface(end, organ.local.nodes[nodes])]]
-            reach = float(np.linalg.norm(ring - _nearest(ring, other.mesh), axis=1).max())
+            reach = float(np.linalg.norm(ring - nearest_places(ring, other.mesh, _STEP), axis=1).max())
             joints.append(TubeJoint(other.body.name, end, _SPARE * reach + 1e-4))
     return PatientTube(tube.body.name, params, organ.local, tuple(joints), _sentences(tube, ends))
 
@@ -109,14 +110,6 @@ def _organ_at(place: Vector, diameter: float, organs: Sequence[LabelMesh]) -> La
     }
     best = max(depths, key=lambda i: depths[i], default=None)
     return None if best is None or depths[best] < 0.0 else organs[best]
-
-
-def _nearest(points: Vector, mesh: TetMesh) -> Vector:
-    """Return the nearest places of a surface, m, shape (n, 3)."""
-    tree: Any = import_module("scipy.spatial").cKDTree
-    places = bisect_long_edges(Surface(mesh.nodes, mesh.triangles), 5e-4).middles
-    found: Vector = places[tree(places).query(points)[1]]
-    return found
 
 
 def _sentences(tube: LabelTube, ends: Mapping[str, LabelMesh | None]) -> list[str]:

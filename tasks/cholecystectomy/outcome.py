@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
+from anatomy.phase import Phase
 from hub.participant import Record, array, number
 from schemas.trocar_msgs import ScoreValue
 from tasks.cholecystectomy.bleeding import LossesState
 from tasks.cholecystectomy.organs import ARTERY, BOWEL, COMMON_DUCT, DUCT, HEPATIC_ARTERY, ORGANS, SPARED
-from tasks.cholecystectomy.params import CholecystectomyParams, Phase
+from tasks.cholecystectomy.params import CholecystectomyParams
 from tasks.cholecystectomy.tubes import TubeWatch
 from tasks.cholecystectomy.watch import Watch, value_or_reason
 from tasks.events import Event, EventKind

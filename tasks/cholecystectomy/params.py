@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from anatomy.phase import Phase
 from schemas.quantity import Angle, Duration, Length
 from tasks.params import TaskParams
 
-__all__ = ["CholecystectomyParams", "Phase"]
-
-Phase = Literal["clip-and-cut", "calot-dissection", "gallbladder-bed", "cholecystectomy"]
-"""A part of the operation, or the whole."""
+__all__ = ["CholecystectomyParams"]
 
 
 class CholecystectomyParams(TaskParams):

@@ -7,6 +7,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.polyline import nearest_feet
 from schemas.trocar_msgs import TubeLine
 from schemas.vectors import Vector
 
@@ -55,10 +56,7 @@ class Tube:
 
     def place(self, point: Vector) -> Place:
         """Return the place of a point, m, in `world`, shape (3,)."""
-        starts, ways = self._points[:-1], np.diff(self._points, axis=0)
-        squares = np.maximum((ways * ways).sum(axis=1), 1e-18)
-        shares = np.clip(((point - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
-        off = np.linalg.norm(starts + shares[:, None] * ways - point, axis=1)
+        shares, off = nearest_feet(self._points, point)
         off[self._parted[:-1] > 0] = np.inf  # no tissue there
         ring = int(off.argmin())
         along = self._along[ring] + shares[ring] * (self._along[ring + 1] - self._along[ring])

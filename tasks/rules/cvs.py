@@ -13,13 +13,13 @@ from hub.participant import Record
 from schemas.trocar_msgs import ScoreValue
 from tasks.events import Event
 from tasks.instant import Instant
+from tasks.rules.operation_errors import NO_OPERATION
 from tasks.rules.rules import Rules, Setting, missing_all
 
 __all__ = ["CvsDoublet"]
 
 _WHOLE, _PART = 0.9, 0.5
 _SATISFACTORY = 5.0
-_NO_OPERATION = "these rules score an operation: run or record a task of kind cholecystectomy-task"
 _ROWS = {"two_structures": "", "triangle": "", "plate": "", "total": "", "satisfactory": ""}
 
 
@@ -41,7 +41,7 @@ class CvsDoublet(Rules[CvsState]):
     def values(self, metrics: Mapping[str, ScoreValue]) -> Iterator[ScoreValue]:
         """Yield the points of each criterion, their sum, and whether it is satisfactory."""
         if "cvs/structures" not in metrics:
-            yield from missing_all(_ROWS, _NO_OPERATION)
+            yield from missing_all(_ROWS, NO_OPERATION)
             return
         parts = [metrics[f"cvs/{name}"] for name in ("structures", "triangle_cleared", "plate_freed")]
         points = [2.0 * (parts[0].value == 2.0), *(_points(part.value) for part in parts[1:])]

@@ -14,12 +14,10 @@ from hub.participant import Record, array, number
 from schemas.trocar_msgs import ScoreValue
 from tasks.events import Event
 from tasks.instant import Instant
-from tasks.rules.operation_errors import ERRORS, MODES
+from tasks.rules.operation_errors import ERRORS, MODES, NO_OPERATION
 from tasks.rules.rules import Rules, Setting
 
 __all__ = ["Ochra"]
-
-_NO_OPERATION = "these rules score an operation: run or record a task of kind cholecystectomy-task"
 
 
 class OchraState(Record):
@@ -49,7 +47,7 @@ class Ochra(Rules[OchraState]):
 
     def values(self, metrics: Mapping[str, ScoreValue]) -> Iterator[ScoreValue]:
         """Yield the counts, in all, with consequences, and by mode."""
-        reason = "" if "cvs/structures" in metrics else _NO_OPERATION
+        reason = "" if "cvs/structures" in metrics else NO_OPERATION
         state = self.state
         yield ScoreValue(name="errors", value=state.total, reason=reason)
         yield ScoreValue(name="consequential", value=state.consequential, reason=reason)

@@ -13,7 +13,10 @@ from typing import Literal, NamedTuple
 
 from tasks.events import EventKind
 
-__all__ = ["ERRORS", "MODES", "ErrorKind", "Mode"]
+__all__ = ["ERRORS", "MODES", "NO_OPERATION", "ErrorKind", "Mode"]
+
+NO_OPERATION = "these rules score an operation: run or record a task of kind cholecystectomy-task"
+"""Reason for rows about an operation of a task that is none."""
 
 Mode = Literal[
     "step_omitted",

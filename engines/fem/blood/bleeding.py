@@ -104,7 +104,8 @@ class Bleeding:
     @property
     def saline_imbalance(self) -> int:
         """Saline given, less the saline that is somewhere, in parts of `QUANTUM`: always 0."""
-        return 2 * int(self._saline[:1].sum()) - int(self._saline.sum()) - self._saline_on_surface
+        given, *gone = self._saline.tolist() or [0]
+        return given - sum(gone) - self._saline_on_surface
 
     def step(self, t: int, seconds: float) -> None:
         """Bleed and run for `seconds` until `t` ns."""
@@ -233,13 +234,11 @@ class Bleeding:
             np.frombuffer(next(parts), array.dtype) for array in self.state
         )
         if self.film.saline is not None:
-            self.film.saline, (self._saline[:], *clips) = more[0].copy(), more[1:]
-        else:
-            clips = more
-        if self.clips is not None:
-            self.clips.restore(*clips[:2])
-        if self.tube is not None:
-            self.tube.restore(*clips[2:])
+            saline, self._saline[:], *more = more
+            self.film.saline = saline.copy()
+        if self.clips is not None and self.tube is not None:
+            self.clips.restore(*more[:2])
+            self.tube.restore(*more[2:])
         self.film.amounts, self._opened = amounts.copy(), opened.copy()
         self._book[:], self._rate[:], self._source[:] = book, rate, source
         self._known = _UNKNOWN

@@ -8,16 +8,15 @@ import numpy as np
 
 from engines.fem.blood.bleeding import Bleeding
 from engines.fem.blood.film import QUANTUM
+from engines.fem.blood.flow_command import commanded_share, flow_port
 from engines.fem.probe import Probe
 from engines.tissue.probes.irrigation import IrrigationParams
-from hub.participant import Inputs, Value, signal_in, signal_out
+from hub.participant import Inputs, Value, signal_out
 from schemas.ports import Port
 from schemas.vectors import Vector
 
 __all__ = ["Irrigation", "irrigation_ports", "saline_outputs", "saline_ports"]
 
-_MOST_AGE_NS = 200_000_000
-"""Age at which a command of a silent device is none."""
 _SALINE = (
     ("given", "saline let fall on it since time 0"),
     ("surface", "of it still on the surface"),
@@ -29,12 +28,7 @@ _SALINE = (
 def irrigation_ports(probe: str) -> tuple[Port, ...]:
     """Return the ports of an instrument."""
     return (
-        signal_in(
-            f"{probe}/irrigation",
-            description="share of the most irrigation, from 0 to 1; 0 from a silent device",
-            start=(0.0,),
-            max_age_ns=_MOST_AGE_NS,
-        ),
+        flow_port(f"{probe}/irrigation", "irrigation"),
         signal_out(f"{probe}/irrigated", description="saline let out since time 0", unit="ml"),
     )
 
@@ -63,11 +57,10 @@ class Irrigation:
 
     def step(self, inputs: Inputs, bleedings: Sequence[Bleeding], seconds: float) -> None:
         """Let saline fall on the first organ in reach for `seconds`; without any it falls past them."""
-        port = f"{self._probe.name}/irrigation"
-        command = 0.0 if inputs.stale(port) else inputs.number(port, 0.0)
-        if not command > 0.0:  # true of NaN
+        share = commanded_share(inputs, f"{self._probe.name}/irrigation")
+        if not share:
             return
-        amount = int(self._params.rate * min(command, 1.0) * seconds / QUANTUM)
+        amount = int(self._params.rate * share * seconds / QUANTUM)
         self.given[0] += 1e6 * QUANTUM * amount
         reach = float(self._probe.radii[0]) + self._params.reach
         for bleeding in bleedings:

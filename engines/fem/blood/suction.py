@@ -8,27 +8,20 @@ import numpy as np
 
 from engines.fem.blood.bleeding import Bleeding
 from engines.fem.blood.film import QUANTUM
+from engines.fem.blood.flow_command import commanded_share, flow_port
 from engines.fem.probe import Probe
 from engines.tissue.probes.suction import SuctionParams
-from hub.participant import Inputs, Value, signal_in, signal_out
+from hub.participant import Inputs, Value, signal_out
 from schemas.ports import Port
 from schemas.vectors import Vector
 
 __all__ = ["Suction", "suction_ports"]
 
-_MOST_AGE_NS = 200_000_000
-"""Age at which a command of a silent device is none."""
-
 
 def suction_ports(probe: str) -> tuple[Port, ...]:
     """Return the ports of an instrument."""
     return (
-        signal_in(
-            f"{probe}/suction",
-            description="share of the most suction, from 0 to 1; 0 from a silent device",
-            start=(0.0,),
-            max_age_ns=_MOST_AGE_NS,
-        ),
+        flow_port(f"{probe}/suction", "suction"),
         signal_out(f"{probe}/sucked", description="liquid taken up since time 0", unit="ml"),
     )
 
@@ -43,11 +36,10 @@ class Suction:
 
     def step(self, inputs: Inputs, bleedings: Sequence[Bleeding], seconds: float) -> None:
         """Take up liquid for `seconds`."""
-        port = f"{self._probe.name}/suction"
-        command = 0.0 if inputs.stale(port) else inputs.number(port, 0.0)
-        if not command > 0.0:  # true of NaN
+        share = commanded_share(inputs, f"{self._probe.name}/suction")
+        if not share:
             return
-        left = int(self._params.rate * min(command, 1.0) * seconds / QUANTUM)
+        left = int(self._params.rate * share * seconds / QUANTUM)
         for bleeding in bleedings:
             taken = bleeding.suck(self._probe.positions, self._probe.radii + self._params.reach, left)
             self.taken[0] += 1e6 * QUANTUM * taken

@@ -39,7 +39,7 @@ class Readings:
         weighs: bool = False,
         engaged: Callable[[], Mapping[str, int]] = dict[str, int],
     ) -> None:
-        """Report on `arms`; `weighs`: by the whole efforts of their motors.
+        """Report on `arms`.
 
         Args:
             model: the model.
@@ -52,6 +52,7 @@ class Readings:
         """
         self._engaged = engaged
         self._jaws: list[tuple[str, list[tuple[Vector, Vector] | None], Vector]] = []
+        """Arm with spares, for each instrument the matrix to joints and the sensors, and the output."""
         self._whole = positions
         self._sensors = data.sensordata
         self._qpos = np.empty(model.nq if positions is None else len(positions))

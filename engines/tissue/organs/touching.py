@@ -17,7 +17,7 @@ from engines.tissue.organs.picks import NodePick
 from engines.tissue.organs.shape import ROUNDING_DIGITS
 from schemas.vectors import Vector
 
-__all__ = ["Contact", "join"]
+__all__ = ["Contact", "join", "nearest_places"]
 
 _REACHES = 1.75, 2.5, 3.5, 5.0
 """Distances of nodes that touch, in voxels: programs leave a seam of one; coarse meshes need more."""
@@ -144,11 +144,17 @@ def _touching_area(one: LabelBody, other: LabelBody) -> float:
     return count * one.field.spacing**2 / _STAIRS if count >= _FEWEST else 0.0
 
 
+def nearest_places(points: Vector, mesh: TetMesh, step: float) -> Vector:
+    """Return the places of a surface nearest to points, of places at most `step` (m) apart, shape (n, 3)."""
+    tree: Any = import_module("scipy.spatial").cKDTree
+    places = bisect_long_edges(Surface(mesh.nodes, mesh.triangles), step).middles
+    found: Vector = places[tree(places).query(points)[1]]
+    return found
+
+
 def _nearest(points: Vector, mesh: TetMesh) -> Vector:
     """Return the nearest places of a surface, within a tenth of an edge, shape (n, 3)."""
-    tree: Any = import_module("scipy.spatial").cKDTree
-    places = bisect_long_edges(Surface(mesh.nodes, mesh.triangles), _FINENESS * mean_edge(mesh)).middles
-    return places[tree(places).query(points)[1]]
+    return nearest_places(points, mesh, _FINENESS * mean_edge(mesh))
 
 
 def _faces(points: Vector, mesh: TetMesh) -> NDArray[np.int64]:
