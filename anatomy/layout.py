@@ -21,6 +21,8 @@ Line = NDArray[np.float64]
 
 _NECK_WALL = 0.0021
 """Wall of the gallbladder where the cystic duct begins, m."""
+_MOST_WALL = 0.3
+"""Largest wall of the gallbladder over its outer diameter: an inflamed wall leaves a lumen in the infundibulum."""
 _CONFLUENCE_Y = -0.014
 _COMMON = np.array(
     [[0.020, -0.050, -0.010], [0.0205, -0.028, -0.007], [0.020, -0.008, -0.007], [0.019, 0.012, -0.009]]
@@ -100,7 +102,9 @@ class Layout:
     def gallbladder_walls(self) -> Line:
         """Thickness of the wall at each point of the gallbladder's line, m."""
         wall = self.patient.gallbladder_wall
-        return np.array([min(wall, _NECK_WALL), *[wall] * 6])
+        found = np.minimum(wall, _MOST_WALL * self.gallbladder_diameters)
+        found[0] = min(wall, _NECK_WALL)
+        return found
 
     def _on_infundibulum(self, outward: Line) -> tuple[Line, Line]:
         """Return a place on the wall of the infundibulum in a direction, and the normal there."""

@@ -53,7 +53,6 @@ _FAT_OFF, _FAT_SIZE = np.array([-0.003, 0.006]), (0.034, 0.034)
 _FAT_THICKNESS, _FAT_FLOOR, _FAT_HEIGHTS = 0.003, -0.012, 13
 """Thickness of peritoneum and fat over the triangle, lowest height of the underside, m; heights a side."""
 _FAT_GAP = 0.0008
-_UNDER_FAT = "gallbladder", "cystic_duct", "common_bile_duct"
 
 
 def organs_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
@@ -83,9 +82,20 @@ def attachments_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
     if phase != "gallbladder-bed":
         found |= _joints(patient)
     if phase in ("calot-dissection", "cholecystectomy"):
-        for name in _UNDER_FAT:
+        for name in _under_fat(patient):
             found[f"fat_{name}"] = {"organs": ["fat", name], "surface": "underside", "within": 0.002, **_FAT}
     return found
+
+
+def _under_fat(patient: Patient) -> list[str]:
+    """Return the organs that the fat lies on: an artery in front keeps it off a short duct."""
+    in_front = patient.artery == "front"
+    return [
+        "gallbladder",
+        *["cystic_artery"] * in_front,
+        *["cystic_duct"] * (not (in_front and patient.short_duct)),
+        "common_bile_duct",
+    ]
 
 
 def _plate(patient: Patient, opened: float) -> dict[str, dict[str, Any]]:

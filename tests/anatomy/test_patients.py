@@ -83,6 +83,7 @@ def test_lines_have_the_lengths_of_the_patient(seed):
 
 @given(SEEDS)
 @example(0)
+@example(284)  # a wall of 5.5 mm and a narrow infundibulum
 def test_every_patient_has_sound_hollow_organs_that_hang_together(seed):
     given = tissue(patient=seed)
     organs = {}
@@ -119,6 +120,7 @@ def test_a_thick_wall_is_thick_and_stiff():
 
 @given(SEEDS)
 @example(0)
+@example(28)  # an artery in front of a short duct
 def test_fat_lies_on_gallbladder_and_ducts_before_the_dissection(seed):
     given = tissue(patient=seed, phase="calot-dissection")
     fat = given.organs["fat"].rest
@@ -128,7 +130,7 @@ def test_fat_lies_on_gallbladder_and_ducts_before_the_dissection(seed):
     assert organs["fat"].solid.longest_step > 40e-6
     under = given.organs["fat"].surface(AnchorParams(surface="underside"))
     beds = [one for name, one in given.attachments.items() if name.startswith("fat_")]
-    assert len(beds) == 3
+    assert len(beds) >= 3
     for bed in beds:
         assert len(find_ties(organs["fat"], organs[bed.organs[1]], under, bed.within).areas) >= 4
 
