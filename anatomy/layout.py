@@ -22,7 +22,7 @@ Line = NDArray[np.float64]
 _NECK_WALL = 0.0021
 """Wall of the gallbladder where the cystic duct begins, m."""
 _MOST_WALL = 0.3
-"""Largest wall of the gallbladder over its outer diameter: an inflamed wall leaves a lumen in the infundibulum."""
+"""Largest wall of the gallbladder over its outer diameter: a narrow infundibulum keeps a lumen."""
 _CONFLUENCE_Y = -0.014
 _COMMON = np.array(
     [[0.020, -0.050, -0.010], [0.0205, -0.028, -0.007], [0.020, -0.008, -0.007], [0.019, 0.012, -0.009]]
