@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,7 +127,10 @@ class ContractPolicy:
             row[:7] = matrix_to_pose(base @ tip_in_base)
         return made
 
-    def close(self) -> None:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         """Release the policy."""
         if self._policy is not None:
             self._policy.close()

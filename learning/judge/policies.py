@@ -6,6 +6,8 @@
 | `random` | uniform actions, seeded by the episode: the floor |
 | `openpi://HOST:PORT`, ... | a policy behind a contract: the backends of kind `policy` |
 | `MODULE:NAME` | a class or function without arguments, for an object with `begin` and `act` |
+
+A policy that is a context manager is entered before the first trial and left after the last.
 """
 
 from __future__ import annotations

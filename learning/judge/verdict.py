@@ -14,14 +14,13 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
 from typing import Any, cast
 
-from learning.judge.contract_policy import ContractPolicy
 from learning.judge.episode import Row, Trial, judge_trial, make_environment
 from learning.judge.policies import PolicyAddress, open_policy
 from learning.own_directory import MARKER, whole_file
@@ -120,8 +119,8 @@ def judge_trials(policy: PolicyAddress, trials: Sequence[Trial], directory: str 
     judged = open_policy(policy)
     rows: list[Row] = []
     with ExitStack() as held, ExitStack() as stack:
-        if isinstance(judged, ContractPolicy):
-            held.callback(judged.close)
+        if isinstance(judged, AbstractContextManager):
+            held.enter_context(judged)
         env, world = None, None
         for trial in trials:
             if env is None or world != trial.world:

@@ -19,9 +19,8 @@ TRIAL = Trial("Reach", "nominal", 0)
 
 @pytest.fixture
 def judged(request):
-    policy = ContractPolicy(f"python:{FILE}:Reach", request.param, 5)
-    yield policy
-    policy.close()
+    with ContractPolicy(f"python:{FILE}:Reach", request.param, 5) as policy:
+        yield policy
 
 
 @pytest.mark.parametrize("judged", [{}, {"rate": 10.0}], indirect=True)

@@ -2,6 +2,7 @@
 
 import json
 import re
+from importlib import import_module
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -105,6 +106,11 @@ def test_a_policy_that_fails_does_not_end_the_suite():
     assert [row["failure"] for row in rows] == ["policy failed", "goal not reached"]
     assert "expected (5,) finite numbers" in rows[0]["error"]
     assert rows[0]["steps"] == 2
+
+
+def test_a_policy_that_is_held_is_entered_and_left():
+    judge_trials(PolicyAddress(f"{OWN}:Held"), [Trial("Reach", "nominal", seed) for seed in (0, 1)], None)
+    assert import_module(OWN).Held.said == ["entered", "left"]
 
 
 def test_two_policies_on_the_same_seeds(expert, tmp_path):
