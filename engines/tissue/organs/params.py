@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Literal, Self
 
@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
-from engines.tissue.files.mesh_file import is_surface, read_surface, read_tetrahedra
 from engines.tissue.frequencies import highest_frequency, lowest_frequency
 from engines.tissue.material import Material
 from engines.tissue.meshing.grid import FEWEST_NODES
-from engines.tissue.meshing.mesh_check import LARGEST_M, MOST_NODES, SMALLEST_M, checked_mesh
-from engines.tissue.meshing.surface import Surface
+from engines.tissue.meshing.mesh_check import LARGEST_M, MOST_NODES, SMALLEST_M
 from engines.tissue.meshing.tet_mesh import TetMesh
 from engines.tissue.organs.anchors import AnchorParams, Edges
 from engines.tissue.organs.bleeding import BleedingParams
@@ -27,11 +25,10 @@ from engines.tissue.organs.layers import LayerParams
 from engines.tissue.organs.lumen import LumenParams
 from engines.tissue.organs.material_file import MaterialFile
 from engines.tissue.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
-from engines.tissue.organs.organ_file import OrganFile
 from engines.tissue.organs.prony import PronySeries, PronyTerm
 from engines.tissue.organs.shape import Shape
+from engines.tissue.organs.shape_file import ORGAN_SUFFIXES, is_surface_file, read_shape
 from engines.tissue.organs.sheet import SheetParams, sheet_shape
-from engines.tissue.organs.surface_mesh import mesh_surface
 from engines.tissue.organs.tube import TubeParams, tube_shape
 from engines.tissue.organs.visceral_face import VisceralFaceParams, visceral_shape
 from robots import rotation
@@ -51,7 +48,6 @@ _DENSITY = 1000.0
 """Density of water, kg/m^3."""
 
 _UNITS = {"m": 1.0, "mm": 1e-3}
-_ORGAN_SUFFIXES = (".yaml", ".yml")
 
 
 class OrganParams(BaseModel):
@@ -181,9 +177,9 @@ class OrganParams(BaseModel):
             self._check_layers()
         if self.mesh is None and self.unit is not None:
             raise ValueError("unit is that of a mesh file; elsewhere units stand with the numbers")
-        if self.mesh is not None and self.nodes is not None and not _is_surface(self.mesh):
+        if self.mesh is not None and self.nodes is not None and not is_surface_file(self.mesh):
             raise ValueError("nodes are those of the mesh file: leave them out")
-        if self.mesh is not None and self.unit is not None and self.mesh.suffix in _ORGAN_SUFFIXES:
+        if self.mesh is not None and self.unit is not None and self.mesh.suffix in ORGAN_SUFFIXES:
             raise ValueError(
                 "unit is that of another program's file; files of `trocar organs import` are in m"
             )
@@ -300,7 +296,7 @@ class OrganParams(BaseModel):
         if self.sheet is not None:
             return sheet_shape(self.sheet)
         if self.mesh is not None:
-            return _from_file(self.mesh, _UNITS[self.unit or "m"], self.nodes or _NODES)
+            return read_shape(self.mesh, _UNITS[self.unit or "m"], self.nodes or _NODES)
         return SHAPES[self.shape or ""]
 
     @cached_property
@@ -392,45 +388,6 @@ class OrganParams(BaseModel):
         return float(np.median(np.linalg.norm(edges, axis=2)))
 
 
-def _is_surface(path: Path) -> bool:
-    return path.suffix not in _ORGAN_SUFFIXES and is_surface(path)
-
-
 def _conditions(part: AnchorParams) -> str:
     stated = [name for name in ("box", "normal", "plane") if getattr(part, name) is not None]
     return f"the {' and the '.join(stated)}"
-
-
-@lru_cache(maxsize=16)
-def _from_file(path: Path, unit: float, nodes: int) -> Shape:
-    """Return the organ of a file; `unit`: m, `nodes`: of a surface. Raises ValueError, naming the file."""
-    if path.suffix in _ORGAN_SUFFIXES:
-        return _from_organ_file(path)
-    if is_surface(path):
-        surface = read_surface(path)
-        read = partial(mesh_surface, Surface(unit * surface.vertices, surface.triangles), nodes)
-    else:
-        points, tetrahedra = read_tetrahedra(path)
-        read = partial(checked_mesh, points * unit, tetrahedra)
-    try:
-        found = read()
-    except ValueError as error:
-        raise ValueError(f"mesh {path}: {error}") from error
-    mesh = found if isinstance(found, TetMesh) else found[0]
-    return Shape(description=str(path), mesh=lambda _: mesh, surfaces={}, anchors=(), material=None)
-
-
-def _from_organ_file(path: Path) -> Shape:
-    content = OrganFile.load(path)
-    try:
-        mesh = content.tet_mesh
-    except ValueError as error:
-        raise ValueError(f"organ {path}: {error}") from error
-    return Shape(
-        description=str(path),
-        mesh=lambda _: mesh,
-        surfaces={},
-        anchors=content.anchors,
-        material=content.material,
-        picks=content.surfaces,
-    )
