@@ -18,7 +18,12 @@ class AnatomyParams(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    patient: int = Field(default=0, ge=0, le=2**53, description="seed of sizes, stiffness and variations")
+    patient: int | None = Field(
+        default=None,
+        ge=0,
+        le=2**53,
+        description="seed of sizes, stiffness and variations; default: the `seed` of the scene, else 0",
+    )
     phase: Phase = Field(
         default="clip-and-cut",
         description=(
@@ -40,7 +45,7 @@ class AnatomyParams(BaseModel):
     @property
     def drawn(self) -> Patient:
         """The patient."""
-        return draw_patient(self.patient, Variations(self.artery, self.short_duct, self.thick_wall))
+        return draw_patient(self.patient or 0, Variations(self.artery, self.short_duct, self.thick_wall))
 
     @property
     def organs(self) -> dict[str, dict[str, Any]]:

@@ -18,7 +18,8 @@ def add_anatomy(given: Any) -> Any:
     """Return parameters with the organs and attachments of their `anatomy`, if any.
 
     Stiff tubes lie beside a soft liver: organs have sub-steps of their own, unless it is stated otherwise.
-    Fields of an organ or attachment of the same name replace the patient's.
+    Fields of an organ or attachment of the same name replace the patient's. A patient that is not stated is
+    that of the `seed`.
     """
     if not isinstance(given, Mapping):
         return given
@@ -27,6 +28,9 @@ def add_anatomy(given: Any) -> Any:
         return tree
     tree.setdefault("own_sub_steps", True)
     anatomy = AnatomyParams.model_validate(tree["anatomy"])
+    if anatomy.patient is None:
+        anatomy = anatomy.model_copy(update={"patient": tree.get("seed")})
+    tree["anatomy"] = anatomy
     for key, made in (("organs", anatomy.organs), ("attachments", anatomy.attachments)):
         own: Any = tree.get(key) or {}
         if isinstance(own, Mapping):

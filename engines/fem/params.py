@@ -33,6 +33,9 @@ class FemParams(PressedOrgansParams):
             " change single fields"
         ),
     )
+    seed: int | None = Field(
+        default=None, ge=0, le=2**53, description="draws the patient where `anatomy` states none"
+    )
     organs: dict[Name, OrganParams] = Field(default_factory=dict[Name, OrganParams])
 
     timestep: Duration | None = Field(

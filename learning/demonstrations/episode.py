@@ -56,8 +56,9 @@ def _run(order: Order, seed: int, recording: Path) -> tuple[str, str]:
     row = run_trial(order.scenario, [*order.overrides, f"scene.seed={seed}"], str(recording))
     if row["error"] is not None:
         return str(row["error"]), ""
-    done = row.get("measures", row).get("done", row.get("done"))
-    return ("" if done == 1.0 else "the task was not done"), str(row.get("state_hash", ""))
+    if row["done"] != 1.0:
+        return "the task was not done", ""
+    return (f"no success: {row['outcome']}" if row["succeeded"] is False else ""), row["state_hash"]
 
 
 def _run_oracle(order: Order, seed: int, recording: Path) -> tuple[str, str]:

@@ -177,6 +177,16 @@ def test_fields_of_an_organ_of_the_same_name_replace_those_of_the_patient():
     assert given.attachments["cystic_plate"].surface == "bed"
 
 
+def test_the_seed_of_the_scene_draws_the_patient_where_none_is_stated():
+    def liver(patient, seed):
+        tree = {"anatomy": {} if patient is None else {"patient": patient}, "probes": {}, "seed": seed}
+        params = FemParams.model_validate(tree)
+        return params.anatomy.patient, params.organs["liver"]
+
+    assert liver(None, 4) == liver(4, None) == liver(4, 5) != liver(5, None)
+    assert liver(None, None)[1] == liver(0, None)[1]
+
+
 def test_the_short_form_reads_back_as_the_same_organs():
     given = tissue(patient=5)
     again = FemParams.model_validate_json(given.model_dump_json())
