@@ -17,7 +17,7 @@ demo: $(VENV)/.all ## run the palpation scenario, record it and write a report
 test: check ## the behaviour of the code: tests that need Python, a C compiler and two cores, and nothing else
 	$(PYTEST) -m "not ($(NEEDS)) and not alone"
 
-test-all: test ## everything: also tests with ROS, a browser, fresh environments, long searches, all cores
+test-all: test ## everything: also tests with ROS, a browser, fresh environments, minutes of search or simulation, all cores
 	$(PYTEST) -m "($(NEEDS)) and not (alone or browser)"
 	pytest -m "alone or browser"
 

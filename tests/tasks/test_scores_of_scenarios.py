@@ -39,7 +39,7 @@ def test_the_beginning_of_a_scenario(name, tmp_path):
     compare(name, tmp_path, duration=LONGER.get(name, "1 s"))
 
 
-@pytest.mark.release
+@pytest.mark.search
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", ["suturing", "hand-over", "peg-board", "pick-and-place"])
 def test_a_whole_scenario(name, tmp_path):

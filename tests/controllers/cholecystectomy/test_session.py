@@ -1,5 +1,7 @@
 """The routine with robot and tissue: the duct of a coarse scene is clipped, cut, and simulated again."""
 
+import pytest
+
 import trocar
 from tests.controllers.cholecystectomy.world import SCENE
 
@@ -9,6 +11,7 @@ def told(recording, tube):
     return [event for _, event in recording[f"tissue.{tube}/events"].messages()]
 
 
+@pytest.mark.search
 def test_the_duct_is_clipped_three_times_and_parted(tmp_path):
     run = tmp_path / "run"
     summary = trocar.run(SCENE, set={"duration": "31 s"}, record=run, one_host=True)

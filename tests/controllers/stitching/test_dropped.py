@@ -32,6 +32,7 @@ def run_with_opener(directory, arm, opener):
     return summary, [decode(StringMessage, each.payload).data for each in messages]
 
 
+@pytest.mark.search
 @pytest.mark.timeout(600)
 def test_a_needle_dropped_in_the_bite_is_taken_again_and_the_stitch_is_made(tmp_path):
     summary, said = run_with_opener(tmp_path, "PSM1", {"phase": "DRIVE", "after": 1.5})
@@ -41,6 +42,7 @@ def test_a_needle_dropped_in_the_bite_is_taken_again_and_the_stitch_is_made(tmp_
     assert "its tip in the tissue; it is taken again" in dropped[0]
 
 
+@pytest.mark.search
 @pytest.mark.timeout(600)
 def test_a_needle_dropped_at_every_pull_ends_the_session_with_the_reason(tmp_path):
     summary, said = run_with_opener(tmp_path, "PSM2", {"phase": "PULL", "after": 0.4})

@@ -1,11 +1,14 @@
 """The installed scenario in which a sheet is burnt off its bed, as far as it takes to see that it is."""
 
+import pytest
+
 import trocar
 from schemas.trocar_msgs import TissueEvent
 
 BURNING = {"duration": "5 s"}
 
 
+@pytest.mark.search
 def test_the_sheet_comes_off_and_the_run_is_simulated_again_to_the_bit(tmp_path):
     summary = trocar.run("dissect", set=BURNING, record=tmp_path / "run", one_host=True)
     measures = summary.measures
