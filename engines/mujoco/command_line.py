@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import numpy as np
 import typer
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from typer.core import TyperCommand
 
-from engines.mujoco.params import SceneParams
+from engines.mujoco.params import MujocoParams, SceneParams
 from engines.mujoco.pictures.opengl import import_mujoco
 from robots import command_line as kinematics
 from robots.dvrk.arms import ARMS, DEFAULT_INSTRUMENT
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MissingExtraError, MotionError, did_you_mean
 from schemas.files import Files
+from schemas.quantity import Duration
 
 if TYPE_CHECKING:
     from engines.mujoco.model.dynamics import JointDynamics
@@ -30,6 +31,7 @@ __all__ = ["app"]
 
 app = typer.Typer(help="Numbers and files of the robot's model.", no_args_is_help=True)
 
+_DURATION = TypeAdapter(Duration)
 _CART: tuple[CartArm, ...] = get_args(CartArm)
 
 
@@ -211,7 +213,10 @@ def export(
     path: Annotated[
         Path,
         typer.Argument(
-            help="File (.xml or .urdf), or folder for dvrk.xml or dvrk.urdf; meshes go to assets beside it."
+            help=(
+                "File (.xml, .urdf or .fmu), or folder for dvrk.xml, dvrk.urdf or dvrk.fmu; the meshes of"
+                " .xml and .urdf go to assets beside it."
+            )
         ),
     ],
     *,
@@ -236,27 +241,47 @@ def export(
     ] = None,
     mounting: Mounting = "cart",
     form: Annotated[
-        Literal["mjcf", "urdf"] | None,
+        Literal["mjcf", "urdf", "fmu"] | None,
         typer.Option("--format", help="By default that of the file's suffix, else mjcf."),
     ] = None,
+    fmi: Annotated[Literal["2", "3"], typer.Option(help="Of an FMU: version 2.0 or 3.0 of FMI.")] = "3",
+    step: Annotated[
+        str,
+        typer.Option(help="Of an FMU: the period of its servos, which communication steps are multiples of."),
+    ] = "1 ms",
 ) -> None:
-    """Write the robot's model as MJCF or URDF with its meshes."""
+    """Write the robot's model as MJCF or URDF with its meshes, or the servoed robot as an FMU."""
     _need_mujoco("export")
     from engines.mujoco.export import FORMATS, write
 
     known = FORMATS.get(path.suffix)
     form = form or known or "mjcf"
     if known is None:
-        path = path / {"mjcf": "dvrk.xml", "urdf": "dvrk.urdf"}[form]
+        path = path / {"mjcf": "dvrk.xml", "urdf": "dvrk.urdf", "fmu": "dvrk.fmu"}[form]
     named: list[CartArm] = [_cart_arm(arm) for arm in arms.replace(",", " ").split()]
     if not named:
         raise typer.BadParameter(f"name at least one of {', '.join(_CART)}", param_hint="--arms")
     scene = _scene(named, instrument or [], own or [], mounting)
     try:
-        files = write(scene, path, form)
+        if form == "fmu":
+            typer.echo(f"{path}  ({_write_fmu(scene, path, fmi, step)})")
+        else:
+            files = write(scene, path, form)
+            typer.echo(f"{path}  ({len(files) - 1} meshes in {path.parent / 'assets'})")
     except OSError as error:
         raise typer.BadParameter(f"cannot write there: {error}", param_hint="PATH") from error
-    typer.echo(f"{path}  ({len(files) - 1} meshes in {path.parent / 'assets'})")
+
+
+def _write_fmu(scene: SceneParams, path: Path, fmi: Literal["2", "3"], step: str) -> str:
+    """Write the FMU, and return a summary in words."""
+    from engines.mujoco.export.fmu import write_fmu
+
+    with _refusing():
+        period = _DURATION.validate_python(step)
+        params = MujocoParams.model_validate({name: getattr(scene, name) for name in scene.model_fields_set})
+    robot = write_fmu(params, path, fmi, period)
+    inputs, outputs = len(robot.inputs), len(robot.outputs)
+    return f"FMI {fmi}.0 co-simulation, {inputs} inputs, {outputs} outputs, steps of {period / 1e6:g} ms"
 
 
 def _scene(arms: list[CartArm], instruments: list[str], own: list[str], mounting: str) -> SceneParams:

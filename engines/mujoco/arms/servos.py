@@ -24,7 +24,7 @@ from robots.serial_chain import Joint
 from schemas.errors import SessionError
 from schemas.vectors import Vector, join_parts
 
-__all__ = ["Servos"]
+__all__ = ["ServoLaw", "Servos"]
 
 _OFF, _POSITION, _EFFORT = 0.0, 1.0, 2.0
 """Control modes: no torque, position servo, effort. The latter two with gravity compensation."""
@@ -48,6 +48,22 @@ class _Axes(NamedTuple):
     start: Sequence[float]
     motors: Sequence[Sequence[tuple[str, str, float]]]
     """Motors of each instrument: actuator, name of the joint, and the motor's share of its position."""
+
+
+class ServoLaw(NamedTuple):
+    """Numbers of the position servos of all arms, with n drives.
+
+    In a step a setpoint goes to the command within `lower` and `upper`, at most by `way`. The effort is
+    `springs * (setpoint - rest)`, and `ctrl` is `layout @ [setpoint, setpoint a step ago, effort]`.
+    """
+
+    lower: Vector
+    upper: Vector
+    way: Vector
+    springs: Vector
+    rest: Vector
+    layout: Vector
+    """Shape (nu, 3 n)."""
 
 
 @dataclass
@@ -201,6 +217,11 @@ class Servos:
                 model.qpos_spring[model.jnt_qposadr[joint]],
             )
         return stiffness, rest
+
+    @property
+    def law(self) -> ServoLaw:
+        """Numbers of the position servos, for a servo outside of a session."""
+        return ServoLaw(self._lower, self._upper, self._ways[1], self._springs, self._rest, self._layout)
 
     def arm_setpoint(self, arm: str) -> Vector:
         """Return the joints of `arm` as a view of `setpoint`."""

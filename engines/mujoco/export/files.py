@@ -17,16 +17,16 @@ from engines.mujoco.params import SceneParams
 
 __all__ = ["FORMATS", "START", "Format", "write"]
 
-Format = Literal["mjcf", "urdf"]
+Format = Literal["mjcf", "urdf", "fmu"]
 
-FORMATS: Mapping[str, Format] = {".xml": "mjcf", ".mjcf": "mjcf", ".urdf": "urdf"}
+FORMATS: Mapping[str, Format] = {".xml": "mjcf", ".mjcf": "mjcf", ".urdf": "urdf", ".fmu": "fmu"}
 """Format by the suffix of the file."""
 
 START = "start"
 """Name of the first keyframe of a loaded model."""
 
 
-def write(scene: SceneParams, path: Path, form: Format) -> list[Path]:
+def write(scene: SceneParams, path: Path, form: Literal["mjcf", "urdf"]) -> list[Path]:
     """Write the model of `scene` to `path`, the meshes to the folder `assets` there; return all files.
 
     As in a session, fingers are tied, and the ECM has brakes, open; `active` closes the brakes, where the ECM
