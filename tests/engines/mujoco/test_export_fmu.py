@@ -293,7 +293,7 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("others", "expected"),
         [
-            ({"objects": {"ring": {"kind": "ring", "position": [0, 0, 0.1]}}}, "objects, fixtures and a table"),
+            ({"objects": {"ring": {"kind": "ring", "position": [0, 0, 1]}}}, "objects"),
             ({"lean": True}, "a lean model"),
             ({"measured_effort": "motor"}, "measured_effort: motor"),
         ],

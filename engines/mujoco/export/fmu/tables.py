@@ -87,7 +87,7 @@ def _literals(values: Sequence[float]) -> Iterator[str]:
 def _fused(layout: Vector) -> list[bool]:
     """Return the rows of the servos' matrix that numpy sums with one rounding per product and sum.
 
-    That depends on the processor, the size of the matrix and the place of the row; see docs/decisions/0158.
+    That depends on BLAS's kernel, the size of the matrix and the place of the row; see docs/decisions/0158.
     """
     random, found = np.random.default_rng(1), np.empty(len(layout))
     terms = _terms(layout)
