@@ -9,7 +9,10 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from schemas.errors import MessageError
 from schemas.ros import Float64MultiArray, PoseStamped, TwistStamped, WrenchStamped
 
-__all__ = ["BondSide", "Port", "bond_ports"]
+__all__ = ["COORDINATE_UNITS", "BondSide", "Port", "bond_ports"]
+
+COORDINATE_UNITS = {"length": ("m", "m/s", "N"), "angle": ("rad", "rad/s", "N*m")}
+"""Units of position, velocity and force of generalised coordinates."""
 
 
 class Port(BaseModel):
@@ -106,6 +109,10 @@ class BondSide(BaseModel):
     name: str
     side: Literal["motion", "force"]
     dof: Literal[1, 2, 3, 6] = 6
+    coordinate: Literal["length", "angle"] = "length"
+    """Kind of generalised coordinates: m, m/s and N, or rad, rad/s and N m; then numbers for the rule are in
+    N m/rad, N m s/rad and kg m^2.
+    """
     points: int = Field(default=1, ge=1)
     """How many points of `dof` 3 are bonded together; else 1."""
     frame: str = ""
@@ -160,7 +167,9 @@ def bond_ports(bond: BondSide) -> tuple[Port, Port, Port]:
     else:
         rows = tuple(
             (name, Float64MultiArray.ros_type, unit)
-            for name, unit in (("position", "m"), ("velocity", "m/s"), ("force", "N"))
+            for name, unit in zip(
+                ("position", "velocity", "force"), COORDINATE_UNITS[bond.coordinate], strict=True
+            )
         )
         size = bond.size
     position, velocity, force = (

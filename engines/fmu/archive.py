@@ -7,6 +7,7 @@ and loads nothing.
 
 from __future__ import annotations
 
+import io
 import stat
 import zipfile
 from collections.abc import Generator, Iterable
@@ -35,17 +36,30 @@ _ENCRYPTED = 1
 
 @contextmanager
 def opened_archive(path: Path) -> Generator[tuple[IO[bytes], zipfile.ZipFile]]:
-    """Open the FMU at `path` as a file and as a checked archive.
+    """Open the FMU at `path`, a file or an unpacked directory, as a file and as a checked archive.
 
     Raises ScenarioError if the archive could write outside its directory, is larger than the limits or brings
     XML entities, and the errors of `zipfile` for other files.
     """
-    with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+    with _opened(path) as file, zipfile.ZipFile(file) as archive:
         problem = _problem(archive.infolist()) or _xml_problem(archive)
         if problem:
             raise ScenarioError(f"the FMU '{path}' is refused: {problem}")
         file.seek(0)
         yield file, archive
+
+
+def _opened(path: Path) -> IO[bytes]:
+    """Open the archive at `path`, or a directory as if it were packed."""
+    if not path.is_dir():
+        return path.open("rb")
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for file in sorted(path.rglob("*")):
+            if file.is_file():
+                archive.write(file, file.relative_to(path).as_posix())
+    packed.seek(0)
+    return packed
 
 
 def unpack(path: Path, directory: Path) -> None:

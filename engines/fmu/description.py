@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from engines.fmu.bond_params import FmuBond
+from engines.fmu.bond_variables import BondVariables, find_bond
 from engines.fmu.model import co_simulation, read_model
+from engines.fmu.sources import listed_sources
 from engines.fmu.start import Start, declared_start, given_start, settable, size_of, unit_of
 from engines.fmu.variables import Variable, number_type, port_name
 from hub.participant import signal_in, signal_out
@@ -45,12 +49,26 @@ class Description:
     ports: tuple[Port, ...]
     starts: tuple[Start, ...]
     """The scenario's start values, in the form for the FMU."""
+    sources: tuple[str, ...] = ()
+    """C files of the library, compiled where there is none for this platform."""
+    bonds: tuple[BondVariables, ...] = ()
+    """The scenario's bonds; their inputs are neither `inputs` nor `ports`."""
 
 
-def describe(path: Path, start: Mapping[str, Any], *, strict: bool = True) -> Description:
-    """Read the FMU at `path`; `start` holds start values by FMU variable name, in the variables' units.
+def describe(
+    path: Path,
+    start: Mapping[str, Any],
+    *,
+    strict: bool = True,
+    bonds: Mapping[str, FmuBond] = MappingProxyType({}),
+) -> Description:
+    """Read the FMU at `path`.
 
-    `strict` false: read a modelDescription.xml in spite of broken rules of FMI.
+    Args:
+        path: the FMU.
+        start: start values by FMU variable name, in the variables' units.
+        strict: whether a modelDescription.xml with a broken rule of FMI is refused.
+        bonds: bonds by name.
 
     Raises ScenarioError, and MissingExtraError without FMPy.
     """
@@ -66,16 +84,33 @@ def describe(path: Path, start: Mapping[str, Any], *, strict: bool = True) -> De
         if variable is not None:
             variables[row.causality].append(variable)
             ports.append(_port(row, variable, _input_start(path, row, variable, starts, strict=strict)))
+    found = [find_bond(path, name, one, model.modelVariables, variables) for name, one in bonds.items()]
+    bonded = _bonded_inputs(found)
     return Description(
         path,
         major,
         model.guid,
         part,
-        tuple(variables["input"]),
+        tuple(variable for variable in variables["input"] if variable.name not in bonded),
         tuple(variables["output"]),
-        tuple(ports),
+        tuple(port for port in ports if port.name not in bonded.values()),
         tuple(starts.values()),
+        listed_sources(model),
+        tuple(found),
     )
+
+
+def _bonded_inputs(bonds: Sequence[BondVariables]) -> dict[str, str]:
+    """Return the port names of the bonds' inputs by variable. Raises ScenarioError for an input set twice."""
+    bonded: dict[str, str] = {}
+    for bond in bonds:
+        for variable in bond.inputs:
+            if variable.name in bonded:
+                raise ScenarioError(
+                    f"input '{variable.name}' is set twice by bonds", path=("bonds", bond.side.name)
+                )
+            bonded[variable.name] = variable.port
+    return bonded
 
 
 def _size(path: Path, row: ModelVariable, start: Mapping[str, Any]) -> int:

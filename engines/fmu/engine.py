@@ -17,15 +17,20 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
+from engines.fmu.bond_params import FmuBond
+from engines.fmu.bonds import FmuSide
+from engines.fmu.coupling import Coupling
 from engines.fmu.description import Description, describe
 from engines.fmu.fmi2 import Fmi2Instance
 from engines.fmu.fmi3 import Fmi3Instance
 from engines.fmu.instance import Instance
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
+from hub.participant.state import split_state
 from schemas.errors import ScenarioError, SessionError, StateError
 from schemas.files import find_file
-from schemas.ports import Port
+from schemas.ports import BondSide, Port
 from schemas.quantity import Duration
+from schemas.scenario import Name
 from schemas.vectors import Vector
 
 __all__ = ["FmuEngine", "FmuParams"]
@@ -53,6 +58,11 @@ class FmuParams(Params):
         default=None,
         gt=0,
         description="communication step of the FMU, a divisor of the period; default: the period",
+    )
+    bonds: dict[Name, FmuBond] = Field(
+        default_factory=dict[str, FmuBond],
+        description="power bonds by name: a force or a motion side, of variables of the FMU",
+        examples=[{"shaft": {"side": "force", "force": "tau", "position": "phi", "velocity": "w"}}],
     )
     strict: bool = Field(
         default=True,
@@ -90,11 +100,16 @@ class FmuEngine(Stepped):
         self._hashes_state = False
         self._outputs: dict[str, Vector] = {}
         self._time = np.zeros(1)
+        self._sides: dict[str, BondSide] = {}
+        """Bonds with the numbers known after `configure`, by name."""
+        self._bonds: list[FmuSide] = []
+        """Connected bonds."""
 
     @cached_property
     def _description(self) -> Description:
         try:
-            return describe(self.params.path, self.params.start, strict=self.params.strict)
+            params = self.params
+            return describe(params.path, params.start, strict=params.strict, bonds=params.bonds)
         except ScenarioError as error:
             error.path = ("participants", self.name, *(error.path or ("path",)))
             raise
@@ -103,6 +118,11 @@ class FmuEngine(Stepped):
     def ports(self) -> tuple[Port, ...]:
         """The FMU's inputs and outputs. Raises ScenarioError for a file without an FMU for this machine."""
         return self._description.ports
+
+    @property
+    def bonds(self) -> tuple[BondSide, ...]:
+        """The scenario's bonds; after `configure` with slopes and masses of connected ones."""
+        return tuple(self._sides.get(one.side.name, one.side) for one in self._description.bonds)
 
     def configure(self, setup: Setup) -> Outputs:
         """Load the FMU, set start values and initialise to time 0."""
@@ -115,17 +135,32 @@ class FmuEngine(Stepped):
             raise ScenarioError(problem, path=("participants", self.name, "step"))
         self.close()
         description = self._description
-        kind = Fmi2Instance if description.major == 2 else Fmi3Instance
-        self._instance = instance = kind(description, self.name)
+        self._instance = instance = self._start()
         self._outputs = {
             port: block.values[part] for block in instance.outputs for port, part in block.parts.items()
         }
-        instance.initialise(description.starts, self.params.tolerance)
         if instance.can_save and not description.co_simulation.canBeInstantiatedOnlyOncePerProcess:
-            with closing(kind(description, self.name)) as twin:
-                twin.initialise(description.starts, self.params.tolerance)
+            with closing(self._start()) as twin:
                 self._hashes_state = twin.serialise() == instance.serialise()
+        coupling = Coupling(instance, description, step or setup.period_ns, self._start)
+        self._bonds = []
+        for bond in description.bonds:
+            if plan := setup.bonds.get(bond.side.name):
+                side, self._sides[bond.side.name] = coupling.couple(bond, plan)
+                self._bonds.append(side)
+                self._outputs |= side.initial()
         return self._read(0)
+
+    def _start(self) -> Instance:
+        """Return an instance at time 0."""
+        description = self._description
+        instance = (Fmi2Instance if description.major == 2 else Fmi3Instance)(description, self.name)
+        try:
+            instance.initialise(description.starts, self.params.tolerance)
+        except BaseException:
+            instance.close()
+            raise
+        return instance
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation.
@@ -138,12 +173,20 @@ class FmuEngine(Stepped):
         """
         instance = self._running()
         sub = self.params.step or h
+        for bond in self._bonds:
+            bond.begin(inputs, h / 1e9)
         for begin in range(0, h, sub):
             instance.now_ns = t + begin
             if not instance.ended:
                 instance.set_inputs(inputs, begin / 1e9, sub / 1e9)
+                for bond in self._bonds:
+                    bond.write(begin / 1e9, sub / 1e9)
             if not instance.ended:
                 instance.advance(t + begin, sub)
+            for bond in self._bonds:
+                bond.read(begin / 1e9, sub / 1e9)
+        for bond in self._bonds:
+            self._outputs |= bond.result()
         return self._read(t + h)
 
     @property
@@ -154,27 +197,36 @@ class FmuEngine(Stepped):
     def state_hash(self) -> int:
         """Return the hash of the FMU's state, or else of inputs, outputs and time."""
         instance = self._running()
+        bonds = [bond.state for bond in self._bonds]
         if self._hashes_state:
-            return state_hash(instance.memory, instance.serialise())
-        return state_hash(self._time, *(block.values for block in (*instance.inputs, *instance.outputs)))
+            return state_hash(instance.memory, *bonds, instance.serialise())
+        values = (block.values for block in (*instance.inputs, *instance.outputs))
+        return state_hash(self._time, *bonds, *values)
 
     def save(self) -> bytes:
         """Return the FMU's state. Raises StateError for an FMU without this capability."""
         instance = self._running()
         self._check_can_save()
-        return instance.memory.tobytes() + instance.serialise()
+        return b"".join(part.tobytes() for part in self._kept()) + instance.serialise()
 
     def restore(self, state: bytes) -> None:
         """Return the FMU to a saved state. Raises StateError for an FMU without this capability."""
         instance = self._running()
         self._check_can_save()
-        size = instance.memory.nbytes
+        kept = self._kept()
+        size = sum(part.nbytes for part in kept)
         if len(state) < size:
             raise StateError(
                 f"participant '{self.name}': {len(state)} bytes are not a state of '{self.params.path.name}'"
             )
         instance.deserialise(state[size:])
-        instance.memory[:] = np.frombuffer(state, np.float64, instance.memory.size)
+        instance.memory[:], *bonds = split_state(self.name, kept, state[:size])
+        for bond, part in zip(self._bonds, bonds, strict=True):
+            bond.state = part
+
+    def _kept(self) -> list[Vector]:
+        """Return the state beside the FMU's own."""
+        return [self._running().memory, *(bond.state for bond in self._bonds)]
 
     def close(self) -> None:
         """Terminate and unload the FMU and remove the extracted files."""

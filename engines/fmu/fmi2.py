@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from engines.fmu.blocks import WARNING
+from engines.fmu.blocks import WARNING, Block
 from engines.fmu.description import Description
 from engines.fmu.instance import DISCARD, Instance
+from engines.fmu.linear_input import LinearInput
 from engines.fmu.log import fmi2_callbacks, log_everything
 from engines.fmu.start import Start
+from engines.fmu.variables import Variable
 from hub.participant import Inputs
+from schemas.vectors import Vector
 
 __all__ = ["Fmi2Instance"]
 
@@ -47,30 +50,43 @@ class Fmi2Instance(Instance):
         super().__init__(FMU2Slave, description, name, [options])
         self._do_step: Callable[..., int] = self._function("DoStep")
         self._varies = description.co_simulation.canHandleVariableCommunicationStepSize
-        interpolates = description.co_simulation.canInterpolateInputs and self.library.has(
+        self._interpolates = description.co_simulation.canInterpolateInputs and self.library.has(
             "fmi2SetRealInputDerivatives"
         )
         continuous = [
             variable
             for variable in description.inputs
-            if variable.type.name == "Real" and not variable.discrete and interpolates
+            if variable.type.name == "Real" and not variable.discrete and self._interpolates
         ]
         self._slope_ports = [variable.port for variable in continuous]
-        self._slopes = np.zeros(len(continuous))
-        self._set_slopes = self._slope_call([variable.reference for variable in continuous])
+        self._slopes, self._set_slopes = self._slope_call(continuous)
 
-    def _slope_call(self, references: Sequence[int]) -> Callable[[], int]:
-        count = len(references)
-        orders = (ctypes.c_int * count)(*[1] * count)
-        slopes = self._slopes.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-        return partial(
+    def _slope_call(self, variables: Sequence[Variable]) -> tuple[Vector, Callable[[], None]]:
+        """Return the slopes of scalar inputs, shape (n,), and the call that sets them."""
+        count = len(variables)
+        slopes = np.zeros(count)
+        call = partial(
             self._function("SetRealInputDerivatives"),
             self._component,
-            (ctypes.c_uint * count)(*references),
+            (ctypes.c_uint * count)(*(variable.reference for variable in variables)),
             count,
-            orders,
-            slopes,
+            (ctypes.c_int * count)(*[1] * count),
+            slopes.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
         )
+
+        def set_slopes() -> None:
+            status = call()
+            if status > WARNING:
+                raise self.failure("SetRealInputDerivatives", status)
+
+        return slopes, set_slopes
+
+    def bond_input(self, variables: Sequence[Variable]) -> LinearInput:
+        """Return the inputs `variables` as inputs of a bond, with slopes if the FMU interpolates."""
+        if not self._interpolates:
+            return super().bond_input(variables)
+        block = Block("Set", variables, self._prepare_access)
+        return LinearInput(block, self.transfer, *self._slope_call(variables))
 
     def _initialise(self, starts: Sequence[Start], tolerance: float | None) -> None:
         self.call("SetupExperiment", tolerance is not None, tolerance or 0.0, 0.0, False, 0.0)
@@ -89,9 +105,7 @@ class Fmi2Instance(Instance):
             for index, port in enumerate(self._slope_ports):
                 rate = inputs.rate(port)
                 self._slopes[index] = 0.0 if rate is None else rate[0]
-            status = self._set_slopes()
-            if status > WARNING:
-                raise self.failure("SetRealInputDerivatives", status)
+            self._set_slopes()
 
     def advance(self, t: int, h: int) -> None:
         """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation.

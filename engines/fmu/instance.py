@@ -18,8 +18,12 @@ from engines.fmu.archive import unpack
 from engines.fmu.blocks import WARNING, Block, grouped, prepared
 from engines.fmu.description import Description
 from engines.fmu.library import Library, load_library
+from engines.fmu.linear_input import LinearInput
 from engines.fmu.log import last_warning
+from engines.fmu.model import library_path
+from engines.fmu.sources import provide_library
 from engines.fmu.start import Start
+from engines.fmu.variables import Variable
 from hub.participant import Inputs
 from schemas.errors import ScenarioError, SessionError
 
@@ -71,6 +75,8 @@ class Instance(ABC):
         with contextlib.ExitStack() as stack:
             directory = stack.enter_context(tempfile.TemporaryDirectory(prefix="trocar-fmu-"))
             unpack(description.path, Path(directory))
+            library = library_path(description.co_simulation.modelIdentifier, description.major)
+            provide_library(description.path, Path(directory), library, description.sources)
             self._fmu = load_library(slave, description, Path(directory), name)
             stack.callback(self._fmu.freeLibrary)
             self.library: Library = self._fmu.dll
@@ -91,7 +97,9 @@ class Instance(ABC):
 
     def _check_functions(self, description: Description) -> None:
         needed = dict.fromkeys(self.prefix + name for name in self.required)
-        needed |= dict.fromkeys(f"{self.prefix}Set{v.type.access}" for v in description.inputs)
+        bonded = (variable for bond in description.bonds for variable in bond.inputs)
+        inputs = (*description.inputs, *bonded)
+        needed |= dict.fromkeys(f"{self.prefix}Set{v.type.access}" for v in inputs)
         needed |= dict.fromkeys(f"{self.prefix}Get{v.type.access}" for v in description.outputs)
         needed |= dict.fromkeys(f"{self.prefix}Set{start.access}" for start in description.starts)
         if missing := self.library.missing(needed):
@@ -142,6 +150,14 @@ class Instance(ABC):
     @abstractmethod
     def advance(self, t: int, h: int) -> None:
         """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation."""
+
+    def bond_input(self, variables: Sequence[Variable]) -> LinearInput:
+        """Return the inputs `variables`, all of the same type, as inputs of a bond."""
+        return LinearInput(Block("Set", variables, self._prepare_access), self.transfer)
+
+    def bond_output(self, variables: Sequence[Variable]) -> Block:
+        """Return the outputs `variables`, all of the same type, for reading in the middle of a step."""
+        return Block("Get", variables, self._prepare_access)
 
     def read_outputs(self) -> None:
         """Bring the FMU's outputs into the blocks."""

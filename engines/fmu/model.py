@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from engines.fmu.archive import opened_archive
+from engines.fmu.sources import NO_COMPILER, find_compiler, listed_sources
 from engines.fmu.start import settable, unit_of
 from schemas.errors import MissingExtraError, ScenarioError
 
@@ -16,10 +18,12 @@ if TYPE_CHECKING:
 
     from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 
-__all__ = ["co_simulation", "read_model"]
+__all__ = ["co_simulation", "library_path", "read_model"]
 
 _log = logging.getLogger(__name__)
 
+_DERIVATIVES = re.compile(rb"<CoSimulation\b[^>]*\bprovidesDirectionalDerivatives\s*=\s*[\"'](true|1)[\"']")
+"""Attribute of FMI 3.0: FMPy 0.3 reads only FMI 2.0's, without the last letter."""
 _LONGEST_REASON = 1000
 """Most letters of a report of FMPy: FMPy quotes values of any length."""
 
@@ -37,12 +41,14 @@ def read_model(path: Path, *, strict: bool) -> tuple[ModelDescription, int, list
         import fmpy  # noqa: F401  # pyright: ignore[reportUnusedImport]
     except ImportError as error:
         raise MissingExtraError("engine 'fmu'", "fmu", "fmpy") from error
-    if not path.is_file():
+    if not path.exists():
         raise ScenarioError(f"the FMU '{path}' does not exist")
     try:
         with opened_archive(path) as (file, archive):
             model, names = _read(path, file, strict=strict), archive.namelist()
             major = int(model.fmiVersion.split(".")[0])
+            if model.coSimulation is not None and _DERIVATIVES.search(archive.read("modelDescription.xml")):
+                model.coSimulation.providesDirectionalDerivative = True
     except ScenarioError:
         raise
     except Exception as error:  # FMPy raises BadZipFile, KeyError, XMLSyntaxError, TypeError, bare Exception
@@ -130,7 +136,9 @@ def co_simulation(path: Path, model: ModelDescription, major: int, names: Collec
             f"'{path}' has time-based input clocks ({', '.join(map(_shown, clocks))}), which Trocar does not"
             " support. Export it without clocks, or with triggered input clocks."
         )
-    _require_binary(path, model.coSimulation.modelIdentifier, major, names)
+    library = library_path(model.coSimulation.modelIdentifier, major)
+    if library not in names:
+        _require_compiler(path, library, names, has_sources=bool(listed_sources(model)))
     return model.coSimulation
 
 
@@ -139,14 +147,22 @@ def _is_time_based_input(row: ModelVariable) -> bool:
     return row.type == "Clock" and row.causality == "input" and row.intervalVariability != "triggered"
 
 
-def _require_binary(path: Path, identifier: str, major: int, names: Collection[str]) -> None:
+def library_path(identifier: str, major: int) -> str:
+    """Return where an FMU has the library for this platform."""
     import fmpy
 
     platform = fmpy.platform if major == 2 else fmpy.platform_tuple
-    library = f"binaries/{platform}/{identifier}{fmpy.sharedLibraryExtension}"
-    if library in names:
+    return f"binaries/{platform}/{identifier}{fmpy.sharedLibraryExtension}"
+
+
+def _require_compiler(path: Path, library: str, names: Collection[str], *, has_sources: bool) -> None:
+    """Raise ScenarioError for an FMU without its library, unless the library can be compiled."""
+    if has_sources and find_compiler():
         return
+    platform = library.split("/")[1]
     files = [name for name in names if name.startswith("binaries/") and not name.endswith("/")]
+    if has_sources:
+        raise ScenarioError(f"'{path}' is an FMU of C sources for this platform, {platform}: {NO_COMPILER}")
     here = sorted(name.split("/", 2)[2] for name in files if name.startswith(f"binaries/{platform}/"))
     if here or f"binaries/{platform}/" in names:
         raise ScenarioError(

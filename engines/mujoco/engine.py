@@ -7,7 +7,7 @@ the same work as `mj_step`, in an order with every output at the end of the step
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
@@ -16,7 +16,7 @@ import numpy as np
 from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.pictures.opengl import import_mujoco
-from engines.mujoco.ports import GRAVITY, WIRE, bond_sides, scene_ports
+from engines.mujoco.ports import GRAVITY, WIRE, bond_sides, bonded_joints, scene_ports
 from hub.participant import (
     BondPlan,
     Inputs,
@@ -30,6 +30,7 @@ from hub.participant import (
     state_hash,
 )
 from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
 from schemas.ports import BondSide, Port
 from schemas.ros import PoseStamped
@@ -38,6 +39,7 @@ from schemas.vectors import Vector
 if TYPE_CHECKING:
     from engines.mujoco.arms.ahead import Ahead
     from engines.mujoco.interaction.contact_spheres_bond import ContactSpheresBond
+    from engines.mujoco.interaction.joint_bond import JointBond
     from engines.mujoco.interaction.probe_bond import ProbeBond
     from engines.mujoco.interaction.wire_bond import WireBond
 
@@ -62,7 +64,7 @@ class MujocoEngine(Stepped):
 
     def __init__(self, name: str, params: MujocoParams) -> None:
         super().__init__(name, params)
-        self._touching: list[ProbeBond | ContactSpheresBond | WireBond] = []
+        self._touching: list[ProbeBond | ContactSpheresBond | WireBond | JointBond] = []
         self._wires: list[WireBond] = []
         self._felt_by_spares: list[tuple[Vector, ProbeBond | ContactSpheresBond]] = []
         """`tip_wrench` of an arm with spares, and one of the bonds that it sums."""
@@ -84,7 +86,7 @@ class MujocoEngine(Stepped):
         """The sphere of every palpation probe, `<arm>/probe`, and the contact spheres of instruments.
 
         Contact spheres are called `<arm>/contact`; positions are the spheres' centres, in the world. Of
-        needles, `<needle>/wire` is base, middle and tip.
+        needles, `<needle>/wire` is base, middle and tip; `<arm>/<joint>` is a joint driven from outside.
         """
         return tuple(
             side.model_copy(update={"effective_mass": self._effective_mass.get(side.name)})
@@ -121,6 +123,7 @@ class MujocoEngine(Stepped):
 
         from engines.mujoco import model
         from engines.mujoco.interaction import holding
+        from engines.mujoco.interaction.joint_bond import release
         from engines.mujoco.model import ties
         from engines.mujoco.model.lean import lean
 
@@ -129,6 +132,8 @@ class MujocoEngine(Stepped):
         spec = model.spec(self.params)
         ties.add(spec, self.params)
         holding.prepare(spec, self.params)
+        for arm, joint in bonded_joints(self.params):
+            release(spec, f"{arm}/{joint.name}")
         spec.option.timestep = self.params.timestep * 1e-9
         positions = None
         if self.params.lean:
@@ -204,14 +209,19 @@ class MujocoEngine(Stepped):
 
     def _couple_bonds(self, setup: Setup) -> None:
         from engines.mujoco.interaction.contact_spheres_bond import ContactSpheresBond
+        from engines.mujoco.interaction.joint_bond import JointBond
         from engines.mujoco.interaction.probe_bond import ProbeBond
 
         kinds = {"probe": ProbeBond, "contact": ContactSpheresBond}
+        joints: Mapping[str, Sequence[str]] = {**self.params.bonded_joints}
         for bond in self.bonds:
             owner, _, kind = bond.name.rpartition("/")
             plan = setup.bonds.get(bond.name)
             if kind == WIRE:
                 self._couple_needle(owner, bond, plan)
+                continue
+            if kind in joints.get(owner, ()):
+                self._couple_joint(owner, kind, bond, plan)
                 continue
             arm = owner.partition("/")[0]
             if owner != arm:
@@ -227,7 +237,7 @@ class MujocoEngine(Stepped):
                 if arm in self._exchange.engaged:
                     self._outputs[f"{arm}/tip_wrench"] = felt
                     self._felt_by_spares.append((cast("Vector", felt), touching))
-        bonded = {touching.bond.partition("/")[0] for touching in self._touching}
+        bonded = {one.bond.partition("/")[0] for one in self._touching if not isinstance(one, JointBond)}
         felt = {arm: self._outputs.get(f"{arm}/tip_wrench") for arm in self.params.arms}
         self._felt = {arm: cast("Vector", wrench) for arm, wrench in felt.items() if wrench is not None}
         self._untouched = [wrench for arm, wrench in self._felt.items() if arm not in bonded]
@@ -254,6 +264,21 @@ class MujocoEngine(Stepped):
             self._touching.append(wire)
             self._wires.append(wire)
             self._outputs.update(wire.outputs)
+
+    def _couple_joint(self, arm: str, joint: str, bond: BondSide, plan: BondPlan | None) -> None:
+        from engines.mujoco.interaction.joint_bond import JointBond
+
+        if plan is None:
+            problem = (
+                f"joint '{bond.name}' has no drive: bond '{self.name}.{bond.name}' to the force side of one"
+            )
+            raise ScenarioError(problem, path=("participants", self.name, "bonded_joints"))
+        self._effective_mass[bond.name] = JointBond.least_mass(bond.name, self._model, self._data)
+        number = [one.name for one in self.params.arms[cast("CartArm", arm)].chain.joints].index(joint)
+        goal = self._servos.arm_setpoint(arm)[number : number + 1]
+        driven = JointBond(bond.name, MotionSide(bond, plan), goal, self._model, self._data)
+        self._touching.append(driven)
+        self._outputs.update(driven.outputs)
 
     def _feel_needles(self) -> None:
         """Give the bond's force on a held needle to the holding arm, as `tip_wrench`.

@@ -28,6 +28,7 @@ from robots.dvrk.mounted import MountedArms, MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import SIMULATED, CartArm, base_pose
 from robots.training.fixtures import FixtureParams
+from schemas.errors import did_you_mean
 from schemas.keys import valid_name
 from schemas.quantity import Duration
 from schemas.scenario import Name
@@ -173,6 +174,14 @@ class MujocoParams(SceneParams, ToolParams):
             " holds the arm against gravity included, as a real arm's currents tell"
         ),
     )
+    bonded_joints: dict[CartArm, tuple[str, ...]] = Field(
+        default_factory=dict[CartArm, tuple[str, ...]],
+        description=(
+            "joints driven through a bond `<arm>/<joint>` instead of the servo here, whose friction, springs"
+            " and rotor they are then without: those are the drive's"
+        ),
+        examples=[{"PSM1": ["insertion"]}],
+    )
     rigid_wrench: bool | Literal["last"] = Field(
         default=True,
         description=(
@@ -188,6 +197,19 @@ class MujocoParams(SceneParams, ToolParams):
             " stand still in the model, and the covers of arms touch nothing"
         ),
     )
+
+    @model_validator(mode="after")
+    def _bonds_own_joints(self) -> Self:
+        for name, joints in self.bonded_joints.items():
+            own = [joint.name for joint in self.arms[name].chain.joints] if name in self.arms else []
+            for joint in joints:
+                if joint not in own:
+                    raise ValueError(
+                        f"bonded_joints: there is no joint '{joint}' of {name}.{did_you_mean(joint, own)}"
+                    )
+            if joints and name in self.arms and len(self.arms[name].variants) > 1:
+                raise ValueError(f"bonded_joints: not beside `spares`, as {name} has them")
+        return self
 
     @property
     def tools(self) -> tuple[Tool, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import groupby
+from typing import Literal
 
 from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import MujocoParams, SceneParams
@@ -12,10 +13,11 @@ from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.linkage import LINKAGES
 from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
 from robots.dvrk.psm import ARM_JOINTS
-from schemas.ports import BondSide, Port
+from robots.serial_chain import Joint
+from schemas.ports import COORDINATE_UNITS, BondSide, Port
 from schemas.ros import Float64Message, JointState, PoseStamped, WrenchStamped
 
-__all__ = ["GRAVITY", "WIRE", "bond_sides", "position_count", "scene_ports"]
+__all__ = ["GRAVITY", "WIRE", "bond_sides", "bonded_joints", "position_count", "scene_ports"]
 
 _ALL = ("position", "velocity", "effort")
 _MODES = (
@@ -52,6 +54,10 @@ def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
             unit="m/s^2",
         )
     )
+    for arm, joint in bonded_joints(params):
+        goal = "goal of the joint's drive: the command within the joint's range, no faster than it may move"
+        unit = COORDINATE_UNITS[_coordinate(joint)][0]
+        ports.append(signal_out(f"{arm}/{joint.name}/goal", Float64Message, goal, unit=unit))
     if params.fixtures and params.rigid_wrench:
         ports += _collision_ports(slow)
     return (*ports, *(port for name in params.objects for port in _object_ports(name, slow)))
@@ -71,13 +77,28 @@ def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
     """Return the bonds `<arm>/probe` of palpation probes and `<arm>/contact` of contact spheres.
 
     A spare instrument has `<arm>/<spare>/contact`. Needles have `<needle>/wire`: base, middle and tip of the
-    wire. All are in the world.
+    wire. All are in the world. A joint driven from outside has `<arm>/<joint>`.
     """
     needles = (name for name, thing in params.objects.items() if isinstance(thing, NeedleParams))
     return (
         *(side for name, arm in params.arms.items() for side in _arm_bonds(name, arm)),
         *(BondSide(name=f"{name}/{WIRE}", side="motion", dof=3, points=3, frame="world") for name in needles),
+        *(
+            BondSide(name=f"{arm}/{joint.name}", side="motion", dof=1, coordinate=_coordinate(joint))
+            for arm, joint in bonded_joints(params)
+        ),
     )
+
+
+def bonded_joints(params: MujocoParams) -> Iterator[tuple[str, Joint]]:
+    """Yield the joints driven through bonds, with their arms."""
+    for arm, names in params.bonded_joints.items():
+        joints = {joint.name: joint for joint in params.arms[arm].chain.joints}
+        yield from ((arm, joints[name]) for name in names)
+
+
+def _coordinate(joint: Joint) -> Literal["length", "angle"]:
+    return "length" if joint.kind == "prismatic" else "angle"
 
 
 def _arm_bonds(name: str, arm: MountedArm) -> Iterator[BondSide]:

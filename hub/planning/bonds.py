@@ -28,6 +28,9 @@ def plan_bond(scenario: Scenario, participants: Mapping[str, Stepped | Device], 
     if motion.dof != force.dof:
         problem = f"'{bond.motion}' has {motion.dof} degrees of freedom, '{bond.force}' has {force.dof}"
         raise ScenarioError(problem, path=path)
+    if motion.dof < 6 and motion.coordinate != force.coordinate:
+        problem = f"'{bond.motion}' moves by {motion.coordinate}, '{bond.force}' by {force.coordinate}"
+        raise ScenarioError(problem, path=path)
     if motion.points != force.points:
         problem = (
             f"'{bond.motion}' bonds {motion.points} points, '{bond.force}' bonds {force.points}: both need"

@@ -12,6 +12,14 @@ class CoSimulation:
     canGetAndSetFMUstate: bool
     canSerializeFMUstate: bool
     hasEventMode: bool
+    providesDirectionalDerivative: bool
+
+class SourceFileSet:
+    sourceFiles: list[str]
+
+class BuildConfiguration:
+    modelIdentifier: str | None
+    sourceFileSets: list[SourceFileSet]
 
 class Dimension:
     start: int
@@ -40,6 +48,7 @@ class ModelDescription:
     coSimulation: CoSimulation | None
     modelVariables: list[ModelVariable]
     unitDefinitions: list[Unit]
+    buildConfigurations: list[BuildConfiguration]
 
 class ValidationError(Exception):
     problems: list[str]

@@ -122,6 +122,7 @@ class MjsJoint(MjsElement):
     type: mjtJoint
 
 class MjsActuator(MjsElement):
+    gear: _Array
     ctrlrange: _Array
     forcerange: _Array
     velrange: _Array
@@ -395,6 +396,7 @@ class MjData:
     geom_xpos: _Array
     xipos: _Array
     warning: _Warnings
+    qfrc_applied: _Array
     xfrc_applied: _Array
     def __init__(self, model: MjModel) -> None: ...
 
