@@ -16,6 +16,7 @@ from engines.fmu.bond_variables import BondVariables, find_bond
 from engines.fmu.model import co_simulation, read_model
 from engines.fmu.sources import listed_sources
 from engines.fmu.start import Start, declared_start, given_start, settable, size_of, unit_of
+from engines.fmu.tunable import tunable_parameters
 from engines.fmu.variables import Variable, number_type, port_name
 from hub.participant import signal_in, signal_out
 from schemas.errors import ScenarioError, did_you_mean
@@ -53,6 +54,8 @@ class Description:
     """C files of the library, compiled where there is none for this platform."""
     bonds: tuple[BondVariables, ...] = ()
     """The scenario's bonds; their inputs are neither `inputs` nor `ports`."""
+    tunable: tuple[Variable, ...] = ()
+    """Parameters that may change while the session runs."""
 
 
 def describe(
@@ -61,6 +64,7 @@ def describe(
     *,
     strict: bool = True,
     bonds: Mapping[str, FmuBond] = MappingProxyType({}),
+    tunable: Mapping[str, Sequence[Any] | None] = MappingProxyType({}),
 ) -> Description:
     """Read the FMU at `path`.
 
@@ -69,6 +73,7 @@ def describe(
         start: start values by FMU variable name, in the variables' units.
         strict: whether a modelDescription.xml with a broken rule of FMI is refused.
         bonds: bonds by name.
+        tunable: limits of parameters that may change while the session runs, by name.
 
     Raises ScenarioError, and MissingExtraError without FMPy.
     """
@@ -86,6 +91,8 @@ def describe(
             ports.append(_port(row, variable, _input_start(path, row, variable, starts, strict=strict)))
     found = [find_bond(path, name, one, model.modelVariables, variables) for name, one in bonds.items()]
     bonded = _bonded_inputs(found)
+    numbers = {name: float(one.value[0]) for name, one in starts.items() if not isinstance(one.value, bytes)}
+    tuned = list(tunable_parameters(path, model.modelVariables, major, tunable, numbers))
     return Description(
         path,
         major,
@@ -93,10 +100,11 @@ def describe(
         part,
         tuple(variable for variable in variables["input"] if variable.name not in bonded),
         tuple(variables["output"]),
-        tuple(port for port in ports if port.name not in bonded.values()),
+        (*(port for port in ports if port.name not in bonded.values()), *(port for _, port in tuned)),
         tuple(starts.values()),
         listed_sources(model),
         tuple(found),
+        tuple(variable for variable, _ in tuned),
     )
 
 

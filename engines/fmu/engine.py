@@ -24,6 +24,7 @@ from engines.fmu.description import Description, describe
 from engines.fmu.fmi2 import Fmi2Instance
 from engines.fmu.fmi3 import Fmi3Instance
 from engines.fmu.instance import Instance
+from engines.fmu.tunable import TunableParameters
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from hub.participant.state import split_state
 from schemas.errors import ScenarioError, SessionError, StateError
@@ -63,6 +64,14 @@ class FmuParams(Params):
         default_factory=dict[str, FmuBond],
         description="power bonds by name: a force or a motion side, of variables of the FMU",
         examples=[{"shaft": {"side": "force", "force": "tau", "position": "phi", "velocity": "w"}}],
+    )
+    tunable: dict[str, tuple[Any, Any] | None] = Field(
+        default_factory=dict[str, tuple[Any, Any] | None],
+        description=(
+            "tunable parameters of the FMU that may change while the session runs: least and greatest value,"
+            " in the variable's unit or with one, or null for the FMU's own limits"
+        ),
+        examples=[{"gain": [0, 10], "damping": None}],
     )
     strict: bool = Field(
         default=True,
@@ -109,7 +118,13 @@ class FmuEngine(Stepped):
     def _description(self) -> Description:
         try:
             params = self.params
-            return describe(params.path, params.start, strict=params.strict, bonds=params.bonds)
+            return describe(
+                params.path,
+                params.start,
+                strict=params.strict,
+                bonds=params.bonds,
+                tunable=params.tunable,
+            )
         except ScenarioError as error:
             error.path = ("participants", self.name, *(error.path or ("path",)))
             raise
@@ -149,6 +164,7 @@ class FmuEngine(Stepped):
                 side, self._sides[bond.side.name] = coupling.couple(bond, plan)
                 self._bonds.append(side)
                 self._outputs |= side.initial()
+        self._tunable = TunableParameters(instance, description.tunable, description.ports)
         return self._read(0)
 
     def _start(self) -> Instance:
@@ -175,6 +191,9 @@ class FmuEngine(Stepped):
         sub = self.params.step or h
         for bond in self._bonds:
             bond.begin(inputs, h / 1e9)
+        if not instance.ended:
+            instance.now_ns = t
+            self._tunable.begin(inputs)
         for begin in range(0, h, sub):
             instance.now_ns = t + begin
             if not instance.ended:
@@ -223,6 +242,7 @@ class FmuEngine(Stepped):
         instance.memory[:], *bonds = split_state(self.name, kept, state[:size])
         for bond, part in zip(self._bonds, bonds, strict=True):
             bond.state = part
+        self._tunable.read()
 
     def _kept(self) -> list[Vector]:
         """Return the state beside the FMU's own."""

@@ -111,6 +111,13 @@ class Fmi3Instance(Instance):
             self.memory[1:] = values
             self._handle_event(self._event_blocks, at=self.now_ns / 1e9)
 
+    def tune(self, blocks: Sequence[Block]) -> None:
+        """Set tunable parameters between two steps; in event mode, if the FMU has one."""
+        if self._has_events:
+            self._handle_event(blocks, at=self.now_ns / 1e9)
+        else:
+            super().tune(blocks)
+
     def advance(self, t: int, h: int) -> None:
         """Bring the FMU from `t` to `t + h` (ns), event by event, or to the FMU's end of the simulation."""
         now, end = t / 1e9, (t + h) / 1e9

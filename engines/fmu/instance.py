@@ -9,7 +9,7 @@ import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,6 +158,15 @@ class Instance(ABC):
     def bond_output(self, variables: Sequence[Variable]) -> Block:
         """Return the outputs `variables`, all of the same type, for reading in the middle of a step."""
         return Block("Get", variables, self._prepare_access)
+
+    def block(self, verb: Literal["Set", "Get"], variables: Sequence[Variable]) -> Block:
+        """Return variables of one type, to be set or got apart from inputs and outputs."""
+        return Block(verb, variables, self._prepare_access)
+
+    def tune(self, blocks: Sequence[Block]) -> None:
+        """Set tunable parameters between two steps."""
+        for block in blocks:
+            self.transfer(block)
 
     def read_outputs(self) -> None:
         """Bring the FMU's outputs into the blocks."""

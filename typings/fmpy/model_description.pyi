@@ -40,6 +40,8 @@ class ModelVariable:
     displayUnit: str | None
     sourceline: int
     start: str | None
+    min: str | None
+    max: str | None
     alias: ModelVariable | None
 
 class ModelDescription:
