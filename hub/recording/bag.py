@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Generator, Iterator
+from collections.abc import Collection, Generator, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from io import BytesIO
@@ -243,25 +243,40 @@ class Bag:
 
         Raises RecordingError for a missing topic.
         """
+        for _, messages in self.chunked_messages(topics):
+            yield from messages
+
+    def chunked_messages(self, topics: Collection[str]) -> Iterator[tuple[ChunkIndex, list[BagMessage]]]:
+        """Yield each chunk that may hold messages of `topics`, or all, with the messages.
+
+        Raises RecordingError for a missing topic.
+        """
         for topic in topics:
             if topic not in self.topics:
                 raise RecordingError(
                     f"'{self.file}' has no topic '{topic}'.{did_you_mean(topic, self.topics)}"
                 )
         wanted = {channel: topic for topic in topics or self.topics for channel in self._channel_ids(topic)}
-        for records, found in self._chunks_with_messages(set(wanted)):
-            for m in found:
-                topic = wanted[m.channel]
-                yield BagMessage(
-                    topic, self.topics[topic], m.time_ns, records[m.offset + MESSAGE_HEADER_BYTES : m.end]
-                )
+        for chunk, records, found in self._chunks_with_messages(set(wanted)):
+            yield (
+                chunk,
+                [
+                    BagMessage(
+                        wanted[m.channel],
+                        self.topics[wanted[m.channel]],
+                        m.time_ns,
+                        records[m.offset + MESSAGE_HEADER_BYTES : m.end],
+                    )
+                    for m in found
+                ],
+            )
 
     def column(self, topic: str) -> tuple[NDArray[np.int64], list[bytes]]:
         """Return the times (ns), shape (n,), and the payloads of a topic, in the order of `messages`."""
         times: list[int] = []
         payloads: list[bytes] = []
         left = max(_FREE_TOPIC_BYTES, _MAX_TOPIC_RATIO * self.file.stat().st_size)
-        for records, found in self._chunks_with_messages(self._channel_ids(topic)):
+        for _, records, found in self._chunks_with_messages(self._channel_ids(topic)):
             left -= sum(m.end - m.offset for m in found)
             if left < 0:
                 raise RecordingError(
@@ -351,8 +366,10 @@ class Bag:
             raise RecordingError(f"'{self.file}' has no chunk index; `trocar recover {self.file}` writes one")
         return summary
 
-    def _chunks_with_messages(self, wanted: set[int]) -> Iterator[tuple[bytes, list[LocatedMessage]]]:
-        """Yield, in file order, the records of each chunk with `wanted` channels, and the places."""
+    def _chunks_with_messages(
+        self, wanted: set[int]
+    ) -> Iterator[tuple[ChunkIndex, bytes, list[LocatedMessage]]]:
+        """Yield, in file order, each chunk with `wanted` channels, the records, and the places."""
         indexes = sorted(self._summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
         with self.file.open("rb") as stream:
             for index in indexes:
@@ -368,7 +385,7 @@ class Bag:
                             o for c in wanted & places.keys() for o in _message_offsets(stream, places[c], c)
                         ]
                         found = [_message_at(records, offset, wanted) for offset in sorted({*offsets})]
-                yield records, found
+                yield index, records, found
 
 
 class LocatedMessage(NamedTuple):

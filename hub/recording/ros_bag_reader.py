@@ -1,5 +1,6 @@
 """ROS bags, read through `rosbags`: rosbag2 directories, .mcap and .db3 files, .bag files of ROS 1.
 
+A session recorded by dvrk_data is read as the bag in it.
 Their contents are untrusted: damaged bytes raise RecordingError, or are returned as the error of a message.
 """
 
@@ -18,6 +19,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
 
 from hub.recording.bounded_rosbags import bound_rosbags
+from hub.recording.dvrk_session import session_bag
 from hub.recording.unfinished import Unfinished
 from hub.recording.unpacking import most_unpacked
 from schemas.codec import typestore
@@ -49,8 +51,8 @@ class RosBag:
     """
 
     def __init__(self, path: Path) -> None:
-        """Open a bag. Raises RecordingError if the bag cannot be read."""
-        self.path = path
+        """Open a bag, or the bag of a session of dvrk_data. Raises RecordingError if it cannot be read."""
+        self.path = path = session_bag(path)
         with _reading_errors(path):
             bound_rosbags()
             _require_bounded(path)

@@ -16,7 +16,7 @@ from schemas.errors import MessageError, RecordingError
 from trocar import Recording
 from trocar.messages import CompressedImage, Image
 
-__all__ = ["DEFAULT_SIZE", "EYES", "Pair", "Stereo", "recorded_size", "stereo"]
+__all__ = ["DEFAULT_SIZE", "EYES", "Pair", "Stereo", "recorded_instants", "recorded_size", "stereo"]
 
 EYES = ("left", "right")
 DEFAULT_SIZE = (640, 480)
@@ -78,6 +78,26 @@ def recorded_size(recording: Recording) -> tuple[int, int] | None:
         for _, pixels in _pictures(recording, port):
             return pixels.shape[1], pixels.shape[0]
     return None
+
+
+def recorded_instants(recording: Recording) -> NDArray[np.int64]:
+    """Return simulated times of each recorded stereo pair, ns, shape (n, 3); empty if none is recorded.
+
+    Of a pair: when it was taken, and when the left and the right picture arrived.
+    """
+    arrivals: list[dict[int, int]] = []
+    for port in _ports(recording):
+        messages = recording.messages(recording[port].topic)
+        arrivals.append(
+            {
+                _decode_picture(recording, one.topic, one.type, one.payload).header.stamp.ns: one.time_ns
+                for one in messages
+            }
+        )
+    if not arrivals:
+        return np.empty((0, 3), np.int64)
+    left, right = arrivals
+    return np.array([(taken, left[taken], right[taken]) for taken in sorted(left.keys() & right)], np.int64)
 
 
 def _ports(recording: Recording) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import typer
@@ -16,6 +16,7 @@ import trocar
 from schemas.errors import MissingExtraError, RecordingError
 
 if TYPE_CHECKING:
+    from learning.relive.arms import PlacedArm, Way
     from learning.relive.doubts import Reading
     from learning.relive.session import Residual
 
@@ -23,6 +24,7 @@ __all__ = ["app"]
 
 app = typer.Typer()
 
+_PSMS = ("PSM1", "PSM2", "PSM3")
 _STILL = 1e-6
 """Largest change of a number, m or a part of a quaternion, of an arm that stays."""
 _FEW = 0.9
@@ -33,7 +35,10 @@ _FEW = 0.9
 def relive(
     dataset: Annotated[
         Path,
-        typer.Argument(metavar="DATASET", help="A LeRobotDataset, or an episode of SutureBot (ee_csv.csv)."),
+        typer.Argument(
+            metavar="DATASET",
+            help="A LeRobotDataset, an episode of SutureBot (ee_csv.csv), or a session of dvrk_data.",
+        ),
     ],
     *,
     episode: Annotated[int, typer.Option(min=0, help="Number of the episode.")] = 0,
@@ -76,22 +81,32 @@ def relive(
     from learning.relive.arms import placed_arms
     from learning.relive.convention import CONVENTIONS
     from learning.relive.doubts import readings
+    from learning.relive.dvrk_session import is_dvrk_session, session_ways
     from learning.relive.episode_file import EpisodeFile
-    from learning.relive.session import follow, robot_of
+    from learning.relive.session import robot_of
 
+    values = {path: value for path, _, value in (each.partition("=") for each in overrides or ())}
+    loaded = trocar.load_scenario(scenario, set=values)
+    robot: Any = loaded.params[robot_of(loaded)]
+    if is_dvrk_session(dataset):
+        named = _PSMS if arms is None else tuple(arms.split(","))
+        placed = placed_arms(robot, tuple(arm for arm in named if arm in robot.arms), "base")
+        fps, ways = session_ways(dataset, placed)
+        frames = len(next(iter(ways.values())).joints)
+        typer.echo(f"{frames} frames at {fps:g} Hz, joint set-points: {', '.join(ways)}")
+        _follow(loaded, {arm: placed[arm] for arm in ways}, ways, fps, record)
+        return
     stated = CONVENTIONS[convention]
     stated = replace(stated, order=order or stated.order, unit=unit or stated.unit)
     if arms is not None:
         stated = replace(stated, arms=tuple(arms.split(",")))
     read = EpisodeFile.read(dataset, episode, stated)
     stated = replace(stated, frame=frame or read.frame or stated.frame)
-    values = {path: value for path, _, value in (each.partition("=") for each in overrides or ())}
-    loaded = trocar.load_scenario(scenario, set=values)
     set_points = stated.set_points(read.rows)
     moving = tuple(arm for arm in stated.arms if np.ptp(set_points[arm][:, :7], axis=0).max() > _STILL)
     if not moving:
         raise RecordingError(f"'{dataset}', episode {episode}: no arm moves")
-    placed = placed_arms(loaded.params[robot_of(loaded)], moving, stated.frame)
+    placed = placed_arms(robot, moving, stated.frame)
     tried = list(readings(read.rows, stated, placed))
     ways = {arm: one.way(set_points[arm]) for arm, one in placed.items()}
     typer.echo(f"{len(read.rows)} frames at {read.fps:g} Hz, poses in {stated.frame}: {', '.join(moving)}")
@@ -99,7 +114,20 @@ def relive(
     lost = [f"{arm}, {way.refusal}" for arm, way in ways.items() if way.share == 0.0]
     if lost:
         raise RecordingError(f"no frame is in reach: {'; '.join(lost)}")
-    _print_residuals(follow(loaded, placed, ways, read.fps, record))
+    _follow(loaded, placed, ways, read.fps, record)
+
+
+def _follow(
+    loaded: trocar.ScenarioFile,
+    placed: Mapping[str, PlacedArm],
+    ways: Mapping[str, Way],
+    fps: float,
+    record: Path | None,
+) -> None:
+    """Let the arms follow, and print what is left."""
+    from learning.relive.session import follow
+
+    _print_residuals(follow(loaded, placed, ways, fps, record))
     for arm, way in ways.items():
         if way.refusal:
             share = 100.0 * (1.0 - way.share)

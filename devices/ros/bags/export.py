@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from devices.ros.bags.implied_gateway import implied_gateway, implied_routes
 from devices.ros.gateway import Gateway
 from devices.ros.topics.publications import MessageSource, State
 from devices.ros.topics.row import Row
@@ -23,6 +24,7 @@ from hub.planning.foreign_code import names_class
 from hub.planning.plan import Plan
 from hub.recording.recording import Recording
 from hub.recording.ros_bag_writer import BagWriter
+from hub.recording.time_order import messages_by_time
 from hub.recording.trust import trusted_parameters
 from hub.transport.port_codec import PortCodec
 from schemas.codec import decode, encode, message_type
@@ -59,14 +61,21 @@ class ExportSummary:
 
 
 def export(
-    recording: Recording, directory: Path, gateway: str | None = None, *, trust: bool = False
+    recording: Recording,
+    directory: Path,
+    gateway: str | None = None,
+    *,
+    pictures: bool = True,
+    trust: bool = False,
 ) -> ExportSummary:
     """Write the messages published and received by a gateway of a recorded session to a new `directory`.
 
     Args:
         recording: the recording of the session.
         directory: the bag, not existing yet.
-        gateway: the gateway's name; by default the session's only gateway.
+        gateway: the gateway's name; by default the session's only gateway, and in a session without one
+            a gateway for the arms of its motion controller.
+        pictures: whether pictures are written.
         trust: allow requests refused by `trusted_parameters`.
 
     Raises:
@@ -76,11 +85,15 @@ def export(
         TrustError: if the gateway, or without a name any device, asks for forbidden files or code.
     """
     plan = recording.plan()
-    shown = _gateway(recording, plan, gateway, trust=trust)
-    routes = {name: rows for name, rows in _recorded_routes(plan, shown).items() if name in recording.topics}
+    shown, planned = _gateway_routes(recording, plan, gateway, trust=trust)
+    routes = {
+        name: kept
+        for name, rows in planned.items()
+        if name in recording.topics and (kept := [one for one in rows if pictures or not one[0].is_picture])
+    }
     with BagWriter(directory) as bag:
         replay, last_ns = _Replay(shown, routes, _RowWriter(bag, recording.started_ns())), -1
-        for message in recording.messages(*routes):
+        for message in messages_by_time(recording, *routes):
             if message.time_ns - max(last_ns, 0) > _LONGEST_GAP_NS:
                 raise RecordingError(
                     f"'{recording.file}': nothing from {max(last_ns, 0) * 1e-9:g} s to"
@@ -99,6 +112,21 @@ def export(
     return ExportSummary(str(directory), shown.name, bag.topics, bag.messages, recording.duration_ns * 1e-9)
 
 
+def _gateway_routes(
+    recording: Recording, plan: Plan, name: str | None, *, trust: bool
+) -> tuple[Gateway, _Routes]:
+    """Return the gateway with this name, or the only or the implied gateway, and the rows."""
+    kinds = (planned.kind for planned in plan.participants.values() if planned.role == "device")
+    if name is None and not any(
+        names_class(kind) or issubclass(registry.load(kind), Gateway) for kind in kinds
+    ):
+        implied = implied_gateway(recording, plan, trust=trust)
+        if implied is not None:
+            return implied, implied_routes(plan, implied)
+    shown = _gateway(recording, plan, name, trust=trust)
+    return shown, _recorded_routes(plan, shown)
+
+
 def _gateway(recording: Recording, plan: Plan, name: str | None, *, trust: bool) -> Gateway:
     """Return the gateway with this name, or the only gateway, as declared in the scenario."""
     devices = {key: planned for key, planned in plan.participants.items() if planned.role == "device"}
@@ -112,8 +140,8 @@ def _gateway(recording: Recording, plan: Plan, name: str | None, *, trust: bool)
         trusted_parameters(recording, classes)
     if name is None and len(there) != 1:
         none = (
-            "no gateway to ROS, which would define its topics: add one to the scenario, with"
-            " `motion.* -> ros.*`, and record again"
+            "neither a gateway to ROS nor a participant of kind `motion`, which would define its topics: add"
+            " one to the scenario and record again"
         )
         found = (
             f"{len(there)} gateways to ROS ({', '.join(there)}): say which by --gateway" if there else none

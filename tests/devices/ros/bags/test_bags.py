@@ -330,10 +330,25 @@ def test_what_cannot_be_written_is_said(driven, bag, tmp_path):
         export(driven, bag)
     with pytest.raises(RecordingError, match=r"no gateway 'rso'\. Did you mean 'ros'\?"):
         export(driven, tmp_path / "bag", "rso")
-    replayed = recorded(tmp_path / "replayed", f"{{kind: ros-bag, bag: {bag}, arms: *psm}}", duration="10 ms")
-    with pytest.raises(RecordingError, match="no gateway to ROS"):
-        export(replayed, tmp_path / "bag")
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(
+        "name: robot\nstep: 5 ms\nduration: 10 ms\nparticipants:\n"
+        "  robot: {kind: mujoco, arms: {PSM1: {instrument: '400006'}}}\n"
+    )
+    launch(load(str(robot)), record=tmp_path / "bare").run()
+    with pytest.raises(RecordingError, match="neither a gateway to ROS nor a participant of kind `motion`"):
+        export(Recording(tmp_path / "bare"), tmp_path / "bag")
     assert not (tmp_path / "bag").exists()
+
+
+def test_a_session_without_a_gateway_has_the_topics_of_its_motion_controller(bag, tmp_path):
+    device = f"{{kind: ros-bag, bag: {bag}, arms: *psm}}"
+    replayed = recorded(tmp_path / "replayed", device, duration="100 ms")
+    export(replayed, tmp_path / "bag")
+    measured = [
+        message.position.tolist() for _, _, message in messages(tmp_path / "bag", "/PSM1/measured_js")
+    ]
+    assert measured == replayed["motion.PSM1/measured_js"]["position"].tolist()
 
 
 def test_a_bag_that_cannot_be_finished_is_not_left_behind(driven, tmp_path, monkeypatch):
