@@ -18,7 +18,7 @@ from xml.parsers import expat
 
 from schemas.errors import ScenarioError
 
-__all__ = ["opened_archive", "unpack"]
+__all__ = ["find_archive_problem", "opened_archive", "unpack"]
 
 LARGEST_FILE = 1 << 30
 """Most bytes of an unpacked file."""
@@ -42,7 +42,7 @@ def opened_archive(path: Path) -> Generator[tuple[IO[bytes], zipfile.ZipFile]]:
     XML entities, and the errors of `zipfile` for other files.
     """
     with _opened(path) as file, zipfile.ZipFile(file) as archive:
-        problem = _problem(archive.infolist()) or _xml_problem(archive)
+        problem = find_archive_problem(archive.infolist()) or _xml_problem(archive)
         if problem:
             raise ScenarioError(f"the FMU '{path}' is refused: {problem}")
         file.seek(0)
@@ -74,7 +74,7 @@ def unpack(path: Path, directory: Path) -> None:
             raise ScenarioError(f"the FMU '{path}' cannot be unpacked: {error}") from error
 
 
-def _problem(entries: Iterable[zipfile.ZipInfo]) -> str:
+def find_archive_problem(entries: Iterable[zipfile.ZipInfo]) -> str:
     """Return the problem of an archive's entries, as a clause; empty: no problem."""
     total, seen = 0, set[str]()
     for count, entry in enumerate(entries, start=1):

@@ -1,10 +1,10 @@
 """FMUs as engines: FMI 2.0 and 3.0 for co-simulation, through FMPy.
 
 Inputs and outputs of the FMU are ports, with names by `engines.fmu.variables.port_name`, in the FMU's units:
-nothing is converted, so a length in mm fits an input in mm alone. Scalars are `std_msgs/msg/Float64`, FMI 3
-arrays `std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and booleans (0, 1) are exchanged
-as doubles; an input without a valid number of its type ends the session. Strings, binaries and clocks become
-no ports, with an entry in the log.
+a length in mm fits an input in mm alone, unless `inputs` states a conversion. Scalars are
+`std_msgs/msg/Float64`, FMI 3 arrays `std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and
+booleans (0, 1) are exchanged as doubles; an input without a valid number of its type ends the session.
+Strings, binaries and clocks become no ports, with an entry in the log.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from engines.fmu.bond_params import FmuBond
 from engines.fmu.bonds import FmuSide
+from engines.fmu.conversions import ConvertedInputs, InputConversion, convert_ports
 from engines.fmu.coupling import Coupling
 from engines.fmu.description import Description, describe
 from engines.fmu.fmi2 import Fmi2Instance
@@ -51,6 +52,11 @@ class FmuParams(Params):
             " for an array, true or false, or a text"
         ),
         examples=[{"mass": "50 g", "stages": 3}],
+    )
+    inputs: dict[str, InputConversion] = Field(
+        default_factory=dict[str, InputConversion],
+        description="conversions of connected inputs, by FMU variable name",
+        examples=[{"force": {"unit": "mN", "factor": 0.001}}],
     )
     tolerance: float | None = Field(
         default=None, gt=0, allow_inf_nan=False, description="relative tolerance of the FMU's own solver"
@@ -129,10 +135,18 @@ class FmuEngine(Stepped):
             error.path = ("participants", self.name, *(error.path or ("path",)))
             raise
 
+    @cached_property
+    def _converted(self) -> tuple[tuple[Port, ...], dict[str, InputConversion]]:
+        try:
+            return convert_ports(self._description.ports, self.params.inputs)
+        except ScenarioError as error:
+            error.path = ("participants", self.name, *error.path)
+            raise
+
     @property
     def ports(self) -> tuple[Port, ...]:
         """The FMU's inputs and outputs. Raises ScenarioError for a file without an FMU for this machine."""
-        return self._description.ports
+        return self._converted[0]
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
@@ -188,6 +202,8 @@ class FmuEngine(Stepped):
         After the FMU's end of the simulation the last outputs are held.
         """
         instance = self._running()
+        if conversions := self._converted[1]:
+            inputs = ConvertedInputs(inputs, conversions)
         sub = self.params.step or h
         for bond in self._bonds:
             bond.begin(inputs, h / 1e9)

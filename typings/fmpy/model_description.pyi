@@ -1,8 +1,29 @@
+class Item:
+    name: str
+    value: str | None
+
 class SimpleType:
     unit: str | None
+    items: list[Item]
+
+class BaseUnit:
+    kg: int
+    m: int
+    s: int
+    A: int
+    K: int
+    mol: int
+    cd: int
+    rad: int
+    factor: float
+    offset: float
 
 class Unit:
     name: str
+    baseUnit: BaseUnit | None
+
+class DefaultExperiment:
+    stepSize: str | None
 
 class CoSimulation:
     modelIdentifier: str
@@ -48,6 +69,7 @@ class ModelDescription:
     fmiVersion: str
     guid: str
     coSimulation: CoSimulation | None
+    defaultExperiment: DefaultExperiment | None
     modelVariables: list[ModelVariable]
     unitDefinitions: list[Unit]
     buildConfigurations: list[BuildConfiguration]
