@@ -171,7 +171,9 @@ participants:
 <ssm:ParameterMapping version="1.0" {NAMESPACES}>
   <ssm:MappingEntry source="mass" target="m"/>
   <ssm:MappingEntry source="place" target="x"/>
-  <ssm:MappingEntry source="push" target="F"><ssc:LinearTransformation factor="2.5" offset="1"/></ssm:MappingEntry>
+  <ssm:MappingEntry source="push" target="F">
+    <ssc:LinearTransformation factor="2.5" offset="1"/>
+  </ssm:MappingEntry>
 </ssm:ParameterMapping>
 """,
         },
@@ -277,15 +279,15 @@ connections: [one.x -> two.F]
                 "</ssc:BooleanMappingTransformation>",
             ),
         ),
-        f"""\
+        """\
 participants:
-  stair: {{kind: fmu, path: resources/stair.fmu}}
-  ball: {{kind: fmu, path: resources/bouncing_ball.fmu}}
+  stair: {kind: fmu, path: resources/stair.fmu}
+  ball: {kind: fmu, path: resources/bouncing_ball.fmu}
   spring:
     kind: fmu
     path: resources/mass_spring_damper.fmu
-    start: {{x: 1}}
-    inputs: {{stage: {{table: {{1: 2, 2: 1}}}}, locked: {{table: {{0: 1}}}}}}
+    start: {x: 1}
+    inputs: {stage: {table: {1: 2, 2: 1}}, locked: {table: {0: 1}}}
 connections: [stair.counter -> spring.stage, ball.seen_frozen -> spring.locked]
 """,
         version="2.0",

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from lxml import etree
 from typer.testing import CliRunner
 
 from hub.command_line.app import app
