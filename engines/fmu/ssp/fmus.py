@@ -57,6 +57,16 @@ class Fmu:
     variables: Mapping[str, Variable]
     """By name; names of aliases included."""
 
+    @property
+    def step_s(self) -> float:
+        """Step of the FMU's default experiment, s; 0: not stated."""
+        experiment = self.model.defaultExperiment
+        try:
+            step = float(experiment.stepSize or 0.0) if experiment else 0.0
+        except ValueError:
+            return 0.0
+        return step if 0.0 < step < float("inf") else 0.0
+
     def describe(self, start: Mapping[str, object]) -> Description:
         """Return inputs, outputs and checked start values. Raises ScenarioError."""
         return describe(self.file, start)

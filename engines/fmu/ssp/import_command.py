@@ -30,6 +30,7 @@ def import_file(
     from hub.planning.limits import safe_text
     from hub.planning.scenario_file import load
     from hub.session.launch import plan_of
+    from schemas.errors import ScenarioError
 
     if file.suffix.lower() != ".ssp":
         raise typer.BadParameter(
@@ -37,8 +38,13 @@ def import_file(
             param_hint="SYSTEM.SSP",
         )
     imported = import_system(file, output or Path(file.stem))
-    checked = load(str(imported.file))
-    plan_of(checked.scenario, checked.params)
+    try:
+        checked = load(str(imported.file))
+        plan_of(checked.scenario, checked.params)
+    except ScenarioError as error:
+        raise ScenarioError(
+            f"{error}\n'{imported.file}' is written, and does not run as it is: correct it there"
+        ) from error
     lines = [*imported.notes]
     lines += [f"not carried over: {line}" for line in imported.lost]
     number = len(imported.scenario["participants"])

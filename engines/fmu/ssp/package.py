@@ -44,7 +44,10 @@ class Package:
 
         Raises ScenarioError for a missing entry and for any other URI: nothing outside the archive is read.
         """
-        parts = urlsplit(source)
+        try:
+            parts = urlsplit(source)
+        except ValueError as error:
+            raise ScenarioError(f"{what} names '{source}', which is no URI: {error}") from error
         name = posixpath.normpath(unquote(parts.path))
         if parts.scheme or parts.netloc or name.startswith(("/", "../")) or name == "..":
             raise ScenarioError(

@@ -15,6 +15,7 @@ __all__ = ["ParameterValue", "read_binding"]
 
 _REALS = {"Real", "Float64", "Float32"}
 _TEXTS = {"String", "Enumeration"}
+_LONGEST_NUMBER = 80
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
 
@@ -157,6 +158,8 @@ def _values(node: Node, kind: str, name: str) -> Iterator[float | int | bool | s
 
 
 def _number(text: str, kind: str) -> float | int | bool:
+    if len(text) > _LONGEST_NUMBER:
+        raise ValueError(f"a number of {len(text)} characters")
     if kind == "Boolean":
         return _BOOLEANS[text]
     return float(text) if kind in _REALS else int(text)

@@ -35,6 +35,7 @@ SCENARIO_KEYS = (
 COMPONENT_KEYS = ("period", "step", "tolerance", "strict", "tunable")
 """Keys of a participant in the annotation of a component."""
 
+_LONGEST_S = 9.2e9
 _UNITS_NS = (("s", 10**9), ("ms", 10**6), ("us", 10**3), ("ns", 1))
 _STEPS = {
     "com.opensimulationplatform": (("osp:Algorithm", "osp:FixedStepAlgorithm"), "baseStepSize"),
@@ -92,7 +93,14 @@ def _annotations(parents: Iterable[Node | None]) -> Iterable[Node]:
 
 
 def duration_text(seconds: float) -> str:
-    """Return a time as whole nanoseconds in the largest unit of a whole number, such as `2500 us`."""
+    """Return a time as whole nanoseconds in the largest unit of a whole number, such as `2500 us`.
+
+    Raises ScenarioError for a time beyond 292 years, 64 bits of nanoseconds.
+    """
+    if abs(seconds) > _LONGEST_S:
+        raise ScenarioError(
+            f"a time of {seconds:g} s is longer than {_LONGEST_S:g} s, 64 bits of nanoseconds"
+        )
     ns = round(seconds * 1e9)
     unit, size = next((unit, size) for unit, size in _UNITS_NS if ns % size == 0)
     return f"{ns // size} {unit}"

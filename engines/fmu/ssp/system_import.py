@@ -246,10 +246,8 @@ class _Import:
     def _step(self, description: Description, fmus: Mapping[tuple[str, ...], Fmu]) -> str:
         found = stated_step(description)
         if found is None:
-            experiments = [fmu.model.defaultExperiment for fmu in fmus.values()]
-            steps = [float(one.stepSize) for one in experiments if one and one.stepSize]
-            least = min(steps, default=0.0)
-            found = (least, "the FMUs' own") if least > 0 else (_DEFAULT_STEP_S, "the default")
+            least = min((step for fmu in fmus.values() if (step := fmu.step_s)), default=0.0)
+            found = (least, "the FMUs' own") if least else (_DEFAULT_STEP_S, "the default")
         step, origin = found
         text = duration_text(step)
         if round(step * 1e9) == 0:

@@ -40,7 +40,7 @@ class Table:
 
     def apply(self, value: float) -> float:
         """Return a value transformed."""
-        return self.entries.get(int(value), value) if value == int(value) else value
+        return self.entries.get(int(value), value) if float(value).is_integer() else value
 
 
 Transformation = Linear | Table

@@ -68,7 +68,14 @@ def conversion(source: Unit, target: Unit) -> Linear:
     if source.is_same(target):
         return Linear()
     if source.exponents is None or target.exponents is None:
-        return Linear(to_si(f"1 {source.name}", target.name))
+        try:
+            return Linear(to_si(f"1 {source.name}", target.name))
+        except ValueError as error:
+            raise ValueError(
+                f"'{source.name}' is not converted to '{target.name}', as the files define only"
+                f" {' and '.join(one.name for one in (source, target) if one.exponents) or 'neither'}: define"
+                " both in Units"
+            ) from error
     if source.exponents != target.exponents or not target.factor:
         raise ValueError(f"'{source.name}' and '{target.name}' are units of different dimension")
     return Linear(source.factor / target.factor, (source.offset - target.offset) / target.factor)
