@@ -47,7 +47,7 @@ def _description(model: str) -> bytes:
     return (build.HERE / model / "modelDescription.xml").read_bytes()
 
 
-def _packed(model: str, description: bytes, names: tuple[str, ...] = ()) -> bytes:
+def pack_fmu(model: str, description: bytes, names: tuple[str, ...] = ()) -> bytes:
     """Return the archive of an FMU with a file where the library would be, and others."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -66,7 +66,7 @@ def _read(data: bytes, directory: Path, *, strict: bool, start: dict[str, object
     _ = make_participant("fmu", "plant", params, directory).ports
 
 
-def _elements(description: bytes, source: random.Random, others: Sequence[bytes]) -> tuple[str, bytes]:
+def mutated_elements(description: bytes, source: random.Random, others: Sequence[bytes]) -> tuple[str, bytes]:
     """Return what was done to elements and attributes, and the description, which is still XML."""
     root = ElementTree.fromstring(description)
     every = list(root.iter())
@@ -102,14 +102,14 @@ def attempt(case: str, directory: Path, note: Note) -> None:
     others = [_description(other) for other in MODELS]
     description, label, names = _description(model), "", tuple[str, ...]()
     if source.random() < 0.85:
-        change = source.choice([_elements, _elements, _elements, _elements, mutated_text, mutated])
+        change = source.choice([mutated_elements] * 4 + [mutated_text, mutated])
         label, description = change(description, source, others)
     if source.random() < 0.05:
         words = [word.decode("utf-8", "replace")[:5000] for word in source.choices(WORDS, k=2)]
         names, label = (f"resources/{words[0]}", f"x{words[1]}"), f"{label} names"
-    data = _packed(model, description, names)
+    data = pack_fmu(model, description, names)
     if not label or source.random() < 0.1:
-        change, data = mutated(data, source, [_packed(other, _description(other)) for other in MODELS])
+        change, data = mutated(data, source, [pack_fmu(other, _description(other)) for other in MODELS])
         label += f" archive {change}"
     note(f"{model}: {label}")
     start = {source.choice(STARTS): source.choice([1, -1, 2**70, 1e400, "1 m", "x", [1, 2], True, None])}
@@ -119,7 +119,7 @@ def attempt(case: str, directory: Path, note: Note) -> None:
 def pristine(directory: Path) -> None:
     """Read each FMU as it is."""
     for model in MODELS:
-        _read(_packed(model, _description(model)), directory, strict=True)
+        _read(pack_fmu(model, _description(model)), directory, strict=True)
 
 
 if __name__ == "__main__":

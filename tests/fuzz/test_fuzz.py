@@ -20,6 +20,7 @@ pytestmark = [
         ("recordings", ("--number", "16")),
         ("meshes", ("--number", "400")),
         ("fmus", ("--number", "150")),
+        ("systems", ("--number", "150")),
         ("ros", ("--number", "40")),
         ("page", ("--number", "300")),
     ],

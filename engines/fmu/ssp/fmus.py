@@ -55,7 +55,7 @@ class Fmu:
     file: Path
     model: ModelDescription
     variables: Mapping[str, Variable]
-    """By name; names of aliases included."""
+    """Variables by name."""
 
     @property
     def step_s(self) -> float:

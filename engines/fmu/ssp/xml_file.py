@@ -28,7 +28,13 @@ _LARGEST = 32 << 20
 _MOST_NODES = 500_000
 _DEEPEST = 100
 _LONGEST = 200
-"""Most letters of a name in a message."""
+"""Most letters of a value in a message."""
+_NAMES = frozenset(
+    {"name", "kind", "source", "target", "unit", "type", "prefix", "version", "implementation"}
+    | {f"{side}{what}" for side in ("start", "end") for what in ("Element", "Connector")}
+)
+_LONGEST_NAME = 500
+"""Most letters of the attributes `_NAMES`, which messages quote."""
 
 
 @dataclass
@@ -107,7 +113,7 @@ def parse_xml(data: bytes, file: str) -> Node:
         parser.Parse(data, True)
     except _RefusedError as error:
         raise ScenarioError(f"{file}, line {parser.CurrentLineNumber}: {error}") from error
-    except (expat.ExpatError, ValueError) as error:
+    except (expat.ExpatError, ValueError, LookupError) as error:  # LookupError: an unknown encoding
         raise ScenarioError(f"{file} is not XML in UTF-8: {error}") from error
     if builder.root is None:
         raise ScenarioError(f"{file} has no root element")
@@ -132,6 +138,8 @@ class _Builder:
         self._count += 1
         if self._count > _MOST_NODES or len(self._open) >= _DEEPEST:
             raise _RefusedError(f"more than {_MOST_NODES} elements, or deeper than {_DEEPEST} levels")
+        if too_long := [key for key in _NAMES & attributes.keys() if len(attributes[key]) > _LONGEST_NAME]:
+            raise _RefusedError(f"'{too_long[0]}' has more than {_LONGEST_NAME} letters")
         uri, _, local = name.rpartition(" ")
         prefixed = f"{_PREFIXES.get(uri, '?')}:{local}"
         node = Node(prefixed, attributes, self._file, self._parser.CurrentLineNumber)

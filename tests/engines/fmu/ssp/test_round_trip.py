@@ -164,3 +164,16 @@ def test_fmpy_gives_the_same_trajectory(libraries: dict[str, Path], tmp_path: Pa
         found = launch(load(str(scenario), overrides)).run().measures["x"]
         assert found == rows["spring.x"][steps - 1]
         assert found or steps == 1
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_pyssp_standard_reads_an_export(name: str, libraries: dict[str, Path], tmp_path: Path) -> None:
+    reader = pytest.importorskip("pyssp_standard.ssp", reason="pyssp-standard is not installed")
+    write_fmus(libraries, tmp_path)
+    (tmp_path / "meant.yaml").write_text(MEANT.format(name=name) + SYSTEMS[name].meant)
+    command("export", tmp_path / "meant.yaml", "-o", tmp_path / "out.ssp")
+    scenario = load(str(tmp_path / "meant.yaml")).scenario
+    with reader.SSP(tmp_path / "out.ssp", mode="r") as package, package.system_structure as structure:
+        assert {one.name for one in structure.system.elements} == set(scenario.participants)
+        assert len(structure.connections()) == len(scenario.connections)
+        assert structure.check_connections() == []
