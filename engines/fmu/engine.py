@@ -137,8 +137,9 @@ class FmuEngine(Stepped):
 
     @cached_property
     def _converted(self) -> tuple[tuple[Port, ...], dict[str, InputConversion]]:
+        ports = self._description.ports
         try:
-            return convert_ports(self._description.ports, self.params.inputs)
+            return convert_ports(ports, self.params.inputs)
         except ScenarioError as error:
             error.path = ("participants", self.name, *error.path)
             raise
