@@ -96,6 +96,14 @@ class Block:
         """The FMU's names of the variables, as text."""
         return ", ".join(self._names.values())
 
+    def differing(self, before: NDArray[Any]) -> list[str]:
+        """Return the FMU's names of the variables whose bytes differ from `before`, of the shape of `raw`."""
+        return [
+            self._names[port]
+            for port, part in self.parts.items()
+            if self.raw[part].tobytes() != before[part].tobytes()
+        ]
+
     def refused(self) -> str:
         """Return the name of the first variable refused by the FMU.
 

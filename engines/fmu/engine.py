@@ -25,6 +25,7 @@ from engines.fmu.description import Description, describe
 from engines.fmu.fmi2 import Fmi2Instance
 from engines.fmu.fmi3 import Fmi3Instance
 from engines.fmu.instance import Instance
+from engines.fmu.repeated_reads import warn_of_changes
 from engines.fmu.tunable import TunableParameters
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from hub.participant.state import split_state
@@ -180,7 +181,9 @@ class FmuEngine(Stepped):
                 self._bonds.append(side)
                 self._outputs |= side.initial()
         self._tunable = TunableParameters(instance, description.tunable, description.ports)
-        return self._read(0)
+        outputs = self._read(0)
+        warn_of_changes(instance, self.name)
+        return outputs
 
     def _start(self) -> Instance:
         """Return an instance at time 0."""

@@ -164,6 +164,7 @@ def _check(params: MujocoParams, period_ns: int) -> None:
     problems = {
         "objects, fixtures and a table": bool(params.objects or params.fixtures or params.table),
         f"spare instruments ({', '.join(spares)})": bool(spares),
+        "bonded joints": bool(params.bonded_joints),
         "a lean model": params.lean,
         "measured_effort: motor": params.measured_effort != "servo",
     }

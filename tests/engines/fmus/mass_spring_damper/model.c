@@ -19,7 +19,7 @@ typedef struct {
 enum { F, X, V, A, M, C, D, X_MM, N_REALS };                             /* value references of reals */
 enum { STEPS, FAULT, STAGE, N_INTEGERS };                                /* of integers */
 enum { LOCKED, SEEN_LOCKED, N_BOOLEANS };                                /* of booleans */
-enum { NO_FAULT, NAN_OUTPUT, DISCARD_STEP, ERROR_STEP, DISCARD_FORCE, FATAL_STEP, REFUSE_INIT }; /* values of FAULT */
+enum { NO_FAULT, NAN_OUTPUT, DISCARD_STEP, ERROR_STEP, DISCARD_FORCE, FATAL_STEP, REFUSE_INIT, CRASH_STEP, CHANGING_OUTPUT }; /* values of FAULT */
 
 typedef struct {
     double real[N_REALS];
@@ -115,6 +115,7 @@ Status fmi2GetReal(void *c, const unsigned *reference, size_t n, double *value) 
     Instance *i = c;
     for (size_t k = 0; k < n; k++) {
         if (reference[k] >= N_REALS) return complain(i, ERROR, "no such real", reference[k]);
+        if (reference[k] == A && i->data.integer[FAULT] == CHANGING_OUTPUT) i->data.real[A] += 1e-3;
         value[k] = reference[k] == V && i->data.integer[FAULT] == NAN_OUTPUT && i->data.time > 0 ? NAN : i->data.real[reference[k]];
     }
     return OK;
@@ -155,6 +156,8 @@ Status fmi2DoStep(void *c, double time, double h, int no_state_prior) {
     case DISCARD_STEP: return complain(i, DISCARD, "told to discard", time);
     case ERROR_STEP: return complain(i, ERROR, "told to fail", time);
     case FATAL_STEP: return complain(i, FATAL, "told to die", time);
+    case CRASH_STEP:
+        if (time > 0.0495) *(volatile int *)0 = 1;
     }
     int n = (int)ceil(h / 1e-4 - 1e-9);
     double dt = h / n, x = r[X], v = r[V];
