@@ -34,7 +34,7 @@ class Coupling:
         """`step_ns`: communication step; `start` returns another instance at time 0, for measurements."""
         self._instance, self._description = instance, description
         self._step_ns, self._start = step_ns, start
-        self._measures = not description.co_simulation.canBeInstantiatedOnlyOncePerProcess
+        self._measures = not description.interface.canBeInstantiatedOnlyOncePerProcess
 
     def couple(self, bond: BondVariables, plan: BondPlan) -> tuple[FmuSide, BondSide]:
         """Return the running side of `bond`, and the declared side with the numbers for its rule."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from engines.fmu.bond_params import FmuBond
 from engines.fmu.bond_variables import BondVariables, find_bond
-from engines.fmu.model import co_simulation, read_model
+from engines.fmu.model import interface_of, read_model, suggested_tolerance
 from engines.fmu.sources import listed_sources
 from engines.fmu.start import Start, declared_start, given_start, settable, size_of, unit_of
 from engines.fmu.tunable import tunable_parameters
@@ -24,7 +24,7 @@ from schemas.ports import Port
 from schemas.ros import Float64Message, Float64MultiArray
 
 if TYPE_CHECKING:
-    from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
+    from fmpy.model_description import CoSimulation, InterfaceType, ModelDescription, ModelVariable
 
 __all__ = ["Description", "describe"]
 
@@ -43,8 +43,10 @@ class Description:
     """Major version of FMI: 2 or 3."""
     guid: str
     """FMI 2: guid; FMI 3: instantiation token."""
-    co_simulation: CoSimulation
-    """Model identifier and capability flags."""
+    interface: InterfaceType
+    """Model identifier and capability flags of what is used."""
+    co_simulation: CoSimulation | None
+    """The same for co-simulation; None: model exchange is used."""
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
     ports: tuple[Port, ...]
@@ -56,6 +58,14 @@ class Description:
     """The scenario's bonds; their inputs are neither `inputs` nor `ports`."""
     tunable: tuple[Variable, ...] = ()
     """Parameters that may change while the session runs."""
+    states: int = 0
+    """For model exchange: number of continuous states (FMI 2)."""
+    indicators: int = 0
+    """For model exchange: number of event indicators (FMI 2)."""
+    completes_steps: bool = False
+    """For model exchange: whether the FMU wants to know of completed steps."""
+    tolerance: float | None = None
+    """Relative tolerance suggested by the FMU."""
 
 
 def describe(
@@ -63,6 +73,7 @@ def describe(
     start: Mapping[str, Any],
     *,
     strict: bool = True,
+    solver: str | None = None,
     bonds: Mapping[str, FmuBond] = MappingProxyType({}),
     tunable: Mapping[str, Sequence[Any] | None] = MappingProxyType({}),
 ) -> Description:
@@ -72,13 +83,14 @@ def describe(
         path: the FMU.
         start: start values by FMU variable name, in the variables' units.
         strict: whether a modelDescription.xml with a broken rule of FMI is refused.
+        solver: `cvode` for model exchange although there is co-simulation; None: by what there is.
         bonds: bonds by name.
         tunable: limits of parameters that may change while the session runs, by name.
 
     Raises ScenarioError, and MissingExtraError without FMPy.
     """
     model, major, names = read_model(path, strict=strict)
-    part = co_simulation(path, model, major, names)
+    part = interface_of(path, model, major, names, solver)
     starts = {value.name: value for value in _starts(path, model, major, start)}
     variables: dict[str, list[Variable]] = {"input": [], "output": []}
     ports: list[Port] = []
@@ -98,6 +110,7 @@ def describe(
         major,
         model.guid,
         part,
+        model.coSimulation if part is model.coSimulation else None,
         tuple(variable for variable in variables["input"] if variable.name not in bonded),
         tuple(variables["output"]),
         (*(port for port in ports if port.name not in bonded.values()), *(port for _, port in tuned)),
@@ -105,6 +118,10 @@ def describe(
         listed_sources(model),
         tuple(found),
         tuple(variable for variable, _ in tuned),
+        model.numberOfContinuousStates,
+        model.numberOfEventIndicators,
+        completes_steps=bool(model.modelExchange and model.modelExchange.needsCompletedIntegratorStep),
+        tolerance=suggested_tolerance(model),
     )
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
@@ -25,6 +25,7 @@ from engines.fmu.description import Description, describe
 from engines.fmu.fmi2 import Fmi2Instance
 from engines.fmu.fmi3 import Fmi3Instance
 from engines.fmu.instance import Instance
+from engines.fmu.model_exchange import Fmi2ModelExchange, Fmi3ModelExchange, default_tolerance
 from engines.fmu.repeated_reads import warn_of_changes
 from engines.fmu.tunable import TunableParameters
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
@@ -37,6 +38,14 @@ from schemas.scenario import Name
 from schemas.vectors import Vector
 
 __all__ = ["FmuEngine", "FmuParams"]
+
+_KINDS = {
+    (2, True): Fmi2Instance,
+    (3, True): Fmi3Instance,
+    (2, False): Fmi2ModelExchange,
+    (3, False): Fmi3ModelExchange,
+}
+"""Class of an instance by FMI's major version, and whether it is for co-simulation."""
 
 
 class FmuParams(Params):
@@ -60,7 +69,17 @@ class FmuParams(Params):
         examples=[{"force": {"unit": "mN", "factor": 0.001}}],
     )
     tolerance: float | None = Field(
-        default=None, gt=0, allow_inf_nan=False, description="relative tolerance of the FMU's own solver"
+        default=None,
+        gt=0,
+        allow_inf_nan=False,
+        description="relative tolerance of the FMU's own solver, or of `solver`",
+    )
+    solver: Literal["cvode"] | None = Field(
+        default=None,
+        description=(
+            "cvode: the FMU's model exchange, integrated by CVode of SUNDIALS; default: the FMU's own"
+            " co-simulation, else cvode"
+        ),
     )
     step: Duration | None = Field(
         default=None,
@@ -129,6 +148,7 @@ class FmuEngine(Stepped):
                 params.path,
                 params.start,
                 strict=params.strict,
+                solver=params.solver,
                 bonds=params.bonds,
                 tunable=params.tunable,
             )
@@ -151,6 +171,15 @@ class FmuEngine(Stepped):
         return self._converted[0]
 
     @property
+    def integration(self) -> str:
+        """Solver of model exchange, for the plan."""
+        description = self._description
+        if description.co_simulation is not None:
+            return ""
+        tolerance = self.params.tolerance or default_tolerance(description.tolerance)
+        return f"model exchange, integrated by CVode (SUNDIALS), relative tolerance {tolerance:g}"
+
+    @property
     def bonds(self) -> tuple[BondSide, ...]:
         """The scenario's bonds; after `configure` with slopes and masses of connected ones."""
         return tuple(self._sides.get(one.side.name, one.side) for one in self._description.bonds)
@@ -170,7 +199,7 @@ class FmuEngine(Stepped):
         self._outputs = {
             port: block.values[part] for block in instance.outputs for port, part in block.parts.items()
         }
-        if instance.can_save and not description.co_simulation.canBeInstantiatedOnlyOncePerProcess:
+        if instance.can_save and not description.interface.canBeInstantiatedOnlyOncePerProcess:
             with closing(self._start()) as twin:
                 self._hashes_state = twin.serialise() == instance.serialise()
         coupling = Coupling(instance, description, step or setup.period_ns, self._start)
@@ -188,7 +217,7 @@ class FmuEngine(Stepped):
     def _start(self) -> Instance:
         """Return an instance at time 0."""
         description = self._description
-        instance = (Fmi2Instance if description.major == 2 else Fmi3Instance)(description, self.name)
+        instance = _KINDS[description.major, description.co_simulation is not None](description, self.name)
         try:
             instance.initialise(description.starts, self.params.tolerance)
         except BaseException:
@@ -282,7 +311,7 @@ class FmuEngine(Stepped):
     def _check_can_save(self) -> None:
         if self._running().can_save:
             return
-        capabilities = self._description.co_simulation
+        capabilities = self._description.interface
         for flag in ("canGetAndSetFMUstate", "canSerializeFMUstate"):
             if not getattr(capabilities, flag):
                 raise StateError(

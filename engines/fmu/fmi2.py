@@ -49,8 +49,10 @@ class Fmi2Instance(Instance):
         options = {"callbacks": fmi2_callbacks(), "loggingOn": log_everything()}
         super().__init__(FMU2Slave, description, name, [options])
         self._do_step: Callable[..., int] = self._function("DoStep")
-        self._varies = description.co_simulation.canHandleVariableCommunicationStepSize
-        self._interpolates = description.co_simulation.canInterpolateInputs and self.library.has(
+        capabilities = description.co_simulation
+        assert capabilities is not None
+        self._varies = capabilities.canHandleVariableCommunicationStepSize
+        self._interpolates = capabilities.canInterpolateInputs and self.library.has(
             "fmi2SetRealInputDerivatives"
         )
         continuous = [

@@ -49,6 +49,7 @@ class Fmi3Instance(Instance):
         from fmpy.fmi3 import FMU3Slave
 
         capabilities = description.co_simulation
+        assert capabilities is not None
 
         def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:  # noqa: ARG001
             log_message(name, status, category, message)
@@ -81,12 +82,7 @@ class Fmi3Instance(Instance):
         ]
 
     def _initialise(self, starts: Sequence[Start], tolerance: float | None) -> None:
-        structural = [start for start in starts if start.structural]
-        if structural:
-            self.call("EnterConfigurationMode")
-            for start in structural:
-                self._set_start(start)
-            self.call("ExitConfigurationMode")
+        self._set_structure(starts)
         for start in starts:
             if not start.structural:
                 self._set_start(start)

@@ -75,7 +75,7 @@ class Instance(ABC):
         with contextlib.ExitStack() as stack:
             directory = stack.enter_context(tempfile.TemporaryDirectory(prefix="trocar-fmu-"))
             unpack(description.path, Path(directory))
-            library = library_path(description.co_simulation.modelIdentifier, description.major)
+            library = library_path(description.interface.modelIdentifier, description.major)
             provide_library(description.path, Path(directory), library, description.sources)
             self._fmu = load_library(slave, description, Path(directory), name)
             stack.callback(self._fmu.freeLibrary)
@@ -124,7 +124,7 @@ class Instance(ABC):
         raise ValueError("there are no options to instantiate an FMU with")
 
     def _can_save(self, description: Description) -> bool:
-        flags = description.co_simulation
+        flags = description.interface
         if not (flags.canGetAndSetFMUstate and flags.canSerializeFMUstate):
             return False
         word = self.state_word
@@ -253,6 +253,15 @@ class Instance(ABC):
             raise self.failure(
                 block.function, status, f" for '{block.refused() if status == DISCARD else block.names}'"
             )
+
+    def _set_structure(self, starts: Sequence[Start]) -> None:
+        """Set structural parameters, in the configuration mode of FMI 3."""
+        structural = [start for start in starts if start.structural]
+        if structural:
+            self.call("EnterConfigurationMode")
+            for start in structural:
+                self._set_start(start)
+            self.call("ExitConfigurationMode")
 
     def _set_start(self, start: Start) -> None:
         if isinstance(start.value, bytes):

@@ -77,7 +77,7 @@ def load_library(slave: type[Any], description: Description, directory: Path, na
         with contextlib.chdir(Path.cwd()):
             return tolerant(
                 guid=description.guid,
-                modelIdentifier=description.co_simulation.modelIdentifier,
+                modelIdentifier=description.interface.modelIdentifier,
                 unzipDirectory=str(directory),
                 instanceName=name,
             )

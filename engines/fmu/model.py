@@ -16,9 +16,9 @@ from schemas.errors import MissingExtraError, ScenarioError
 if TYPE_CHECKING:
     from typing import IO
 
-    from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
+    from fmpy.model_description import InterfaceType, ModelDescription, ModelVariable
 
-__all__ = ["co_simulation", "library_path", "read_model"]
+__all__ = ["interface_of", "library_path", "read_model", "suggested_tolerance"]
 
 _log = logging.getLogger(__name__)
 
@@ -120,26 +120,41 @@ def _shown(text: str, *, most: int = 80) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in text[:most])
 
 
-def co_simulation(path: Path, model: ModelDescription, major: int, names: Collection[str]) -> CoSimulation:
-    """Return the co-simulation part of the FMU with the archive entries `names`.
+def interface_of(
+    path: Path, model: ModelDescription, major: int, names: Collection[str], solver: str | None
+) -> InterfaceType:
+    """Return the used interface of an FMU with the archive entries `names`.
 
-    Raises ScenarioError if there is none for this platform.
+    Co-simulation, if there is a choice; `solver`: `cvode` for model exchange. Raises ScenarioError if there
+    is none for this platform.
     """
-    if model.coSimulation is None:
-        raise ScenarioError(
-            f"'{path}' cannot be co-simulated: it is for model exchange or scheduled execution only. Export"
-            " it for co-simulation."
+    found = model.modelExchange if solver else model.coSimulation or model.modelExchange
+    if found is None:
+        has = "co-simulation" if model.coSimulation else "scheduled execution"
+        remedy = (
+            "leave 'solver' out" if model.coSimulation else "export it for co-simulation or model exchange"
         )
+        raise ScenarioError(f"'{path}' is for {has} only; {remedy}")
     clocks = [v.name for v in model.modelVariables if _is_time_based_input(v)]
     if clocks:
         raise ScenarioError(
             f"'{path}' has time-based input clocks ({', '.join(map(_shown, clocks))}), which Trocar does not"
             " support. Export it without clocks, or with triggered input clocks."
         )
-    library = library_path(model.coSimulation.modelIdentifier, major)
+    library = library_path(found.modelIdentifier, major)
     if library not in names:
         _require_compiler(path, library, names, has_sources=bool(listed_sources(model)))
-    return model.coSimulation
+    return found
+
+
+def suggested_tolerance(model: ModelDescription) -> float | None:
+    """Return the relative tolerance of the FMU's default experiment, if it is one."""
+    stated = model.defaultExperiment and model.defaultExperiment.tolerance
+    try:
+        tolerance = float(stated or 0.0)
+    except ValueError:
+        return None
+    return tolerance if 0.0 < tolerance < 1.0 else None
 
 
 def _is_time_based_input(row: ModelVariable) -> bool:

@@ -34,7 +34,7 @@ class Derivatives:
     def offered(instance: Instance, description: Description, bond: BondVariables) -> bool:
         """Return whether the FMU has directional derivatives of scalars."""
         scalars = all(variable.size == 1 for variable in bond.inputs + bond.force.variables)
-        has = description.co_simulation.providesDirectionalDerivative
+        has = description.interface.providesDirectionalDerivative
         return has and scalars and instance.library.has(f"{instance.prefix}GetDirectionalDerivative")
 
     def read(self) -> tuple[Vector, Vector]:

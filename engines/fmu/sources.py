@@ -39,7 +39,8 @@ def listed_sources(model: ModelDescription) -> tuple[str, ...]:
 
 
 def _identifier(model: ModelDescription) -> str | None:
-    return model.coSimulation.modelIdentifier if model.coSimulation else None
+    used = model.coSimulation or model.modelExchange
+    return used.modelIdentifier if used else None
 
 
 def provide_library(path: Path, directory: Path, library: str, sources: tuple[str, ...]) -> None:

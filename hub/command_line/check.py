@@ -66,6 +66,8 @@ def _print_plan(plan: Plan, *, with_ports: bool) -> None:
             f" {planned.host}{escape(_time(planned))}",
             soft_wrap=True,
         )
+        if planned.integration:
+            results.print(f"    {escape(planned.integration)}", soft_wrap=True)
         if not with_ports:
             results.print(f"    {_counts(planned, sources)}", soft_wrap=True)
         for port in planned.ports if with_ports else ():

@@ -100,6 +100,11 @@ class Stepped(Participant):
     """
 
     @property
+    def integration(self) -> str:
+        """How an engine integrates its equations, for the plan; empty: as its kind always does."""
+        return ""
+
+    @property
     def bonds(self) -> tuple[BondSide, ...]:
         """The bonds available for connection; after `configure` with their effective masses."""
         return ()

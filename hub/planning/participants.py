@@ -59,6 +59,7 @@ def plan_participant(
         use_ns=participant.use_period_ns if isinstance(participant, Device) else 0,
         network_link=spec.network_link,
         rate_limit=spec.rate_limit,
+        integration="" if isinstance(participant, Device) else participant.integration,
         ports=ports,
         bonds=tuple(sides),
         bond_plans=_bond_plans(name, bonds, period_ns),

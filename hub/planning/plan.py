@@ -51,6 +51,8 @@ class PlannedParticipant(_Part):
     """The participant only looks, in its own time: it has no place in the order and is never waited for."""
     lock_step: str = ""
     """Reason for lock-step of a participant that only looks, in words; empty for all others."""
+    integration: str = ""
+    """How an engine integrates its equations, in words, where its kind leaves a choice."""
     ports: tuple[Port, ...]
     bonds: tuple[BondSide, ...] = ()
     bond_plans: dict[str, BondPlan] = {}

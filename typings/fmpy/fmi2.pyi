@@ -11,6 +11,14 @@ class fmi2CallbackFunctions(Structure):
     allocateMemory: Any
     freeMemory: Any
 
+class fmi2EventInfo(Structure):
+    newDiscreteStatesNeeded: int
+    terminateSimulation: int
+    nextEventTimeDefined: int
+    nextEventTime: float
+
+class FMU2Model: ...
+
 class FMU2Slave:
     dll: CDLL
     component: int | None

@@ -1,6 +1,8 @@
 from collections.abc import Callable
 from ctypes import CDLL
 
+class FMU3Model: ...
+
 class FMU3Slave:
     dll: CDLL
     component: int | None

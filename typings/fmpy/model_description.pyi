@@ -24,16 +24,22 @@ class Unit:
 
 class DefaultExperiment:
     stepSize: str | None
+    tolerance: str | None
 
-class CoSimulation:
+class InterfaceType:
     modelIdentifier: str
-    canHandleVariableCommunicationStepSize: bool
-    canInterpolateInputs: bool
     canBeInstantiatedOnlyOncePerProcess: bool
     canGetAndSetFMUstate: bool
     canSerializeFMUstate: bool
-    hasEventMode: bool
     providesDirectionalDerivative: bool
+
+class ModelExchange(InterfaceType):
+    needsCompletedIntegratorStep: bool
+
+class CoSimulation(InterfaceType):
+    canHandleVariableCommunicationStepSize: bool
+    canInterpolateInputs: bool
+    hasEventMode: bool
 
 class SourceFileSet:
     sourceFiles: list[str]
@@ -69,7 +75,10 @@ class ModelDescription:
     fmiVersion: str
     guid: str
     coSimulation: CoSimulation | None
+    modelExchange: ModelExchange | None
     defaultExperiment: DefaultExperiment | None
+    numberOfContinuousStates: int
+    numberOfEventIndicators: int
     modelVariables: list[ModelVariable]
     unitDefinitions: list[Unit]
     buildConfigurations: list[BuildConfiguration]

@@ -100,12 +100,13 @@ class TestBadFmus:
         ("model", "edits", "expected"),
         [
             (
-                SPRING,
+                BALL,
                 {
-                    "<CoSimulation ": "<ModelExchange ",
-                    'canHandleVariableCommunicationStepSize="true" canInterpolateInputs="true" ': "",
+                    "<CoSimulation ": "<ScheduledExecution ",
+                    'canHandleVariableCommunicationStepSize="true" ': "",
+                    ' hasEventMode="true" mightReturnEarlyFromDoStep="true"': "",
                 },
-                "model exchange",
+                "is for scheduled execution only; export it for co-simulation or model exchange",
             ),
             (SPRING, {'fmiVersion="2.0"': 'fmiVersion="4.0"'}, "Unsupported FMI version"),
             (SPRING, {"<ModelVariables>": "<Model"}, "XMLSyntaxError"),

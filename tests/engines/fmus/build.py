@@ -14,7 +14,12 @@ HERE = Path(__file__).parent
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 USABLE = COMPILER is not None and sys.platform == "linux" and platform.machine() == "x86_64"
 WHY_NOT = "the test FMUs are compiled from C: this needs 'cc' or 'gcc' and Linux on x86_64"
-FOLDERS = {"mass_spring_damper": "linux64", "bouncing_ball": "x86_64-linux", "stair": "linux64"}
+FOLDERS = {
+    "mass_spring_damper": "linux64",
+    "bouncing_ball": "x86_64-linux",
+    "stair": "linux64",
+    "hopper": "linux64",
+}
 """Platform folders of FMI 2.0 and 3.0."""
 
 
@@ -34,12 +39,13 @@ def pack(
     path: Path,
     edits: Mapping[str, str] | None = None,
     folder: str | None = None,
+    description: str = "modelDescription.xml",
 ) -> Path:
     """Write the FMU of `model` to `path`.
 
-    Each key of `edits` is replaced by its value in modelDescription.xml.
+    Each key of `edits` is replaced by its value in the model's file `description`.
     """
-    text = (HERE / model / "modelDescription.xml").read_text()
+    text = (HERE / model / description).read_text()
     for old, new in (edits or {}).items():
         assert old in text, old
         text = text.replace(old, new)
