@@ -10,13 +10,15 @@
 `Client` has the arms (`Arm`, with `JointGroup` for the jaw and `Tip` for further frames) and cameras
 (`Camera`) of the session. `Handle` is a command under way; `Joints`, `Pose`, `Twist`, `Wrench` and `Picture`
 are values. `MotionError` is a refusal by the arm, `SessionError` the end of the session, `ConnectError` a
-session or a value that is not there. docs/how-to/programs.md.
+session or a value that is not there. `IsaacTeleopPsm` lets an arm follow NVIDIA's IsaacTeleop.
+docs/how-to/programs.md.
 """
 
 from devices.programs.arm import Arm, JointGroup, Tip
 from devices.programs.camera import Camera
 from devices.programs.client import Client
 from devices.programs.handles import Handle
+from devices.programs.isaac_teleop import IsaacTeleopPsm
 from devices.programs.sessions import connect
 from devices.programs.values import Joints, Picture, Pose, Twist, Wrench
 from schemas.errors import ConnectError, MotionError, SessionError
@@ -27,6 +29,7 @@ __all__ = [
     "Client",
     "ConnectError",
     "Handle",
+    "IsaacTeleopPsm",
     "JointGroup",
     "Joints",
     "MotionError",

@@ -19,7 +19,7 @@ from devices.programs.sessions import _find_hub
 from hub.transport.hub_files import hub_file, running_hubs
 from tests.hub.authorities import Authority, free_port
 from tests.waiting import LIMIT_S, until
-from trocar.programs import ConnectError, MotionError, Pose, SessionError, connect
+from trocar.programs import ConnectError, IsaacTeleopPsm, MotionError, Pose, SessionError, connect
 
 pytest.importorskip("ruckig")
 pytest.importorskip("mujoco")
@@ -95,6 +95,36 @@ def test_an_arm_moves_and_its_pose_is_that_of_the_kinematics(program):
     assert (pose.frame, arm.measured_cp().frame) == ("PSM1_base", "ECM")
     assert np.abs(arm.measured_cv().linear).max() < 0.01
     assert arm.body.measured_cf().force.shape == (3,)
+
+
+def test_an_arm_follows_isaac_teleop(program):
+    lead = IsaacTeleopPsm(program.PSM1)
+    home = program.PSM1.setpoint_cp()
+    assert lead.home == pytest.approx(home.matrix, abs=1e-9)
+    squeezed = np.concatenate([home.position, home.orientation]).astype(np.float32)
+    for moved, jaws, opening in (
+        (0.0, (-0.5, 0.5), 1.0),
+        (0.005, (-0.295, 0.295), 0.5),
+        (0.01, (-0.09, 0.09), 0.0),
+    ):
+        goal = squeezed + np.array([moved, 0, 0, 0, 0, 0, 0], np.float32)
+
+        def followed(goal=goal, jaws=jaws, opening=opening):
+            lead.follow(goal, np.array(jaws, np.float32))
+            tip, jaw = program.PSM1.setpoint_cp(), program.PSM1.jaw.setpoint_js().position
+            return np.allclose(tip.position, goal[:3], atol=1e-5) and np.allclose(jaw, [opening], atol=1e-5)
+
+        until(followed)
+    for pose, jaws in (
+        (squeezed[:6], (0.0, 0.0)),
+        (squeezed * np.nan, (0.0, 0.0)),
+        (np.zeros(7), (0.0, 0.0)),
+        (squeezed, (0.0,)),
+    ):
+        with pytest.raises(MotionError, match=r"PSM1: (ee_pose|jaw_targets|the quaternion)"):
+            lead.follow(pose, jaws)
+    with pytest.raises(MotionError, match="does not open"):
+        IsaacTeleopPsm(program.PSM1, jaw_open=(0.0, 0.0))
 
 
 def test_the_tip_and_the_jaw_move(program):
