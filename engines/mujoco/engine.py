@@ -154,6 +154,7 @@ class MujocoEngine(Stepped):
         """
         from engines.mujoco.arms.brakes import Brakes
         from engines.mujoco.arms.exchange import Exchange
+        from engines.mujoco.arms.hands import Hands
         from engines.mujoco.arms.readings import Readings
         from engines.mujoco.arms.servos import Servos
         from engines.mujoco.interaction.holding import Holding
@@ -174,8 +175,9 @@ class MujocoEngine(Stepped):
             engaged=lambda: self._exchange.engaged,
         )
         self._brakes = Brakes(model, data, params)
+        self._hands = Hands(model, data, params.arms, period)
         self._holding = Holding(model, data, params, params.publish_period * 1e-9)
-        self._outputs.update({**self._readings.outputs, **self._holding.outputs})
+        self._outputs.update({**self._readings.outputs, **self._holding.outputs, **self._hands.outputs})
 
     def _build_contacts(self, period_ns: int) -> None:
         """Make the sums of rigid contact forces, if the scenario wants them."""
@@ -197,6 +199,7 @@ class MujocoEngine(Stepped):
             self._servos,
             self._brakes,
             self._holding,
+            *([self._hands] if self._hands.outputs else []),
             *(touching.motion for touching in self._touching),
             *([] if self._rigid is None or self._rigid.collisions is None else [self._rigid.collisions]),
         ]
@@ -312,6 +315,7 @@ class MujocoEngine(Stepped):
             self._exchange_instruments(inputs)
         self._servos.begin(inputs)
         self._brakes.set(on="ECM" in self._servos.off)
+        self._hands.begin(inputs)
         if self._rigid is None and not self._touching:
             self._sub_steps(h // self.params.timestep)
             self._mujoco.mj_step1(self._model, self._data)
@@ -322,6 +326,7 @@ class MujocoEngine(Stepped):
     def _finish(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Read arms, objects and contacts at the end of the step from `t`."""
         self._readings.update()
+        self._hands.update()
         if (t + h) % self.params.publish_period == 0:
             self._readings.refresh()
             self._holding.update()
@@ -487,6 +492,7 @@ class MujocoEngine(Stepped):
         self._readings.update()
         self._readings.refresh()
         self._holding.refresh()
+        self._hands.refresh()
         if self._rigid is not None:
             self._rigid.refresh()
         for touching in self._touching:

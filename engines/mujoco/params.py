@@ -24,9 +24,9 @@ from engines.mujoco.object_params import ObjectParams, TableParams
 from engines.mujoco.tools import instrument_tools
 from hub.participant import Params, Tool, ToolParams
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
-from robots.dvrk.mounted import MountedArms, MountedEcm, MountedPsm
+from robots.dvrk.mounted import AnyArm, MountedArms, MountedMtm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
-from robots.dvrk.setup_joints import SIMULATED, CartArm, base_pose
+from robots.dvrk.setup_joints import SIMULATED, CartArm, DrivenArm, base_pose
 from robots.training.fixtures import FixtureParams
 from schemas.errors import did_you_mean
 from schemas.keys import valid_name
@@ -66,15 +66,15 @@ def _object_names(objects: Mapping[str, ObjectParams]) -> Mapping[str, ObjectPar
 
 
 class SceneParams(Params):
-    """A scene: arms of a da Vinci Research Kit, a table, fixtures and objects."""
+    """A scene: arms of a da Vinci Research Kit, masters at its console, a table, fixtures and objects."""
 
     model: Literal["dvrk"] = "dvrk"
-    arms: Annotated[dict[CartArm, MountedPsm | MountedEcm], _validated_as(MountedArms), Field(min_length=1)]
+    arms: Annotated[dict[DrivenArm, AnyArm], _validated_as(MountedArms), Field(min_length=1)]
     mounting: Literal["free", "cart"] = Field(
         default="free",
         description=(
             "each arm at its own position and orientation, or on the setup joints of the cart, whose frame is"
-            " then the world"
+            " then the world; masters stand at the console either way"
         ),
     )
     setup_joints: Annotated[dict[CartArm, SetupPositions], _validated_as(_SetupJoints)] = Field(
@@ -112,9 +112,9 @@ class SceneParams(Params):
         ),
     )
 
-    def base_pose(self, arm: CartArm) -> Vector:
+    def base_pose(self, arm: DrivenArm) -> Vector:
         """Return the pose of the arm's base frame in the world, shape (4, 4)."""
-        if self.mounting == "cart":
+        if self.mounting == "cart" and arm != "MTML" and arm != "MTMR":
             return base_pose(arm, np.array(self.setup_joints.get(arm, SIMULATED[arm])))
         return self.arms[arm].pose
 
@@ -123,7 +123,9 @@ class SceneParams(Params):
         if self.mounting == "free" and self.setup_joints:
             raise ValueError("setup_joints belong to the cart: set 'mounting: cart', or leave them out")
         placed = [
-            name for name, arm in self.arms.items() if arm.model_fields_set & {"position", "orientation"}
+            name
+            for name, arm in self.arms.items()
+            if arm.model_fields_set & {"position", "orientation"} and not isinstance(arm, MountedMtm)
         ]
         if self.mounting == "cart" and placed:
             raise ValueError(

@@ -11,7 +11,8 @@ from engines.mujoco.params import MujocoParams, SceneParams
 from hub.participant import event_in, signal_in, signal_out, tunable_in
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.linkage import LINKAGES
-from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
+from robots.dvrk.mounted import AnyArm, MountedArm, MountedMtm, MountedPsm
+from robots.dvrk.mtm import DISPLAY_FRAME
 from robots.dvrk.psm import ARM_JOINTS
 from robots.serial_chain import Joint
 from schemas.ports import COORDINATE_UNITS, BondSide, Port
@@ -31,6 +32,7 @@ _GRAVITY_M_PER_S2 = 9.81
 """MuJoCo's default."""
 _MOST_GRAVITY_M_PER_S2 = 25.0
 """A little more than on Jupiter."""
+_NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 _FREE_BODY = 7
 """Position and quaternion."""
 
@@ -109,7 +111,7 @@ def _arm_bonds(name: str, arm: MountedArm) -> Iterator[BondSide]:
             yield BondSide(name=f"{owner}/contact", side="motion", dof=3, points=len(spheres), frame="world")
 
 
-def _arm_ports(arm: str, params: MountedPsm | MountedEcm, engine: MujocoParams) -> Iterator[Port]:
+def _arm_ports(arm: str, params: AnyArm, engine: MujocoParams) -> Iterator[Port]:
     slow, base = engine.publish_period, f"{arm}_base"
     names = tuple(joint.name for joint in params.chain.joints)
     yield from _servo_ports(arm, names, params.start, "goal of the joint servos")
@@ -120,6 +122,8 @@ def _arm_ports(arm: str, params: MountedPsm | MountedEcm, engine: MujocoParams) 
     yield signal_out(f"{arm}/measured_js", JointState, names=names, fields=_ALL)
     yield signal_out(f"{arm}/setpoint_js", JointState, names=names, period_ns=slow)
     yield signal_out(f"{arm}/measured_cp", PoseStamped, frame=base, period_ns=slow)
+    if isinstance(params, MountedMtm):
+        yield from _hand_ports(arm)
     if any(True for _ in _arm_bonds(arm, params)):
         felt = (
             "mean over the last step of the force through the bonds on the instrument, with its moment about"
@@ -132,6 +136,17 @@ def _arm_ports(arm: str, params: MountedPsm | MountedEcm, engine: MujocoParams) 
             " its weight"
         )
         yield signal_out(f"{arm}/rigid_wrench", WrenchStamped, felt, frame=base)
+
+
+def _hand_ports(arm: str) -> Iterator[Port]:
+    where, firmly = (
+        "pose of the hand on the gripper",
+        "how firmly the hand holds the gripper: 0 not at all, 1",
+    )
+    felt = "what the hand feels, at the gripper"
+    yield signal_in(f"{arm}/hand_cp", PoseStamped, where, frame=DISPLAY_FRAME, start=_NO_POSE)
+    yield signal_in(f"{arm}/hand_grip", Float64Message, firmly, start=(0.0,))
+    yield signal_out(f"{arm}/hand_cf", WrenchStamped, felt, frame=DISPLAY_FRAME)
 
 
 def _servo_ports(owner: str, names: tuple[str, ...], start: tuple[float, ...], goal: str) -> Iterator[Port]:

@@ -3,7 +3,8 @@
 PSM: the bodies of the arm are fitted so that the arm has the identified dynamics (`robots.dvrk.identified`)
 with an instrument mounted; `bench/identified_inertia.py` makes the numbers in `data/psm_inertia.json`. ECM:
 masses and centres from CAD, not identified; dvrk_env = WPI-AIM/dvrk_env (commit 675a3fa),
-dvrk_description/ecm/ecm.urdf.xacro. See docs/decisions/0010.
+dvrk_description/ecm/ecm.urdf.xacro. MTM: fitted to its identification (`robots.dvrk.identified_mtm`);
+`bench/identified_mtm_inertia.py` makes the numbers in `data/mtm_inertia.json`. See docs/decisions/0010.
 
 SI units. All bodies of an arm stand in its base frame (origin in the remote centre of motion) with every
 joint at 0, insertion included.
@@ -21,11 +22,13 @@ import numpy as np
 
 from robots.dvrk.ecm import chain as ecm_chain
 from robots.dvrk.end_effectors.end_effector import Mount
+from robots.dvrk.end_effectors.master_gripper import MasterGripper
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS, Instrument
+from robots.dvrk.mtm import chain as mtm_chain
 from robots.dvrk.psm import chain as psm_chain
 
-__all__ = ["ENDOSCOPE_MASS", "SHAFT_MASS", "ecm", "instrument", "psm"]
+__all__ = ["ENDOSCOPE_MASS", "SHAFT_MASS", "ecm", "instrument", "mtm", "psm"]
 
 
 SHAFT_MASS = 0.0117201
@@ -48,12 +51,17 @@ _ENDOSCOPE_LENGTH, _ENDOSCOPE_RADIUS = 0.603, 0.035
 
 def psm(tool: Instrument) -> Mapping[str, Inertia]:
     """Return the bodies of a PSM with `tool` by link; the instrument's housing is part of the insertion."""
-    return {**_arm_of_psm(), **instrument(tool)}
+    return {**_fitted("psm"), **instrument(tool)}
+
+
+def mtm() -> Mapping[str, Inertia]:
+    """Return the bodies of a master by link, with its gripper; left and right are taken as alike."""
+    return {**_fitted("mtm"), **MasterGripper().bodies(Mount.on(mtm_chain("MTML")))}
 
 
 @cache
-def _arm_of_psm() -> Mapping[str, Inertia]:
-    data = json.loads(files("robots.dvrk").joinpath("data/psm_inertia.json").read_text(encoding="utf-8"))
+def _fitted(arm: str) -> Mapping[str, Inertia]:
+    data = json.loads(files("robots.dvrk").joinpath(f"data/{arm}_inertia.json").read_text(encoding="utf-8"))
     return {
         name: Inertia(row["mass"], np.array(row["centre"]), np.array(row["tensor"]))
         for name, row in data["bodies"].items()

@@ -18,13 +18,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from robots.dvrk import ecm
+from robots.dvrk import ecm, identified_mtm, mtm
 from robots.dvrk import psm as psm_arm
 from robots.dvrk.drive import JAW_COLUMN, Disc, Drive, disc_shares
 from robots.dvrk.instruments import Instrument
 from schemas.plain_sum import plain_sum
 
-__all__ = ["ECM", "discs", "friction", "psm"]
+__all__ = ["ECM", "MTM", "discs", "friction", "psm"]
 
 _ARM = {
     "yaw": (120.0, 6.0, 0.136392294, 0.063000355, 0.135144709, 0.00726440463),
@@ -104,6 +104,30 @@ def _of_ecm() -> Mapping[str, Drive]:
 
 ECM = _of_ecm()
 """The drives of the ECM by joint."""
+
+
+_MTM_GAINS = ((100.0, 10.0), (80.0, 5.0), (80.0, 5.0), (3.0, 0.35), (1.0, 0.028), (0.4, 0.015), (0.15, 0.005))
+"""p, d of the seven joints (SAW share/pid/sawControllersPID-MTM.json)."""
+_ROLL_STIFFNESS, _ROLL_DAMPING = _MTM_GAINS[-1]
+_ROLL_ROTOR = _ROLL_DAMPING**2 / (4.0 * _ROLL_STIFFNESS)
+"""kg m^2 of the wrist roll's motor: no identification sees it; the gains damp this value critically."""
+
+
+def _of_mtm() -> Mapping[str, Drive]:
+    """Return the drives of a master by joint, with the identified friction of the motors."""
+    joints, losses = mtm.chain("MTML").joints, identified_mtm.FRICTION
+    rotors = (*(0.0,) * (len(joints) - 1), _ROLL_ROTOR)
+    rows = zip(joints, _MTM_GAINS, losses, rotors, strict=True)
+    return MappingProxyType(
+        {
+            joint.name: Drive(*gains, *lost, 0.0, 0.0, rotor, joint.effort, joint.velocity)
+            for joint, gains, lost, rotor in rows
+        }
+    )
+
+
+MTM = _of_mtm()
+"""The drives of a master by joint."""
 
 
 def friction(

@@ -18,12 +18,22 @@ from typing import Literal
 
 from schemas.plain_sum import plain_sum
 
-__all__ = ["ECM", "INSERTION_AXIS", "LINKAGES", "PITCH_AXIS", "PSM", "Linkage", "PassiveJoint", "Pin"]
+__all__ = [
+    "ECM",
+    "INSERTION_AXIS",
+    "LINKAGES",
+    "MTM",
+    "PITCH_AXIS",
+    "PSM",
+    "Linkage",
+    "PassiveJoint",
+    "Pin",
+]
 
 Point = tuple[float, float, float]
 
 PITCH_AXIS: Point = (-1.0, 0.0, 0.0)
-"""Axis of the pitch joint and of every pivot, in the base frame with every joint at 0."""
+"""Axis of the pitch joint, a master's elbow and every pivot, in the base frame with every joint at 0."""
 INSERTION_AXIS: Point = (0.0, 0.0, -1.0)
 """Direction of the insertion, same frame."""
 
@@ -35,10 +45,8 @@ class PassiveJoint:
     name: str
     """Name of the body and of the joint."""
     parent: str
-    follows: Literal["pitch", "insertion"]
-    """The joint of the arm that decides the position of this one: a hinge follows the pitch, a slide the
-    insertion.
-    """
+    follows: Literal["pitch", "insertion", "elbow_pitch"]
+    """Joint of the arm that decides the position: pitch or elbow of a hinge, insertion of a slide."""
     ratio: float
     """Position of this joint over that of the joint it follows."""
     pivot: Point
@@ -125,5 +133,21 @@ ECM = Linkage(
     ),
 )
 
-LINKAGES: Mapping[str, Linkage] = {"PSM1": PSM, "PSM2": PSM, "PSM3": PSM, "ECM": ECM}
+# MTM (model of WPI-AIM/dvrk_dynamics_identification, commit 7697d3a, main_mtm.ipynb: l_b2f and l_arm). Crank
+# and bar drive the forearm from a motor at the shoulder; here the forearm leads them.
+_MTM_CRANK, _MTM_UPPER_ARM = (-0.100, 0.0), (0.0, -0.2794)
+
+MTM = Linkage(
+    joints=(
+        PassiveJoint("crank", "shoulder_pitch", "elbow_pitch", 1.0, (0.0, 0.0, 0.0)),
+        PassiveJoint("bar", "crank", "elbow_pitch", -1.0, _at(_MTM_CRANK)),
+    ),
+    pins=(Pin(("bar", "elbow_pitch"), _at(_MTM_CRANK, _MTM_UPPER_ARM)),),
+)
+
+LINKAGES: Mapping[str, Linkage] = {
+    **dict.fromkeys(("PSM1", "PSM2", "PSM3"), PSM),
+    "ECM": ECM,
+    **dict.fromkeys(("MTML", "MTMR"), MTM),
+}
 """Linkage by the arm's name."""

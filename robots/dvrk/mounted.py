@@ -1,4 +1,4 @@
-"""The arms of a patient cart in a scenario: base pose, tool and start of each arm.
+"""The arms of cart and console in a scenario: base pose, tool and start of each arm.
 
 SI units, radians.
 """
@@ -9,8 +9,9 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from math import radians
 from pathlib import Path
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import (
@@ -25,16 +26,18 @@ from pydantic import (
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
 from robots import rotation
-from robots.dvrk import arm_bodies, drives, ecm, psm
+from robots.dvrk import arm_bodies, drives, ecm, mtm, psm
 from robots.dvrk.drive import Disc, Drive
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
 from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.end_effectors.end_effector import EndEffector, Mount
 from robots.dvrk.end_effectors.jaw import Jaw
+from robots.dvrk.end_effectors.master_gripper import MasterGripper
 from robots.dvrk.end_effectors.own_jaw import JawFile, with_own_jaw
 from robots.dvrk.end_effectors.probe import PROBE_RADIUS, Probe
 from robots.dvrk.end_effectors.scissors import Scissors
 from robots.dvrk.end_effectors.suction_tube import SuctionTube
+from robots.dvrk.hand_on_master import HandOnMaster
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import Instrument, instrument
 from robots.dvrk.link import Link
@@ -45,6 +48,7 @@ from robots.dvrk.parameters import (
     HandPositions,
     InstrumentName,
     MountedPositions,
+    MtmPositions,
     UnitQuaternion,
     check_start,
     home,
@@ -58,7 +62,18 @@ from schemas.quantity import Angle, Length
 from schemas.scenario import Name
 from schemas.vectors import Vector
 
-__all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedArms", "MountedEcm", "MountedPsm", "PsmTool"]
+__all__ = [
+    "DEFAULT_INSTRUMENT",
+    "AnyArm",
+    "MountedArm",
+    "MountedArms",
+    "MountedEcm",
+    "MountedMtm",
+    "MountedMtml",
+    "MountedMtmr",
+    "MountedPsm",
+    "PsmTool",
+]
 
 DEFAULT_INSTRUMENT = "palpation-probe"
 
@@ -398,11 +413,90 @@ class MountedEcm(MountedArm):
         return self
 
 
+class MountedMtm(MountedArm):
+    """A master at the surgeon's console: where the stereo viewer stands, and start."""
+
+    position: tuple[Length, Length, Length] = Field(
+        default=(-1.9, 0.9, 0.95), description="of the stereo viewer (HRSV) in the world; the same for both"
+    )
+    orientation: UnitQuaternion = Field(
+        default=(0.6830127018922194, 0.6830127018922194, 0.1830127018922193, 0.1830127018922193),
+        description=(
+            "of the stereo viewer in the world, x to the left of the surgeon, y up, z ahead in the picture:"
+            " quaternion x, y, z, w"
+        ),
+    )
+    start: MtmPositions = Field(
+        default=mtm.HOME, description=f"joint positions at time 0: {', '.join(mtm.JOINT_NAMES)}"
+    )
+    gripper: Angle = Field(
+        default=radians(30.0), ge=0.0, le=mtm.GRIPPER_OPEN, description="opening of the gripper at time 0"
+    )
+
+    hand: HandOnMaster = Field(default=HandOnMaster(), description="how firmly a hand holds the gripper")
+
+    side: ClassVar[mtm.MtmName]
+    """Name of the arm."""
+
+    @property
+    def viewer_pose(self) -> Vector:
+        """Pose of the stereo viewer in the world, shape (4, 4)."""
+        return super().pose
+
+    @property
+    def pose(self) -> Vector:
+        """Pose of the base frame in the world, shape (4, 4)."""
+        return self.viewer_pose @ mtm.BASE[self.side]
+
+    @cached_property
+    def chain(self) -> SerialChain:
+        """The arm's kinematics, from `<arm>_base` to the gripper."""
+        return mtm.chain(self.side)
+
+    @property
+    def end_effector(self) -> MasterGripper:
+        """The gripper."""
+        return MasterGripper()
+
+    @property
+    def end_effector_start(self) -> tuple[float, ...]:
+        """Opening of the gripper at time 0."""
+        return (self.gripper,)
+
+    @property
+    def _published(self) -> _Published:
+        fingers = {motor.name: motor.drive for motor in self.end_effector.motors}
+        return arm_bodies.mtm(), {**drives.MTM, **fingers}, ()
+
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        check_start(self.chain, self.start)
+        return self
+
+
+class MountedMtml(MountedMtm):
+    """The left master."""
+
+    side: ClassVar[mtm.MtmName] = "MTML"
+
+
+class MountedMtmr(MountedMtm):
+    """The right master."""
+
+    side: ClassVar[mtm.MtmName] = "MTMR"
+
+
+AnyArm = MountedPsm | MountedEcm | MountedMtm
+"""Any simulated arm."""
+
+
 @with_config(ConfigDict(extra="forbid"))
 class MountedArms(TypedDict, total=False):
-    """The arms of a cart by name, for validation."""
+    """The arms of cart and console by name, for validation."""
 
     PSM1: MountedPsm
     PSM2: MountedPsm
     PSM3: MountedPsm
     ECM: MountedEcm
+    MTML: MountedMtml
+    MTMR: MountedMtmr

@@ -15,7 +15,16 @@ import numpy as np
 from robots.serial_chain import Joint, SerialChain, jerk_limit
 from schemas.vectors import Vector
 
-__all__ = ["ACTUATOR_TO_JOINT", "BASE", "MtmName", "chain"]
+__all__ = [
+    "ACTUATOR_TO_JOINT",
+    "BASE",
+    "DISPLAY_FRAME",
+    "GRIPPER_OPEN",
+    "HOME",
+    "JOINT_NAMES",
+    "MtmName",
+    "chain",
+]
 
 MtmName = Literal["MTML", "MTMR"]
 
@@ -52,7 +61,17 @@ def _base(side: float) -> Vector:
 BASE = {"MTML": _base(0.180), "MTMR": _base(-0.180)}
 """Pose of `<arm>_base` in the frame of the stereo viewer (HRSV), shape (4, 4) (SAW
 share/system/system-full-system-simulated.json).
+
+The viewer's frame is that of a camera's view: x to the left, y up, z ahead, 60 degrees down. The base stands
+upright: x to the right, y ahead, z up.
 """
+DISPLAY_FRAME = "HRSV"
+"""`frame_id` of the stereo viewer (same file)."""
+
+HOME = (0.0,) * 7
+"""Joint positions after homing (SAW mtsIntuitiveResearchKitMTM.cpp, SetGoalHomingArm)."""
+GRIPPER_OPEN = radians(60.0)
+"""Largest opening of the gripper (SAW mtsIntuitiveResearchKit.h, GripperMax)."""
 
 
 def _joints(arm: MtmName) -> tuple[Joint, ...]:
@@ -115,3 +134,6 @@ def _joints(arm: MtmName) -> tuple[Joint, ...]:
 def chain(arm: MtmName) -> SerialChain:
     """Return the kinematics of the arm, from `<arm>_base`, its first DH frame, to the gripper."""
     return SerialChain.from_standard(_joints(arm), np.eye(4))
+
+
+JOINT_NAMES = tuple(joint.name for joint in _joints("MTML"))

@@ -24,6 +24,7 @@ __all__ = [
     "HandPositions",
     "InstrumentName",
     "MountedPositions",
+    "MtmPositions",
     "SetupPositions",
     "UnitQuaternion",
     "check_start",
@@ -74,6 +75,9 @@ InstrumentName = Annotated[
 
 EcmPositions = tuple[Angle, Angle, Length, Angle]
 """Positions of the ECM's four joints (rad, m)."""
+
+MtmPositions = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle]
+"""Positions of a master's seven joints (rad)."""
 
 SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
 """Positions of the setup joints of an arm: the lift (m), then five angles."""

@@ -17,10 +17,22 @@ from typing import Literal
 from robots.serial_chain import Joint, SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["CART_MASS", "JOINT_NAMES", "MASSES", "SIMULATED", "CartArm", "base_pose", "chain", "joint_names"]
+__all__ = [
+    "CART_MASS",
+    "JOINT_NAMES",
+    "MASSES",
+    "SIMULATED",
+    "CartArm",
+    "DrivenArm",
+    "base_pose",
+    "chain",
+    "joint_names",
+]
 
 CartArm = Literal["PSM1", "PSM2", "PSM3", "ECM"]
 """The arms on the cart."""
+DrivenArm = CartArm | Literal["MTML", "MTMR"]
+"""The arms with drives, masters included."""
 
 JOINT_NAMES = ("lift", "shoulder", "elbow", "wrist", "tilt", "mount")
 

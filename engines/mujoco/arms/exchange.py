@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from engines.mujoco.model.names import PARKED_M, SEAT
 from hub.participant import Inputs
-from robots.dvrk.mounted import MountedEcm, MountedPsm
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.mounted import AnyArm
+from robots.dvrk.setup_joints import DrivenArm
 from schemas.errors import SessionError
 from schemas.vectors import Vector
 
@@ -52,12 +52,10 @@ class _Instrument:
 class Exchange:
     """Puts the instrument asked for into the seat of each arm with spares."""
 
-    def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, MountedPsm | MountedEcm]
-    ) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[DrivenArm, AnyArm]) -> None:
         """Put the mounted instruments into the seats."""
         self._model, self._data = model, data
-        self._arms: dict[str, MountedPsm | MountedEcm] = {
+        self._arms: dict[str, AnyArm] = {
             name: params for name, params in arms.items() if len(params.variants) > 1
         }
         self.owners = {str(name): list(params.by_owner(name)) for name, params in self._arms.items()}

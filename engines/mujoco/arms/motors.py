@@ -15,8 +15,8 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model.leading import to_all_joints
-from robots.dvrk.mounted import MountedEcm, MountedPsm
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.mounted import AnyArm
+from robots.dvrk.setup_joints import DrivenArm
 from schemas.vectors import Vector
 
 __all__ = ["Motors"]
@@ -30,7 +30,7 @@ class Motors:
         self._model, self._data = model, data
         self._rows: list[tuple[Vector, Vector, Vector, list[int], list[int]]] = []
 
-    def add(self, arm: CartArm, params: MountedPsm | MountedEcm, sensed: Vector) -> Vector:
+    def add(self, arm: DrivenArm, params: AnyArm, sensed: Vector) -> Vector:
         """Return the joint state of `arm`, shape (3 n,), from the sensors' joint state, same shape."""
         names = [f"{arm}/{joint.name}" for joint in params.chain.joints]
         whole = np.empty_like(sensed)

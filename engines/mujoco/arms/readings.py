@@ -15,8 +15,8 @@ from engines.mujoco.model import first_sensor
 from engines.mujoco.model.end_effector import sensed_motors
 from engines.mujoco.model.poses import ROS_ORDER
 from robots.dvrk.end_effectors.end_effector import EndEffector
-from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.mounted import AnyArm, MountedArm
+from robots.dvrk.setup_joints import DrivenArm
 from schemas.vectors import Vector
 
 __all__ = ["Readings"]
@@ -32,7 +32,7 @@ class Readings:
         self,
         model: mujoco.MjModel,
         data: mujoco.MjData,
-        arms: Mapping[CartArm, MountedPsm | MountedEcm],
+        arms: Mapping[DrivenArm, AnyArm],
         servos: Servos,
         positions: Vector | None = None,
         *,
@@ -63,7 +63,7 @@ class Readings:
         self._poses = np.empty(7 * len(arms))
         self.outputs: dict[str, Vector] = {"qpos": self._qpos}
         for i, (arm, params) in enumerate(arms.items()):
-            first, n = int(model.sensor(first_sensor(arm)).adr[0]), len(params.chain.joints)
+            first, n = _first_sensor(model, arm, params), len(params.chain.joints)
             poses.append(first + 3 * n + ROS_ORDER)
             self.outputs[f"{arm}/measured_js"] = measured = self._sensors[first : first + 3 * n]
             if self._motors is not None:
@@ -153,3 +153,8 @@ def _to_joints(effector: EndEffector) -> Vector:
                 column[row] = motor.share if quantity == _EFFORT else 1.0
                 columns.append(column)
     return np.column_stack(columns)
+
+
+def _first_sensor(model: mujoco.MjModel, arm: str, params: MountedArm) -> int:
+    """Return where the sensors of an arm begin; their order is that of `engines.mujoco.model.names`."""
+    return int(model.sensor(first_sensor(arm, params.chain.joints[0].name)).adr[0])

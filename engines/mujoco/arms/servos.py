@@ -17,9 +17,9 @@ import numpy as np
 
 from engines.mujoco.arms.friction import Friction
 from hub.participant import Inputs
-from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.mounted import AnyArm, MountedMtm
 from robots.dvrk.psm import ARM_JOINTS
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import DrivenArm
 from robots.serial_chain import Joint
 from schemas.errors import SessionError
 from schemas.vectors import Vector, join_parts
@@ -28,11 +28,21 @@ __all__ = ["ServoLaw", "Servos"]
 
 _OFF, _POSITION, _EFFORT = 0.0, 1.0, 2.0
 """Control modes: no torque, position servo, effort. The latter two with gravity compensation."""
+_LOCKED = 5.0
+"""Control mode of a master with a locked orientation: effort in the first joints, position in the wrist."""
+_BEFORE_WRIST = 3
+"""Joints of a master in effort mode while its orientation is locked, as on the real controller
+(jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitMTM.cpp, SetControlEffortActiveJoints).
+"""
 _BARE = 2.0
 """Added to position servo and effort: without gravity compensation, as on the real controller, see
 docs/decisions/0010.
 """
 
+_MODES = (_OFF, _POSITION, _EFFORT, _POSITION + _BARE, _EFFORT + _BARE)
+_LOCKS = (_LOCKED, _LOCKED + 1.0)
+_BARE_MODES = {_POSITION + _BARE: _POSITION, _EFFORT + _BARE: _EFFORT, _LOCKED + 1.0: _LOCKED}
+"""Mode of the drives in each mode without gravity compensation."""
 _OF_ARM = frozenset(joint.name for joint in ARM_JOINTS)
 """Joints that all instruments of an arm have in common."""
 _Row = tuple[float, float, float, float]
@@ -79,7 +89,7 @@ class _Group:
     """Place in the vectors of all joints."""
     actuators: list[int] = field(default_factory=list[int])
     weighed: list[int] = field(default_factory=list[int])
-    """Bodies with weight on the real controller too: the endoscope. Springs and weights balance all else."""
+    """Bodies with weight on the real controller too: the endoscope, masters. Springs balance all else."""
     mode: float = _POSITION
     spares: list[list[_Share]] = field(default_factory=list[list[_Share]])
     """Motors of each instrument, the mounted one first, where the arm has spares."""
@@ -98,7 +108,7 @@ class Servos:
         self,
         model: mujoco.MjModel,
         data: mujoco.MjData,
-        arms: Mapping[CartArm, MountedPsm | MountedEcm],
+        arms: Mapping[DrivenArm, AnyArm],
         period: float,
     ) -> None:
         """Drive `arms`, stepped every `period` seconds, from the start."""
@@ -146,6 +156,7 @@ class Servos:
         self._friction = {arm: Friction(model, arm) for arm in arms}
         self._mode_ports = {arm: f"{arm}/control_mode" for arm in arms}
         self._ports = *self._mode_ports.values(), *(f"{group.ports}servo_jp" for group in self._groups)
+        self._masters = frozenset(arm for arm, params in arms.items() if isinstance(params, MountedMtm))
         self._state = np.concatenate([start, np.full(2 * len(arms), _POSITION)])
         self._modes = self._state[n:]  # per arm those of its joints and its jaw
         self._taken = np.concatenate([self._modes, start])
@@ -176,7 +187,7 @@ class Servos:
             for q, joint in zip(axes.start, axes.joints, strict=True)
         ]
         group.part = slice(first, len(rows))
-        group.weighed += [i for i in group.bodies if model.body(i).name == "ECM/roll"]
+        group.weighed += [i for i in group.bodies if _is_weighed(model.body(i).name)]
         self._groups.append(group)
 
     def _servo_matrices(
@@ -321,7 +332,11 @@ class Servos:
         measured = np.clip(self._measure @ self._data.qpos, self._lower, self._upper)
         for group in self._groups:
             part = group.part
-            if group.mode != _POSITION:
+            if group.mode == _LOCKED:
+                part = slice(part.start, part.start + _BEFORE_WRIST)
+                self._effort[part] = inputs[group.ports + "servo_jf"][:_BEFORE_WRIST]
+                self.setpoint[part] = self._previous[part] = measured[part]
+            elif group.mode != _POSITION:
                 self._effort[part] = inputs[group.ports + "servo_jf"] if group.mode == _EFFORT else 0.0
                 self.setpoint[part] = self._previous[part] = measured[part]
 
@@ -329,23 +344,27 @@ class Servos:
         """Switch the drives; `modes`, shape (2 arms,): joints and end effector of every arm."""
         gain, bias = self._gains
         for (arm, port), asked in zip(self._mode_ports.items(), modes.reshape(-1, 2), strict=True):
-            if not np.isin(asked, (_OFF, _POSITION, _EFFORT, _POSITION + _BARE, _EFFORT + _BARE)).all():
+            if not (np.isin(asked, _MODES).all() or (arm in self._masters and asked[0] in _LOCKS)):
                 raise SessionError(
                     f"input '{port}' is {asked}; each of [arm, jaw] is 0 (off), 1 (position servo) or 2"
-                    " (effort), 3 and 4 the last two without gravity compensation"
+                    " (effort), 3 and 4 the last two without gravity compensation; of a master's joints also"
+                    " 5 (orientation locked) and 6, the same without gravity compensation"
                 )
             for group, number in zip(
                 [group for group in self._groups if group.arm == arm], asked.tolist(), strict=False
             ):
-                mode = number - _BARE if number > _EFFORT else number
-                self._model.actuator_gainprm[group.actuators] = gain[group.actuators] * (mode == _POSITION)
-                self._model.actuator_biasprm[group.actuators] = bias[group.actuators] * (mode == _POSITION)
+                mode = _BARE_MODES.get(number, number)
+                holds = np.full((len(group.actuators), 1), mode in (_POSITION, _LOCKED))
+                if mode == _LOCKED:
+                    holds[:_BEFORE_WRIST] = False
+                self._model.actuator_gainprm[group.actuators] = gain[group.actuators] * holds
+                self._model.actuator_biasprm[group.actuators] = bias[group.actuators] * holds
                 self._model.body_gravcomp[group.bodies] = self._gravity_compensation[group.bodies] * (
                     mode != _OFF
                 )
                 self._model.body_gravcomp[group.weighed] *= number == mode
                 group.mode = mode
-            self._friction[arm].set(dry=asked[0] in (_EFFORT, _EFFORT + _BARE))
+            self._friction[arm].set(dry=asked[0] in (_EFFORT, _EFFORT + _BARE, *_LOCKS))
         self._modes[:] = modes
         self.off = frozenset(
             arm for arm, mode in zip(self._mode_ports, modes[::2].tolist(), strict=True) if mode == _OFF
@@ -363,6 +382,11 @@ class Servos:
         self._at_rest = b""
         self.setpoint[:] = state[: self.setpoint.size]
         self._set_modes(state[self.setpoint.size :])
+
+
+def _is_weighed(body: str) -> bool:
+    """Return whether the real controller carries the weight of a body, and no spring or counterweight."""
+    return body == "ECM/roll" or body.startswith(("MTML/", "MTMR/"))
 
 
 def _widest(chains: Sequence[Sequence[Joint]]) -> Sequence[Joint]:

@@ -22,7 +22,7 @@ import numpy as np
 from engines.mujoco.export.assets import FOLDER, file_of, numbers
 from robots import rotation
 from robots.dvrk.mounted import MountedArm
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import DrivenArm
 from schemas.errors import ScenarioError
 from schemas.vectors import Vector
 
@@ -47,7 +47,7 @@ class _Lead:
     """Servo with the joint's limits."""
 
 
-def urdf(spec: mujoco.MjSpec, arms: Mapping[CartArm, MountedArm]) -> Element:
+def urdf(spec: mujoco.MjSpec, arms: Mapping[DrivenArm, MountedArm]) -> Element:
     """Return the root element `robot` of the model's URDF, with meshes as files in `FOLDER`."""
     model = spec.compile()
     robot = Element("robot", name=spec.modelname)
@@ -74,7 +74,7 @@ def urdf(spec: mujoco.MjSpec, arms: Mapping[CartArm, MountedArm]) -> Element:
     return robot
 
 
-def _leads(arms: Mapping[CartArm, MountedArm]) -> dict[str, _Lead]:
+def _leads(arms: Mapping[DrivenArm, MountedArm]) -> dict[str, _Lead]:
     """Return by joint how the links of end effectors are driven.
 
     Links moved as a unit mimic the commanded joint; links on a tendon move freely.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import get_args
 
-from engines.mujoco.looks import cart, collision_shapes, ecm, instruments, psm, setup_joints
+from engines.mujoco.looks import cart, collision_shapes, console, ecm, instruments, mtm, psm, setup_joints
 from engines.mujoco.looks.part import Collisions, Looks
 from robots.dvrk.instruments import Instrument, instrument
 from robots.dvrk.setup_joints import CartArm
@@ -36,7 +36,13 @@ def parts(what: str | Instrument) -> Looks:
     for arm in get_args(CartArm):
         if what == f"suj/{arm}":
             return setup_joints.parts(arm)
-    simple = {"psm": psm.parts, "ecm": ecm.parts, "cart": cart.parts}
+    simple = {
+        "psm": psm.parts,
+        "ecm": ecm.parts,
+        "cart": cart.parts,
+        "mtm": mtm.parts,
+        "console": console.parts,
+    }
     if what not in simple:
         raise _nothing(what)
     return simple[what]()
@@ -44,7 +50,7 @@ def parts(what: str | Instrument) -> Looks:
 
 @cache
 def collision(what: str | Instrument) -> Collisions:
-    """Return the collision shapes of `what` by body, in the frames of `parts`.
+    """Return the collision shapes of `what` by body, in the frames of `parts`; masters and console have none.
 
     Raises:
         MotionError: no such instrument, or nothing of this name.
@@ -56,6 +62,8 @@ def collision(what: str | Instrument) -> Collisions:
     for arm in get_args(CartArm):
         if what == f"suj/{arm}":
             return collision_shapes.setup_joint(arm)
+    if what in ("mtm", "console"):
+        return {}
     simple = {"psm": collision_shapes.psm, "ecm": collision_shapes.ecm, "cart": collision_shapes.cart}
     if what not in simple:
         raise _nothing(what)
@@ -64,5 +72,6 @@ def collision(what: str | Instrument) -> Collisions:
 
 def _nothing(what: str) -> MotionError:
     return MotionError(
-        f"no look of '{what}': there are psm, ecm, cart, suj/<arm> and instrument/<name or number>"
+        f"no look of '{what}': there are psm, ecm, mtm, cart, console, suj/<arm> and instrument/<name or"
+        " number>"
     )

@@ -19,7 +19,7 @@ from robots.dvrk.drive import Disc
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
 from robots.dvrk.link import Link
 from robots.dvrk.mounted import MountedArm
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import DrivenArm
 from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
@@ -35,7 +35,7 @@ _SEAT_MASS, _SEAT_INERTIA = 1e-9, 1e-12
 """kg and kg m^2; MuJoCo wants some."""
 
 
-def add(spec: mujoco.MjSpec, name: CartArm, params: MountedArm, base_pose: Vector) -> Bodies:
+def add(spec: mujoco.MjSpec, name: DrivenArm, params: MountedArm, base_pose: Vector) -> Bodies:
     """Add the arm called `name`, and return the bodies by link.
 
     `base_pose`: pose of the base frame in the world, shape (4, 4).
@@ -67,7 +67,7 @@ def add(spec: mujoco.MjSpec, name: CartArm, params: MountedArm, base_pose: Vecto
     return bodies
 
 
-def add_spare(spec: mujoco.MjSpec, arm: CartArm, owner: str, spare: MountedArm, bodies: Bodies) -> Bodies:
+def add_spare(spec: mujoco.MjSpec, arm: DrivenArm, owner: str, spare: MountedArm, bodies: Bodies) -> Bodies:
     """Add a spare instrument to the arm called `arm`, with `bodies`, and return its own bodies by link.
 
     `owner`: prefix of the names of its parts.

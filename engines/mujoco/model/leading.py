@@ -6,14 +6,14 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model.tree import links
-from robots.dvrk.mounted import MountedEcm, MountedPsm
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.mounted import AnyArm
+from robots.dvrk.setup_joints import DrivenArm
 from schemas.vectors import Vector
 
 __all__ = ["to_all_joints"]
 
 
-def to_all_joints(model: mujoco.MjModel, arm: CartArm, params: MountedPsm | MountedEcm) -> Vector:
+def to_all_joints(model: mujoco.MjModel, arm: DrivenArm, params: AnyArm) -> Vector:
     """Return the matrix from velocities of the n joints of `arm` to velocities of all joints, shape (nv, n).
 
     The linkage moves with the leading joints; the fingers of a jaw are held. The transpose maps loads of all

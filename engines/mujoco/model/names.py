@@ -28,12 +28,12 @@ def sphere_site(arm: str, sphere: str) -> str:
     return f"{arm}/{CONTACT}/{sphere}"
 
 
-def first_sensor(arm: str) -> str:
-    """Return the name of the arm's first sensor.
+def first_sensor(arm: str, joint: str = "yaw") -> str:
+    """Return the name of the arm's first sensor, the position of its first joint.
 
     The order of sensors: positions, velocities and efforts of the n joints; tip in the base frame (position
     3, quaternion w, x, y, z); tip in the world (the same, then linear and angular velocity); end effector
     (`engines.mujoco.model.end_effector.add_sensors`), such as positions, velocities and efforts of the two
     fingers of a jaw, left before right; positions of all contact spheres in the world, then their velocities.
     """
-    return f"{arm}/position/yaw"
+    return f"{arm}/position/{joint}"

@@ -1,4 +1,4 @@
-"""A whole scene: arms, free or on the cart's setup joints, a table, fixtures and objects."""
+"""A whole scene: arms, free or on the cart's setup joints, a console, a table, fixtures and objects."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from engines.mujoco.model import arm, fixtures, objects, setup_joints, shapes
+from engines.mujoco.model import arm, console, fixtures, hands, objects, setup_joints, shapes
 from engines.mujoco.model.names import PARKED_M, SEAT
 from engines.mujoco.model.tree import links, spare_links
 from engines.mujoco.params import SceneParams
-from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.mounted import AnyArm, MountedArm, MountedMtm, MountedPsm
+from robots.dvrk.setup_joints import DrivenArm
+from schemas.vectors import Vector
 
 __all__ = ["build", "place", "spec"]
 
@@ -35,11 +36,16 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     result.option.timestep = _TIMESTEP
     _set_options(result.option, grasping=bool(scene.objects) or any(map(_has_springs, scene.arms.values())))
     result.worldbody.add_light(pos=[0.0, 0.0, 3.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
-    mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
+    mounts: dict[DrivenArm, Vector] = {}
+    if scene.mounting == "cart":
+        mounts |= setup_joints.add(result, scene)
+    console.add(result, scene)
     for name, params in scene.arms.items():
         pose, seen = mounts.get(name, params.pose), scene.looks != "none"
         bodies = arm.add(result, name, params, pose)
         shapes.add_arm(result, name, params, bodies, seen=seen)
+        if isinstance(params, MountedMtm):
+            hands.add(result, name, params)
         for owner, spare in params.by_owner(name).items():
             if owner != name and isinstance(spare, MountedPsm):
                 own = arm.add_spare(result, name, owner, spare, bodies)
@@ -53,9 +59,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     return result
 
 
-def place(
-    model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, MountedPsm | MountedEcm]
-) -> None:
+def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[DrivenArm, AnyArm]) -> None:
     """Put the joints of `arms`, with fingers and, unless the model is lean, linkages, at the start."""
     for name, params in arms.items():
         start = _start(params) | {SEAT: 0.0}
@@ -69,7 +73,7 @@ def place(
                 _put(model, data, f"{owner}/{link.name}", start[link.name])
 
 
-def _start(params: MountedPsm | MountedEcm) -> dict[str, float]:
+def _start(params: AnyArm) -> dict[str, float]:
     """Return the positions at time 0 by joint, of an end effector by link."""
     start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
     return start | dict(params.end_effector.positions(np.array(params.end_effector_start)))

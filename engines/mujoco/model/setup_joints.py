@@ -23,7 +23,7 @@ CART = "cart"
 
 
 def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
-    """Add the cart and the setup joint of every arm in `scene`.
+    """Add the cart and the setup joint of every arm of the cart in `scene`.
 
     Returns the poses of the arms' base frames in the world, shape (4, 4).
     """
@@ -32,6 +32,8 @@ def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
     _weigh(cart, setup_joints.CART_MASS)
     mounts: dict[CartArm, Vector] = {}
     for arm in scene.arms:
+        if arm == "MTML" or arm == "MTMR":
+            continue
         chain = setup_joints.chain(arm)
         *poses, mounts[arm] = chain.frames(np.array(scene.setup_joints.get(arm, setup_joints.SIMULATED[arm])))
         drawn = chain.frames(np.zeros(len(setup_joints.JOINT_NAMES)))

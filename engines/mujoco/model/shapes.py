@@ -20,8 +20,8 @@ from engines.mujoco.model.names import SEAT
 from engines.mujoco.model.poses import pose_attributes
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.instruments import Instrument
-from robots.dvrk.mounted import MountedEcm, MountedPsm
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.mounted import AnyArm, MountedEcm, MountedMtm, MountedPsm
+from robots.dvrk.setup_joints import CartArm, DrivenArm
 from robots.transform import inverse_transform
 from schemas.vectors import Vector
 
@@ -40,11 +40,10 @@ _KINDS = {"box": mujoco.mjtGeom.mjGEOM_BOX, "capsule": mujoco.mjtGeom.mjGEOM_CAP
 _UNSEEN_BY_PHYSICS = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": _SEEN}
 
 
-def add_arm(
-    spec: mujoco.MjSpec, arm: CartArm, params: MountedPsm | MountedEcm, bodies: Bodies, *, seen: bool
-) -> None:
+def add_arm(spec: mujoco.MjSpec, arm: DrivenArm, params: AnyArm, bodies: Bodies, *, seen: bool) -> None:
     """Give an arm and the instrument collision shapes and, if `seen`, looks."""
-    add(spec, "ecm" if isinstance(params, MountedEcm) else "psm", arm, bodies, seen=seen)
+    look = "ecm" if isinstance(params, MountedEcm) else "mtm" if isinstance(params, MountedMtm) else "psm"
+    add(spec, look, arm, bodies, seen=seen)
     if isinstance(params, MountedPsm):
         add_instrument(spec, arm, params, bodies, seen=seen)
     if isinstance(params.end_effector, Probe):

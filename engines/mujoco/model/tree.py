@@ -15,7 +15,7 @@ from robots.dvrk.link import Follow, Link
 from robots.dvrk.linkage import LINKAGES
 from robots.dvrk.mounted import MountedArm
 from robots.dvrk.psm import ARM_JOINTS
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import DrivenArm
 
 __all__ = ["BASE", "links", "spare_links"]
 
@@ -23,7 +23,7 @@ BASE = "base"
 """The fixed link; the origin of the frame is the remote centre of motion."""
 
 
-def links(arm: CartArm, params: MountedArm) -> tuple[Link, ...]:
+def links(arm: DrivenArm, params: MountedArm) -> tuple[Link, ...]:
     """Return all moving links of `arm`, parents before children.
 
     The order: joints, linkage, end effector. An arm with spare instruments has a seat under the roll.
@@ -54,7 +54,7 @@ def links(arm: CartArm, params: MountedArm) -> tuple[Link, ...]:
     return *tree.values(), *params.end_effector_links
 
 
-def spare_links(arm: CartArm, spare: MountedArm) -> tuple[Link, ...]:
+def spare_links(arm: DrivenArm, spare: MountedArm) -> tuple[Link, ...]:
     """Return the moving links of a spare instrument, the seat first, parents before children."""
     shared = {joint.name for joint in ARM_JOINTS} | {one.name for one in LINKAGES[arm].joints}
     tree = _seat_roll({link.name: link for link in links(arm, spare)})
