@@ -10,20 +10,29 @@ import numpy as np
 from controllers.motion.axes import Axes, Mode
 from controllers.motion.cartesian_commands import CartesianCommands
 from controllers.motion.commands import Commands
-from controllers.motion.drives import Drives
+from controllers.motion.drives import Drives, WrenchFrame
 from controllers.motion.equipment import Equipment
 from controllers.motion.exchange import Exchange
 from controllers.motion.frames import BaseFrame, base_in_world
 from controllers.motion.lifecycle import Lifecycle
+from controllers.motion.master import MasterGripper, OrientationLock
 from controllers.motion.messages import Messages
 from controllers.motion.operating_state import State
-from controllers.motion.params import EcmParams, Gripper, MotionParams, PsmParams
-from controllers.motion.ports import EQUIPMENT_COMMANDS, event_names
+from controllers.motion.params import (
+    AnyParams,
+    EcmParams,
+    Gripper,
+    MotionParams,
+    MtmlParams,
+    MtmrParams,
+    PsmParams,
+)
+from controllers.motion.ports import EQUIPMENT_COMMANDS, MASTER_COMMANDS, event_names
 from controllers.motion.setpoint import Setpoint
 from controllers.motion.telemetry import KnownWeight, TelemetryRow
 from hub.participant import Inputs, Record, flag
 from robots.dvrk import crtk
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import DrivenArm
 from robots.serial_chain import SerialChain
 from schemas.crtk import StringStamped
 from schemas.errors import MotionError
@@ -32,8 +41,10 @@ from schemas.vectors import Vector
 
 __all__ = ["Arm"]
 
-_ANY_TIME = crtk.SETTINGS.union(*EQUIPMENT_COMMANDS.values())
+_ANY_TIME = crtk.SETTINGS.union(MASTER_COMMANDS, *EQUIPMENT_COMMANDS.values())
 """Commands executed in every operating state."""
+_LOCKED = 5.0
+"""`control_mode` of a master that holds its orientation beside a wrench; 6 without gravity compensation."""
 _BARE = 2.0
 """Addition to `control_mode`, position or effort, without gravity compensation."""
 
@@ -52,7 +63,7 @@ class Arm:
 
     def __init__(
         self,
-        name: CartArm,
+        name: DrivenArm,
         params: MotionParams,
         camera: Callable[[], Vector | None],
         period: float,
@@ -67,7 +78,7 @@ class Arm:
             period: the controller's step, s.
             outputs: the controller's outputs; the arm adds its own, with arrays kept for the whole session.
         """
-        arm = params.arms.present_arms[name]
+        arm = params.arms.driven_arms[name]
         self._period = period
         self._messages = Messages(name, event_names(arm), outputs)
         self._base = BaseFrame(name, params, camera)
@@ -88,8 +99,15 @@ class Arm:
         self._exchange = self._exchange_of(arm, params.exchange_time)
         self.refitted = False
         """Whether kinematics have changed; reset by the controller."""
-        names = [one.equipment[1] for one in arm.variants]
-        self._equipment = Equipment(arm.equipment[0], names, self._messages, self._exchange)
+        self._equipment: Equipment | None = None
+        if isinstance(arm, PsmParams | EcmParams):
+            names = [one.equipment[1] for one in arm.variants]
+            self._equipment = Equipment(arm.equipment[0], names, self._messages, self._exchange)
+        self._lock: OrientationLock | None = None
+        self._held_gripper: MasterGripper | None = None
+        if isinstance(arm, MtmlParams | MtmrParams):
+            self._lock = OrientationLock(arm.chain, self._base, lambda: self.position, self._messages)
+            self._held_gripper = MasterGripper(name, arm.end_effector_start[0], self._messages)
         self._commanded = self._commands_by_port(name, arm.gripper)
         self._now, self._modes = ArmState(), np.array(self._drives.modes, np.float64)
         self._condition: tuple[State, bool, bool] | None = None
@@ -105,6 +123,8 @@ class Arm:
             self._messages.state,
             *self._drives.state,
             *(() if self._exchange is None else (self._exchange.state,)),
+            *(() if self._lock is None else (self._lock.state,)),
+            *(() if self._held_gripper is None else (self._held_gripper.state,)),
         )
         if self._exchange is not None:
             outputs[f"drive/{name}/instrument"] = self._exchange.state.part("held")
@@ -114,13 +134,15 @@ class Arm:
         self._offsets = params.joint_errors.of(name, len(arm.chain.joints))
         self._is_off = bool(self._offsets.any())
         self._driven = self._drives.joints.setpoint.position
-        if self._is_off:
+        if self._is_off or self._lock is not None:
             self._driven = self._driven.copy()
         self._gripper_setpoint = np.zeros(0 if arm.gripper is None else 3 * len(arm.gripper.joints))
         outputs[f"drive/{name}/control_mode"] = self._modes
         outputs |= self._joint_outputs(groups)
+        if self._held_gripper is not None:
+            outputs[f"{name}/gripper/measured_js"] = self._held_gripper.measured
 
-    def _exchange_of(self, arm: PsmParams | EcmParams, time_ns: int) -> Exchange | None:
+    def _exchange_of(self, arm: AnyParams, time_ns: int) -> Exchange | None:
         if not isinstance(arm, PsmParams) or len(arm.variants) == 1:
             return None
         drives, messages = self._drives, self._messages
@@ -133,12 +155,11 @@ class Arm:
             self._cartesian.fit()
             self.refitted = True
 
-    def _commands_by_port(self, name: CartArm, gripper: Gripper | None) -> dict[str, _Commanded]:
+    def _commands_by_port(self, name: DrivenArm, gripper: Gripper | None) -> dict[str, _Commanded]:
         """Return order, name and handler of each command, by port."""
-        handlers = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
-        commands = [
-            (command, handlers.get(command)) for command in (*crtk.COMMANDS, *self._equipment.handlers)
-        ]
+        own = self._own_handlers
+        handlers = {**own, **self._commands.handlers, **self._cartesian.handlers}
+        commands = [(command, handlers.get(command)) for command in (*crtk.COMMANDS, *own)]
         if gripper is not None:
             commands += [
                 (f"{gripper.name}/{word}", handlers[f"gripper/{word}"]) for word in crtk.GRIPPER_COMMANDS
@@ -147,6 +168,13 @@ class Arm:
             f"{name}/{command}": (order, command, handler)
             for order, (command, handler) in enumerate(commands)
         }
+
+    @property
+    def _own_handlers(self) -> Mapping[str, Callable[[Any], None]]:
+        """Handlers of the commands of this kind of arm alone."""
+        if self._equipment is not None:
+            return self._equipment.handlers
+        return {} if self._lock is None else self._lock.handlers
 
     def _joint_outputs(self, groups: Mapping[str, Axes]) -> Iterator[tuple[str, Vector]]:
         """Yield the outputs of joints driven together, by the prefix of the ports."""
@@ -172,6 +200,8 @@ class Arm:
         """Read measurements, the start of the setpoint."""
         for port, axes in self._sensed:
             axes.measured[:] = inputs[port]
+        if self._held_gripper is not None:
+            self._held_gripper.sense(inputs)
         if self._is_off:
             self._drives.joints.position -= self._offsets
         if not self._now.started:
@@ -184,6 +214,8 @@ class Arm:
         Returned are the setpoints following a stream, to follow together with the setpoints of all arms.
         """
         self._messages.begin(t + h)
+        if self._held_gripper is not None:
+            self._held_gripper.step(self._period)
         arrived = () if inputs.quiet else inputs.event_ports & self._commanded.keys()
         if self._rests and not arrived and not self._lifecycle.is_lost:
             return self._drives.step(self._period)
@@ -191,7 +223,8 @@ class Arm:
         if before is None:
             self._now.started = True
             self._messages.desired_state(self._lifecycle.desired_state)
-            self._equipment.publish()
+            if self._equipment is not None:
+                self._equipment.publish()
         self._lifecycle.watch(self._period)
         awaited = self._execute_arrived(inputs, arrived)
         self._lifecycle.step(self._period)
@@ -218,14 +251,18 @@ class Arm:
         if state is State.ENABLED and homed:
             held = self._exchange.held
             self._exchange.step(self._period)
-            if self._exchange.held is not held:
+            if self._exchange.held is not held and self._equipment is not None:
                 self._equipment.publish()
         elif state is not State.PAUSED:
             self._exchange.stop()
 
     def drive(self) -> None:
         """Command the final setpoints of the step, through encoders with offsets."""
-        if self._is_off:
+        if self._lock is not None:
+            self._driven[:] = (
+                self._lock.goal() if self._holds_orientation else self._drives.joints.setpoint.position
+            )
+        elif self._is_off:
             np.add(self._drives.joints.setpoint.position, self._offsets, out=self._driven)
 
     def publish(self, row: TelemetryRow) -> None:
@@ -237,6 +274,8 @@ class Arm:
         row.base[:], row.ratio[:] = self._base.pose, settings.ratio
         row.switches[0] = drives.control.absolute
         row.switches[1] = joints.mode is not Mode.OFF and settings.gravity_compensation
+        if self._held_gripper is not None:
+            self._held_gripper.publish()
         if drives.gripper is not None:
             self._gripper_setpoint[:] = drives.gripper.commanded
 
@@ -252,8 +291,17 @@ class Arm:
 
     def _update_modes(self) -> None:
         self._modes[:] = self._drives.modes
-        if self._modes[0] and not self._commands.settings.gravity_compensation:
+        if self._holds_orientation:
+            self._modes[0] = _LOCKED if self._commands.settings.gravity_compensation else _LOCKED + 1.0
+        elif self._modes[0] and not self._commands.settings.gravity_compensation:
             self._modes[0] += _BARE
+
+    @property
+    def _holds_orientation(self) -> bool:
+        """Whether the drives of the wrist hold a locked orientation, beside a wrench."""
+        drives = self._drives
+        presses = drives.joints.mode is Mode.EFFORT and drives.control.frame is not WrenchFrame.NONE
+        return self._lock is not None and self._lock.is_locked and presses
 
     def _execute_arrived(self, inputs: Inputs, ports: Collection[str]) -> bool:
         """Execute commands from `ports`; return whether clients now wait for the operating state."""

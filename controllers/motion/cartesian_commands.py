@@ -16,7 +16,7 @@ from controllers.motion.frames import BaseFrame, rotate_twist
 from robots.dvrk.cannula import Cannula
 from robots.dvrk.crtk import tip_frame
 from robots.dvrk.inverse import inverse as inverse_kinematics
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import DrivenArm
 from robots.transform import inverse_transform
 from schemas.crtk import CartesianImpedance, CartesianState
 from schemas.errors import MotionError
@@ -33,7 +33,7 @@ _SINGULAR = 1e-6
 class CartesianCommands:
     """Executes the Cartesian commands of an arm: `handlers`, by name."""
 
-    def __init__(self, arm: CartArm, drives: Drives, base: BaseFrame, ratio: Vector, period: float) -> None:
+    def __init__(self, arm: DrivenArm, drives: Drives, base: BaseFrame, ratio: Vector, period: float) -> None:
         """Prepare the handlers.
 
         Args:
@@ -61,11 +61,13 @@ class CartesianCommands:
     def fit(self) -> None:
         """Take over the kinematics of the instrument."""
         self._chain = self._joints.chain
-        self._cannula = Cannula.of(self._chain)
+        self._cannula = None if self._arm in ("MTML", "MTMR") else Cannula.of(self._chain)
 
     def not_ready(self) -> str:
         """Return why the arm refuses Cartesian commands; empty: accepted."""
-        return "" if self._drives.control.cartesian else self._cannula.not_past(self._joints.position)
+        if self._cannula is None or self._drives.control.cartesian:
+            return ""
+        return self._cannula.not_past(self._joints.position)
 
     def _set_cf_orientation_absolute(self, message: BoolMessage) -> None:
         self._drives.control.absolute = message.data
@@ -149,7 +151,8 @@ class CartesianCommands:
         Among several solutions, the nearest to the setpoint.
         """
         goal = inverse_kinematics(self._chain, tip, self._joints.setpoint.position)
-        self._cannula.check(goal, self._joints.position)
+        if self._cannula is not None:
+            self._cannula.check(goal, self._joints.position)
         return goal
 
     def _joint_velocity(self, twist: Vector) -> Vector:

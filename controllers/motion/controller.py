@@ -1,4 +1,4 @@
-"""The motion controller as a participant: all arms of a patient cart under CRTK's commands."""
+"""The motion controller as a participant: all arms of cart and console under CRTK's commands."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class MotionController(Controller):
         params, period = self.params, self.params.publish_period
         ports = [
             port
-            for name, arm in params.arms.present_arms.items()
+            for name, arm in params.arms.driven_arms.items()
             for port in arm_ports(name, arm, reference_frame(name, params), period)
         ]
         if params.mounting == "cart":
@@ -76,7 +76,7 @@ class MotionController(Controller):
         period = self._period = setup.period_ns * 1e-9
         self._arms = {
             name: Arm(name, self.params, self._camera, period, self._outputs)
-            for name in self.params.arms.present_arms
+            for name in self.params.arms.driven_arms
         }
         self._telemetry = Telemetry([(name, arm.chain, arm.weight) for name, arm in self._arms.items()])
         self._publish(self._telemetry)

@@ -10,8 +10,9 @@ import numpy as np
 from controllers.motion.axes import Axes, Mode
 from controllers.motion.frames import rotate_twist
 from controllers.motion.impedance import Impedance
+from controllers.motion.master import PLATFORM, platform_effort
 from controllers.motion.messages import Messages
-from controllers.motion.params import EcmParams, PsmParams
+from controllers.motion.params import AnyParams, MtmlParams, MtmrParams, PsmParams
 from controllers.motion.setpoint import Setpoint
 from controllers.motion.telemetry import body_to_spatial
 from hub.participant import Record, array, choice, flag
@@ -51,7 +52,7 @@ class DrivesState(Record):
 class Drives:
     """The joints of an arm, and the gripper if any."""
 
-    def __init__(self, arm: PsmParams | EcmParams, messages: Messages, base: Callable[[], Vector]) -> None:
+    def __init__(self, arm: AnyParams, messages: Messages, base: Callable[[], Vector]) -> None:
         """Build arm and gripper.
 
         Args:
@@ -69,6 +70,8 @@ class Drives:
         """Whether the instrument held has the gripper."""
         self.groups = (self.joints,) if self.gripper is None else (self.joints, self.gripper)
         """Driven joints: the arm's joints, then the gripper."""
+        self._is_master = isinstance(arm, MtmlParams | MtmrParams)
+        self._idle_gripper = Mode.POSITION if self._is_master else Mode.OFF
         self.control = DrivesState()
         self._impedance = Impedance()
         self.state = (
@@ -93,8 +96,8 @@ class Drives:
 
     @property
     def modes(self) -> tuple[Mode, Mode]:
-        """Modes of arm and gripper; a missing gripper is off."""
-        return self.joints.mode, Mode.OFF if self.gripper is None else self.gripper.mode
+        """Modes of arm and gripper; a missing gripper is off, that of a master in its hand."""
+        return self.joints.mode, self._idle_gripper if self.gripper is None else self.gripper.mode
 
     def power(self, *, on: bool) -> None:
         """Switch all drives off, or on to hold the present positions."""
@@ -198,7 +201,11 @@ class Drives:
             jacobian, wrench = chain.jacobian(frames, frame="tip"), self.control.wrench
             if frame is WrenchFrame.SPATIAL:
                 jacobian = body_to_spatial(frames[-1]) @ jacobian
-        self.joints.apply(np.clip(jacobian.T @ wrench, -chain.effort, chain.effort))
+        effort = jacobian.T @ wrench
+        if self._is_master and frame is not WrenchFrame.SPATIAL:
+            n = len(effort)
+            effort[PLATFORM] += platform_effort(chain, self.joints.position, self.joints.measured[n : 2 * n])
+        self.joints.apply(np.clip(effort, -chain.effort, chain.effort))
 
     def _in_base(self, tip: Vector, jacobian: Vector) -> Vector:
         """Return the wrench at the tip, shape (6,), along the axes of the base frame, not the reference's."""

@@ -12,9 +12,9 @@ from typing import Protocol
 import numpy as np
 
 from controllers.motion.params import Arms, MotionParams, SetupJoints
-from robots.dvrk import crtk, setup_joints
+from robots.dvrk import crtk, mtm, setup_joints
 from robots.dvrk.crtk import Mounting
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import CartArm, DrivenArm
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -57,14 +57,14 @@ def setup_positions(arm: CartArm, params: CartParams) -> Vector:
     return np.array(getattr(params.setup_joints, arm) or setup_joints.SIMULATED[arm])
 
 
-def base_in_world(arm: CartArm, params: CartParams) -> Vector:
+def base_in_world(arm: DrivenArm, params: CartParams) -> Vector:
     """Return the pose of the arm's base frame in the world by the scenario, shape (4, 4)."""
-    if params.mounting == "cart":
+    if params.mounting == "cart" and arm != "MTML" and arm != "MTMR":
         return setup_joints.base_pose(arm, setup_positions(arm, params))
-    return params.arms.present_arms[arm].pose
+    return params.arms.driven_arms[arm].pose
 
 
-def reference_frame(arm: CartArm, params: MotionParams) -> str:
+def reference_frame(arm: DrivenArm, params: MotionParams) -> str:
     """Return the `frame_id` of the arm's Cartesian ports other than `local/`."""
     return crtk.reference_frame(arm, params.arms.present_arms, params.mounting, params.reference)
 
@@ -75,7 +75,7 @@ _ORIGIN = np.eye(4)
 class BaseFrame:
     """The base frame of an arm in the reference frame of the arm's Cartesian ports."""
 
-    def __init__(self, arm: CartArm, params: MotionParams, camera: Callable[[], Vector | None]) -> None:
+    def __init__(self, arm: DrivenArm, params: MotionParams, camera: Callable[[], Vector | None]) -> None:
         """Start at the scenario's pose.
 
         Args:
@@ -86,8 +86,10 @@ class BaseFrame:
         """
         self.reference, self.local = reference_frame(arm, params), crtk.base_frame(arm)
         """`frame_id` of ports other than `local/`, and of `local/` ports."""
-        self._camera, self._carried = camera, params.mounting == "cart"
+        self._camera, self._carried = camera, params.mounting == "cart" and arm in params.arms.present_arms
         self._world = base_in_world(arm, params)
+        if self.reference == mtm.DISPLAY_FRAME and (arm == "MTML" or arm == "MTMR"):
+            self._world = mtm.BASE[arm].copy()
         self._seen_by, self._in_camera = np.eye(4), np.eye(4)
         self.state = (self._world,)
 

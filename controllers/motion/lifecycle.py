@@ -26,6 +26,8 @@ _TRACKING_TOLERANCE = (0.5, 0.5, 0.05, 0.6, 0.6, 0.6)
 
 From SAW share/pid/sawControllersPID-PSM.json; the first four are used for the ECM too.
 """
+_MASTER_TOLERANCE = (0.2, 0.2, 0.2, 0.2, 0.5, 0.5, 0.5)
+"""The same of a master, rad (SAW share/pid/sawControllersPID-MTM.json)."""
 _GOAL_TOLERANCE = radians(3.0)
 """Largest distance of a joint from home, rad and m, after homing.
 
@@ -74,7 +76,11 @@ class Lifecycle:
         self._drives, self._messages = drives, messages
         self._home, self._power_time = home, power_time
         n = len(home)
-        self._tolerance = [*_TRACKING_TOLERANCE, *_TRACKING_TOLERANCE[-1:] * n][:n]
+        self._tolerance = (
+            list(_MASTER_TOLERANCE)
+            if n == len(_MASTER_TOLERANCE)
+            else [*_TRACKING_TOLERANCE, *_TRACKING_TOLERANCE[-1:] * n][:n]
+        )
         self._now = LifecycleState()
         self._repeats = Repeats()
         self.records = (self._now, self._repeats.state)

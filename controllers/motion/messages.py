@@ -12,7 +12,7 @@ from robots.dvrk import crtk
 from robots.dvrk.repeats import refusals_to_report
 from schemas.crtk import OperatingState
 from schemas.message import Message
-from schemas.ros import BoolMessage, Header, StringMessage, Time
+from schemas.ros import BoolMessage, EmptyMessage, Header, StringMessage, Time
 
 __all__ = ["Messages"]
 
@@ -77,6 +77,16 @@ class Messages:
     def equipment(self, event: str, name: str) -> None:
         """Publish the arm's equipment: `event` is `tool_type` or `endoscope_type`."""
         self._put(event, StringMessage(data=name))
+
+    def orientation_locked(self, *, locked: bool) -> None:
+        """Publish whether the orientation of a master is locked."""
+        self._put("orientation_locked", BoolMessage(data=locked))
+
+    def gripper(self, *, closed: bool) -> None:
+        """Publish that the gripper of a master has closed or opened."""
+        self._put("gripper/closed", BoolMessage(data=closed))
+        if closed:
+            self._put("gripper/pinch", EmptyMessage())
 
     def goal_reached(self, *, reached: bool) -> None:
         """Publish whether a move has arrived."""

@@ -10,15 +10,25 @@ from pydantic import Field, model_validator
 from controllers.motion.equipment import endoscope_type, tool_type
 from controllers.motion.joint_errors import JointErrors
 from hub.participant import Params
-from robots.dvrk import ecm, psm
+from robots.dvrk import ecm, mtm, psm
 from robots.dvrk.crtk import Mounting, Reference
-from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.mounted import MountedEcm, MountedMtml, MountedMtmr, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import CartArm, DrivenArm
 from robots.serial_chain import Joint
 from schemas.quantity import Duration
 
-__all__ = ["Arms", "EcmParams", "Gripper", "MotionParams", "PsmParams", "SetupJoints"]
+__all__ = [
+    "AnyParams",
+    "Arms",
+    "EcmParams",
+    "Gripper",
+    "MotionParams",
+    "MtmlParams",
+    "MtmrParams",
+    "PsmParams",
+    "SetupJoints",
+]
 
 
 class Gripper(NamedTuple):
@@ -72,23 +82,55 @@ class EcmParams(MountedEcm):
         return "endoscope_type", endoscope_type(self.endoscope)
 
 
+class _Master:
+    """Properties of a master for its controller."""
+
+    @property
+    def gripper(self) -> Gripper | None:
+        """None: no motor drives the gripper of a master."""
+        return None
+
+    @property
+    def home(self) -> tuple[float, ...]:
+        """Joint positions of the arm at home."""
+        return mtm.HOME
+
+    @property
+    def equipment(self) -> None:
+        """None: a master holds nothing."""
+        return None
+
+
+class MtmlParams(_Master, MountedMtml):
+    """The left master: place of the console, and position before the first measurement."""
+
+
+class MtmrParams(_Master, MountedMtmr):
+    """The right master."""
+
+
+AnyParams = PsmParams | EcmParams | MtmlParams | MtmrParams
+
+
 class Arms(Params):
-    """The driven arms of a patient cart."""
+    """The driven arms of cart and console."""
 
     PSM1: PsmParams | None = None
     PSM2: PsmParams | None = None
     PSM3: PsmParams | None = None
     ECM: EcmParams | None = None
+    MTML: MtmlParams | None = None
+    MTMR: MtmrParams | None = None
 
     @model_validator(mode="after")
     def _at_least_one(self) -> Self:
-        if not self.present_arms:
-            raise ValueError("name at least one of PSM1, PSM2, PSM3, ECM")
+        if not self.driven_arms:
+            raise ValueError("name at least one of PSM1, PSM2, PSM3, ECM, MTML, MTMR")
         return self
 
     @property
     def present_arms(self) -> Mapping[CartArm, PsmParams | EcmParams]:
-        """Present arms by name."""
+        """Present arms of the cart by name."""
         named: dict[CartArm, PsmParams | EcmParams | None] = {
             "PSM1": self.PSM1,
             "PSM2": self.PSM2,
@@ -96,6 +138,12 @@ class Arms(Params):
             "ECM": self.ECM,
         }
         return {name: arm for name, arm in named.items() if arm is not None}
+
+    @property
+    def driven_arms(self) -> Mapping[DrivenArm, AnyParams]:
+        """Present arms and masters by name."""
+        named: dict[DrivenArm, AnyParams | None] = {"MTML": self.MTML, "MTMR": self.MTMR}
+        return {**self.present_arms, **{name: arm for name, arm in named.items() if arm is not None}}
 
 
 class SetupJoints(Params):

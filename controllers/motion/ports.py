@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from controllers.motion.params import EcmParams, PsmParams
+from controllers.motion.params import AnyParams
 from controllers.ports import measured_joints
 from hub.participant import event_in, event_out, signal_out
 from robots.dvrk import crtk
@@ -16,13 +16,21 @@ from robots.dvrk.setup_joints import CartArm, joint_names
 from schemas.ports import Port
 from schemas.ros import Float64Message, JointState, PoseStamped
 
-__all__ = ["EQUIPMENT_COMMANDS", "arm_ports", "event_names", "setup_joint_event_names", "setup_joint_ports"]
+__all__ = [
+    "EQUIPMENT_COMMANDS",
+    "MASTER_COMMANDS",
+    "arm_ports",
+    "event_names",
+    "setup_joint_event_names",
+    "setup_joint_ports",
+]
 
 _STATE_COMMAND = "enable, disable, home, unhome, pause or resume"
 _COMMANDS = {
     "state_command": _STATE_COMMAND,
     "use_gravity_compensation": (
-        "whether the drives carry the weight that the controller knows, the endoscope's; on at time 0"
+        "whether the drives carry the weight that the controller knows, the endoscope's or a master's; on at"
+        " time 0"
     ),
     "trajectory_j/set_ratio": (
         "share of the limits of velocity and acceleration that the next moves use, above 0 and up to 1"
@@ -87,6 +95,17 @@ EQUIPMENT_COMMANDS = {
     "endoscope_type": {"set_endoscope_type": "refused unless it is what the arm holds"},
 }
 """Meanings of commands about an arm's equipment, by the event of publication."""
+_MASTER_COMMANDS = {
+    "lock_orientation": "hold this orientation while a wrench is applied, in the frame of measured_cp",
+    "unlock_orientation": "hold no orientation any more",
+}
+_MASTER_EVENTS = {
+    "gripper/closed": "the gripper has been closed, or open, for 0.2 s",
+    "gripper/pinch": "the gripper has been closed for 0.2 s",
+    "orientation_locked": "whether the orientation is locked",
+}
+MASTER_COMMANDS = frozenset(_MASTER_COMMANDS)
+"""Commands to masters alone."""
 _SETUP_JOINT_COMMANDS = {
     "state_command": _STATE_COMMAND,
     "servo_jp": "refused: the joints are braked",
@@ -98,13 +117,28 @@ _SETUP_JOINT_EVENTS = {
     "status": "what happens",
 }
 _TYPES = (
-    crtk.COMMANDS | crtk.EVENTS | crtk.PSM_COMMANDS | crtk.PSM_EVENTS | crtk.ECM_COMMANDS | crtk.ECM_EVENTS
+    crtk.COMMANDS
+    | crtk.EVENTS
+    | crtk.PSM_COMMANDS
+    | crtk.PSM_EVENTS
+    | crtk.ECM_COMMANDS
+    | crtk.ECM_EVENTS
+    | crtk.MTM_COMMANDS
+    | crtk.MTM_EVENTS
 )
 
 
-def event_names(params: PsmParams | EcmParams) -> tuple[str, ...]:
+def _own_topics(params: AnyParams) -> tuple[Mapping[str, str], Mapping[str, str]]:
+    """Return the meanings of commands and events of this kind of arm alone."""
+    if params.equipment is None:
+        return _MASTER_COMMANDS, _MASTER_EVENTS
+    held = params.equipment[0]
+    return EQUIPMENT_COMMANDS[held], {held: _EQUIPMENT}
+
+
+def event_names(params: AnyParams) -> tuple[str, ...]:
     """Return the names of an arm's event outputs, without the arm's."""
-    return (*_EVENTS, params.equipment[0])
+    return (*_EVENTS, *_own_topics(params)[1])
 
 
 def setup_joint_event_names() -> tuple[str, ...]:
@@ -112,7 +146,7 @@ def setup_joint_event_names() -> tuple[str, ...]:
     return tuple(_SETUP_JOINT_EVENTS)
 
 
-def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns: int) -> Iterator[Port]:
+def arm_ports(arm: str, params: AnyParams, reference: str, period_ns: int) -> Iterator[Port]:
     """Yield all ports of an arm.
 
     Args:
@@ -122,21 +156,26 @@ def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns
         period_ns: period of the states, ns.
     """
     joints = tuple(joint.name for joint in params.chain.joints)
-    gripper, held = params.gripper, params.equipment[0]
-    yield from _events(event_in, arm, _COMMANDS | EQUIPMENT_COMMANDS[held])
+    gripper, (commands, events) = params.gripper, _own_topics(params)
+    yield from _events(event_in, arm, {**_COMMANDS, **commands})
     if gripper is not None:
         yield from _events(event_in, f"{arm}/{gripper.name}", _GRIPPER_COMMANDS)
-    yield from _events(event_out, arm, _EVENTS | {held: _EQUIPMENT})
+    yield from _events(event_out, arm, {**_EVENTS, **events})
     yield from _joint_states(arm, joints, period_ns)
     yield from _cartesian_states(arm, reference, period_ns)
     yield from _wrench_states(arm, len(joints), reference, period_ns)
-    yield from _settings(arm, joints, reference, period_ns)
+    if params.equipment is None:
+        yield from _master_gripper(arm, period_ns)
+    else:
+        base = "of the arm's base frame: where the setup joints hold it"
+        yield signal_out(f"SUJ/{arm}/measured_cp", PoseStamped, base, frame=reference, period_ns=period_ns)
+    yield from _settings(arm, joints, period_ns)
     yield from _servo_command_ports(arm, joints)
     yield signal_out(
         f"drive/{arm}/control_mode",
         description=(
             "of arm and gripper: 0 off, 1 position, 2 effort; 3 and 4: position and effort without gravity"
-            " compensation"
+            " compensation; 5 and 6: effort, and position of a master's wrist, with and without it"
         ),
         size=2,
     )
@@ -199,15 +238,21 @@ def _wrench_states(arm: str, joints: int, reference: str, period_ns: int) -> Ite
         yield signal_out(jacobian, description=meaning, size=size, shape=shape, period_ns=period_ns)
 
 
-def _settings(arm: str, joints: tuple[str, ...], reference: str, period_ns: int) -> Iterator[Port]:
-    base = "of the arm's base frame: where the setup joints hold it"
+def _master_gripper(arm: str, period_ns: int) -> Iterator[Port]:
+    names = ("gripper",)
+    yield measured_joints(f"sense/{arm}/gripper/measured_js", names)
+    yield signal_out(
+        f"{arm}/gripper/measured_js", JointState, names=names, fields=crtk.MEASURED, period_ns=period_ns
+    )
+
+
+def _settings(arm: str, joints: tuple[str, ...], period_ns: int) -> Iterator[Port]:
     weight = "that carries the weight that the controller knows; 0 while it is switched off"
     ratios = (
         ("ratio", "of velocity and acceleration; 0 where they differ"),
         ("ratio_v", "of the velocity"),
         ("ratio_a", "of the acceleration"),
     )
-    yield signal_out(f"SUJ/{arm}/measured_cp", PoseStamped, base, frame=reference, period_ns=period_ns)
     for name, meaning in ratios:
         yield signal_out(f"{arm}/trajectory_j/{name}", Float64Message, meaning, period_ns=period_ns)
     yield signal_out(

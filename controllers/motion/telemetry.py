@@ -13,8 +13,8 @@ import numpy as np
 from controllers.motion.frames import rotate_twist
 from robots.dvrk import arm_bodies
 from robots.dvrk.dynamics import STANDARD_GRAVITY, Dynamics
-from robots.dvrk.linkage import Linkage
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.linkage import MTM, Linkage
+from robots.dvrk.setup_joints import DrivenArm
 from robots.rotation import from_matrices
 from robots.serial_chain import SerialChain, SerialChains
 from schemas.vectors import Vector
@@ -28,6 +28,7 @@ _POSES = (
     *(f"{{}}/{local}{kind}_cp" for kind in ("setpoint", "measured") for local in ("local/", "")),
 )
 _TWISTS = tuple(f"{{}}/{local}{kind}_cv" for kind in ("setpoint", "measured") for local in ("local/", ""))
+_MASTERS = ("MTML", "MTMR")
 _RATIOS, _KINDS = ("ratio_v", "ratio_a", "ratio"), ("body", "spatial")
 
 
@@ -110,6 +111,8 @@ class Telemetry:
         self.wrenches |= wrenches.keys()
         for names, values in ((_POSES, self._poses[i]), (_TWISTS, self._twists[i])):
             self.outputs |= {name.format(arm): value for name, value in zip(names, values, strict=True)}
+        if arm in _MASTERS:  # no setup joints carry them
+            del self.outputs[_POSES[0].format(arm)]
         self.outputs |= {
             f"{arm}/trajectory_j/{name}": self._ratios[i, j : j + 1] for j, name in enumerate(_RATIOS)
         }
@@ -252,12 +255,12 @@ def _pseudo_inverse(matrices: Vector) -> Vector:
 
 
 class KnownWeight:
-    """The weight carried by the real controller: the endoscope's.
+    """The weight carried by the real controller: the endoscope's, and a master's.
 
     The rest of an arm is balanced by springs and weights (docs/decisions/0010).
     """
 
-    def __init__(self, arm: CartArm, chain: SerialChain, base: Vector) -> None:
+    def __init__(self, arm: DrivenArm, chain: SerialChain, base: Vector) -> None:
         """`base`: pose of the arm's base frame in the world, shape (4, 4)."""
         self._gravity = base[:3, :3].T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
         self._nothing = np.zeros(len(chain.joints))
@@ -266,6 +269,8 @@ class KnownWeight:
             self._dynamics = Dynamics(
                 chain, Linkage((), ()), {"roll": arm_bodies.ecm()["roll"]}, self._nothing
             )
+        elif arm in _MASTERS:
+            self._dynamics = Dynamics(chain, MTM, arm_bodies.mtm(), self._nothing)
 
     def effort(self, q: Vector) -> Vector:
         """Return the carrying efforts (N m, N), shape (n,), at joint positions `q`, shape (n,)."""

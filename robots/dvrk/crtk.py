@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Literal
 
+from robots.dvrk.mtm import DISPLAY_FRAME
 from schemas.crtk import CartesianImpedance, CartesianState, OperatingState, StringStamped
 from schemas.ros import (
     BoolMessage,
@@ -201,7 +202,7 @@ def reference_frame(arm: str, arms: Collection[str], mounting: Mounting, referen
     """Return the `frame_id` of the arm's Cartesian states and commands that are not `local/`.
 
     On the real system (jhu-dvrk/sawIntuitiveResearchKit) a PSM is seen from the camera, the ECM from the
-    cart.
+    cart, a master from the stereo viewer.
 
     Args:
         arm: name, such as `PSM1`.
@@ -212,6 +213,8 @@ def reference_frame(arm: str, arms: Collection[str], mounting: Mounting, referen
     world = CART_FRAME if mounting == "cart" else WORLD_FRAME
     if reference == "world":
         return world
+    if reference == "camera" and arm.startswith("MTM"):
+        return DISPLAY_FRAME
     if reference == "base" or "ECM" not in arms:
         return base_frame(arm)
     return CART_FRAME if arm == "ECM" else CAMERA_FRAME

@@ -28,7 +28,8 @@ from math import degrees, pi, radians
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.dvrk import ecm, psm
+from robots.dvrk import ecm, mtm, psm
+from robots.dvrk.mtm_inverse import inverse_mtm
 from robots.limits import ANGLE_TOLERANCE, distinct
 from robots.serial_chain import Joint, SerialChain, compiled
 from robots.transform import inverse_transform
@@ -102,7 +103,7 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
         joints = inverse(psm, tips, near=home)     # (..., 4, 4), m -> (..., 6), rad and m
 
     Args:
-        chain: a PSM with a wrist of three joints or none, or an ECM.
+        chain: a PSM with a wrist of three joints or none, an ECM, or a master (`robots.dvrk.mtm_inverse`).
         pose: of the tip in the chain's base frame, shape (..., 4, 4).
         near: joint positions that decide between solutions, shape (n,) or (..., n).
 
@@ -110,6 +111,11 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
         MotionError: wrong shape, not finite, no rigid transform, or not reachable; the message names the
             joints, the positions they would need and their ranges, for the first of many poses that fails.
     """
+    if len(chain.joints) == len(mtm.JOINT_NAMES):
+        poses, start = _goals(chain, pose, near)
+        rows = zip(poses, np.broadcast_to(start, (len(poses), len(chain.joints))), strict=True)
+        found = np.array([inverse_mtm(chain, one, at) for one, at in rows])
+        return found.reshape(*np.shape(pose)[:-2], -1)
     form = _form(chain)
     if compiled is not None:
         found = compiled.inverse(chain.numbers, form.numbers, pose, near)

@@ -429,7 +429,7 @@ class MountedMtm(MountedArm):
     start: MtmPositions = Field(
         default=mtm.HOME, description=f"joint positions at time 0: {', '.join(mtm.JOINT_NAMES)}"
     )
-    gripper: Angle = Field(
+    opening: Angle = Field(
         default=radians(30.0), ge=0.0, le=mtm.GRIPPER_OPEN, description="opening of the gripper at time 0"
     )
 
@@ -461,7 +461,7 @@ class MountedMtm(MountedArm):
     @property
     def end_effector_start(self) -> tuple[float, ...]:
         """Opening of the gripper at time 0."""
-        return (self.gripper,)
+        return (self.opening,)
 
     @property
     def _published(self) -> _Published:

@@ -35,7 +35,7 @@ def _housing() -> tuple[Part, ...]:
 
 def _viewer() -> tuple[Part, ...]:
     """Hood with two eyepieces, tilted as the picture is."""
-    hood = block((-0.17, -0.10, 0.03), (0.17, 0.12, 0.36), 0.03)
+    hood = block((-0.17, -0.10, 0.03), (0.17, 0.12, 0.26), 0.03)
     eyes = [rod((x, 0.0, 0.0), (x, 0.0, 0.05), 0.026) for x in (-0.032, 0.032)]
     turn, place = _VIEWER[:3, :3], _VIEWER[:3, 3]
     rest = block((-0.14, 0.10, -0.01), (0.14, 0.125, 0.10), 0.01)
