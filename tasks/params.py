@@ -13,9 +13,9 @@ from pydantic import Field, GetPydanticSchema
 from hub.participant import Params
 from robots.dvrk import endoscope
 from robots.dvrk.endoscope import StereoCamera
-from robots.dvrk.mounted import MountedArms, MountedEcm, MountedPsm
+from robots.dvrk.mounted import AnyArm, MountedArms, MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.setup_joints import CartArm, DrivenArm
 from robots.training.fixtures import FixtureParams
 from schemas.quantity import Angle, Duration, Force, Length, Speed
 
@@ -30,9 +30,9 @@ class TaskParams(Params):
 
     open_to_pages: ClassVar[bool] = True
 
-    arms: Annotated[
-        dict[CartArm, MountedPsm | MountedEcm], GetPydanticSchema(lambda _, handler: handler(MountedArms))
-    ] = Field(min_length=1, description="as in the scene: where each stands, and which endoscope looks on")
+    arms: Annotated[dict[DrivenArm, AnyArm], GetPydanticSchema(lambda _, handler: handler(MountedArms))] = (
+        Field(min_length=1, description="as in the scene: where each stands, and which endoscope looks on")
+    )
     mounting: Literal["free", "cart"] = Field(default="free", description="as in the scene")
     setup_joints: dict[CartArm, SetupPositions] = Field(
         default_factory=dict[CartArm, SetupPositions], description="as in the scene"
@@ -74,14 +74,19 @@ class TaskParams(Params):
     )
 
     @property
+    def watched_arms(self) -> tuple[CartArm, ...]:
+        """The arms of the cart, in the scenario's order: no task watches masters."""
+        return tuple(name for name in self.arms if name != "MTML" and name != "MTMR")
+
+    @property
     def psms(self) -> tuple[CartArm, ...]:
         """The arms with instruments, in the scenario's order."""
-        return tuple(name for name, arm in self.arms.items() if isinstance(arm, MountedPsm))
+        return tuple(name for name in self.watched_arms if isinstance(self.arms[name], MountedPsm))
 
     @property
     def ecm(self) -> CartArm | None:
         """The arm with the endoscope; None: none."""
-        return next((name for name, arm in self.arms.items() if isinstance(arm, MountedEcm)), None)
+        return next((name for name in self.watched_arms if isinstance(self.arms[name], MountedEcm)), None)
 
     @property
     def camera(self) -> StereoCamera:

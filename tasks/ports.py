@@ -24,7 +24,8 @@ def task_ports(params: TaskParams) -> tuple[Port, ...]:
 def _inputs(params: TaskParams) -> Iterator[Port]:
     wrench = "on the instrument; the force of both together is what may be excessive"
     following = "whether a hand leads the arm: `following` of its teleoperation"
-    for arm, mounted in params.arms.items():
+    for arm in params.watched_arms:
+        mounted = params.arms[arm]
         pose, base = f"{arm}/measured_cp", f"{arm}_base"
         if isinstance(mounted, MountedEcm):
             yield signal_in(pose, PoseStamped, "of the endoscope's camera", frame=base, start=_NO_POSE)

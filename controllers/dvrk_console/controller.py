@@ -60,7 +60,7 @@ class DvrkConsole(Controller):
         masters = sorted({component.master for component in self._components.values()})
         self._readiness = Readiness((*params.arms, *masters))
         self._state = DvrkConsoleState()
-        self._state.enabled = params.enabled
+        self._state.enabled, self._state.operator_present = params.enabled, params.operator_present
         for component in self._components.values():
             component.state.selected = not self._rival_components(component)
         self._powers = {arm: np.zeros(1) for arm in params.energy}

@@ -53,6 +53,9 @@ class DvrkConsoleParams(Params):
         default=False,
         description=("whether teleoperation is enabled at time 0; on the real system it is not"),
     )
+    operator_present: bool = Field(
+        default=False, description="whether an operator's head is in the viewer at time 0"
+    )
     align_mtm: bool = Field(
         default=True,
         description="masters are turned by their motors as the tips are before they lead; false for styluses",

@@ -13,6 +13,8 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import ClassVar, cast
 
+import numpy as np
+
 from devices.ros.params import GatewayParams
 from devices.ros.status import StatusCounters
 from devices.ros.topics.arbitration import CommandArbiter
@@ -41,7 +43,10 @@ from devices.ros.topics.whole_robot import (
 from devices.ros.transport import Publisher, ServiceHandler, Transport
 from devices.samples import stamp_of
 from hub.participant import Device, Sample, Value, event_out
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.mounted import MountedMtm
+from robots.dvrk.mtm import BASE
+from robots.dvrk.setup_joints import DrivenArm
+from robots.transform import matrix_to_pose
 from schemas.crtk import OperatingState
 from schemas.errors import MessageError, did_you_mean
 from schemas.message import Message
@@ -194,8 +199,14 @@ class Gateway(Device):
 
     def _service_handler(self, row: Row) -> ServiceHandler:
         """Return the counting handler of an arm's service."""
-        arm, count = self.params.arms.present_arms[cast("CartArm", row.owner)], self._counters[row]
-        handle = kinematics_handler(row, arm.chain, self._states[f"SUJ/{row.owner}/measured_cp"])
+        arm, count = self.params.arms.driven_arms[cast("DrivenArm", row.owner)], self._counters[row]
+        if isinstance(arm, MountedMtm):
+            bases = {"camera": BASE[arm.side], "base": np.eye(4), "world": arm.pose}
+            pose = matrix_to_pose(bases[self.params.reference])
+            handle = kinematics_handler(row, arm.chain, lambda: pose)
+        else:
+            state = self._states[f"SUJ/{row.owner}/measured_cp"]
+            handle = kinematics_handler(row, arm.chain, lambda: state.value, state.port.name)
 
         def count_payload(payload: bytes) -> bytes:
             count.messages += 1

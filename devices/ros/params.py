@@ -51,7 +51,7 @@ class TopicParams(Params):
 
     @model_validator(mode="after")
     def _shown_or_listened_to(self) -> Self:
-        both = sorted(set(self.arms.present_arms) & set(self.listen))
+        both = sorted(set(self.arms.driven_arms) & set(self.listen))
         if both:
             raise ValueError(
                 f"{', '.join(both)}: an arm is either simulated (`arms`) or real (`listen`); for both take"

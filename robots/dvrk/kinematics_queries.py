@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robots import rotation
+from robots.dvrk import mtm
 from robots.dvrk.cannula import Cannula
 from robots.dvrk.inverse import inverse
 from robots.serial_chain import SerialChain
@@ -44,8 +45,9 @@ class KinematicsQueries:
     """Answers for an arm with a given instrument or endoscope; keeps no state."""
 
     def __init__(self, chain: SerialChain) -> None:
-        """`chain`: kinematics of a PSM or the ECM, rows in modified Denavit-Hartenberg form."""
-        self._chain, self._cannula = chain, Cannula.of(chain)
+        """`chain`: kinematics of a PSM, the ECM or a master, rows in modified Denavit-Hartenberg form."""
+        self._chain = chain
+        self._cannula = None if len(chain.joints) == len(mtm.JOINT_NAMES) else Cannula.of(chain)
 
     def forward(self, jp: Vector, base: Vector | None = None) -> Answer:
         """Return the pose at joint positions `jp`, shape (m,) with m from 0 to n, in range or not.
@@ -82,7 +84,8 @@ class KinematicsQueries:
             return Answer(jp, False, f"incorrect number of joints: {jp.size}, expected {n}")
         try:
             q = inverse(self._chain, _frame(cp), jp)
-            self._cannula.check(q, jp)
+            if self._cannula is not None:
+                self._cannula.check(q, jp)
         except MotionError as error:
             return Answer(jp, False, f"inverse kinematics failed: {error}")
         return Answer(q, True, "")

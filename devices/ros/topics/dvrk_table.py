@@ -22,8 +22,8 @@ from hub.participant import SignalFields, event_in, event_out, signal_in, signal
 from robots.dvrk import arms as dvrk
 from robots.dvrk import crtk
 from robots.dvrk.console_topics import PARTS, PEDALS, TELEOPERATION
-from robots.dvrk.mounted import MountedEcm, MountedPsm
-from robots.dvrk.setup_joints import CartArm, joint_names
+from robots.dvrk.mounted import AnyArm, MountedMtm
+from robots.dvrk.setup_joints import CartArm, DrivenArm, joint_names
 from schemas.ros import (
     CameraInfo,
     CompressedImage,
@@ -66,7 +66,7 @@ def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
     Ports are named like their topics, without namespace and leading slash.
     """
     rows: list[Row] = []
-    for name, arm in params.arms.present_arms.items():
+    for name, arm in params.arms.driven_arms.items():
         rows += _simulated_arm(name, arm, _reference_frame(name, params))
     for carried in get_args(CartArm):
         rows += _setup_joints(
@@ -94,7 +94,7 @@ def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
     )
 
 
-def _reference_frame(arm: CartArm, params: GatewayParams) -> str:
+def _reference_frame(arm: DrivenArm, params: GatewayParams) -> str:
     """Return the `frame_id` of Cartesian states other than `local/`.
 
     The plan refuses a scenario with another frame in the motion controller.
@@ -132,12 +132,9 @@ def _joint_states(owner: str, prefix: str, names: tuple[str, ...]) -> Iterator[R
         yield _state(owner, prefix + kind, JointState.ros_type, names=names, fields=crtk.MEASURED)
 
 
-def _simulated_arm(arm: CartArm, mounted: MountedPsm | MountedEcm, reference: str) -> Iterator[Row]:
+def _simulated_arm(arm: DrivenArm, mounted: AnyArm, reference: str) -> Iterator[Row]:
     names = tuple(joint.name for joint in mounted.chain.joints)
-    is_psm = isinstance(mounted, MountedPsm)
-    events, commands = (
-        (crtk.PSM_EVENTS, crtk.PSM_COMMANDS) if is_psm else (crtk.ECM_EVENTS, crtk.ECM_COMMANDS)
-    )
+    events, commands = _own_topics(arm)
     yield from _events_and_commands(arm, crtk.EVENTS | events, crtk.COMMANDS | commands, names)
     yield from _joint_states(arm, "", names)
     yield _state(
@@ -154,12 +151,26 @@ def _simulated_arm(arm: CartArm, mounted: MountedPsm | MountedEcm, reference: st
     for ratio in ("ratio", "ratio_v", "ratio_a"):
         yield _state(arm, f"trajectory_j/{ratio}", Float64Message.ros_type)
     yield from (Row(f"/{arm}/{name}", type_, "serve", owner=arm) for name, type_ in _SERVICES.items())
+    if isinstance(mounted, MountedMtm):
+        yield _state(
+            arm, "gripper/measured_js", JointState.ros_type, names=("gripper",), fields=crtk.MEASURED
+        )
+        return
     effector = mounted.commanded_end_effector
     if grasping := tuple(joint.name for joint in effector.joints):
         gripper = effector.name
         yield from _joint_states(arm, f"{gripper}/", grasping)
         gripper_commands = {f"{gripper}/{name}": type_ for name, type_ in crtk.GRIPPER_COMMANDS.items()}
         yield from _events_and_commands(arm, {}, gripper_commands, grasping)
+
+
+def _own_topics(arm: str) -> tuple[Mapping[str, str], Mapping[str, str]]:
+    """Return events and commands of this kind of arm alone."""
+    if arm.startswith("MTM"):
+        return crtk.MTM_EVENTS, crtk.MTM_COMMANDS
+    if arm.startswith("PSM"):
+        return crtk.PSM_EVENTS, crtk.PSM_COMMANDS
+    return crtk.ECM_EVENTS, crtk.ECM_COMMANDS
 
 
 def _setup_joints(arm: CartArm, reference: str) -> Iterator[Row]:
@@ -218,13 +229,7 @@ def _real_arm(arm: Real) -> Iterator[Row]:
             yield _real_state(arm, prefix + name, type_)
     for name, type_ in crtk.WRENCH_STATES.items():
         yield _real_state(arm, name, type_)
-    own_events, own_commands = (
-        (crtk.MTM_EVENTS, crtk.MTM_COMMANDS)
-        if is_master
-        else (crtk.PSM_EVENTS, crtk.PSM_COMMANDS)
-        if is_psm
-        else (crtk.ECM_EVENTS, crtk.ECM_COMMANDS)
-    )
+    own_events, own_commands = _own_topics(arm)
     for name, type_ in (crtk.EVENTS | own_events).items():
         yield _command(arm, name, type_)
     jaw = {f"jaw/{name}": type_ for name, type_ in crtk.GRIPPER_COMMANDS.items()} if is_psm else {}

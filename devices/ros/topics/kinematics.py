@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from devices.ros.topics.publications import State
 from devices.ros.topics.row import Row
 from devices.ros.transport import ServiceHandler
 from robots.dvrk.kinematics_queries import KinematicsQueries
@@ -22,23 +23,24 @@ from schemas.vectors import Vector
 __all__ = ["kinematics_handler"]
 
 
-def kinematics_handler(row: Row, chain: SerialChain, base: State) -> ServiceHandler:
+def kinematics_handler(
+    row: Row, chain: SerialChain, base: Callable[[], Vector | None], port: str = ""
+) -> ServiceHandler:
     """Return the handler of the service `row`.
 
     Args:
         row: forward or inverse kinematics, in the arm's base (`local/...`) or in the reference frame.
         chain: the arm's kinematics.
-        base: pose, shape (7,), of the arm's base in the reference frame.
+        base: returns the pose, shape (7,), of the arm's base in the reference frame, if that is known.
+        port: name of that pose, for errors.
     """
     queries = KinematicsQueries(chain)
 
     def forward(payload: bytes) -> bytes:
-        base_pose = None if row.name.startswith("local/") else base.value
+        base_pose = None if row.name.startswith("local/") else base()
         if base_pose is None and not row.name.startswith("local/"):
             return encode(
-                ForwardKinematicsResponse(
-                    message=f"{base.port.name} has no value now: is the session running?"
-                )
+                ForwardKinematicsResponse(message=f"{port} has no value now: is the session running?")
             )
         answer = queries.forward(decode(ForwardKinematicsRequest, payload).jp, base_pose)
         return encode(

@@ -11,7 +11,7 @@ from devices.ros.params import GatewayParams
 from devices.ros.topics.publications import State
 from robots.dvrk.ecm import tip
 from robots.dvrk.endoscope import BASELINE, optical_in_roll
-from robots.dvrk.mounted import MountedArm, MountedEcm
+from robots.dvrk.mounted import MountedArm, MountedEcm, MountedMtm
 from robots.transform import inverse_transform, matrix_to_pose, translation
 from schemas.codec import encode
 from schemas.ros import Header, Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3
@@ -35,7 +35,7 @@ class TransformTree:
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
         """`states`: by the names of their ports."""
         self._edges: list[_Edge] = []
-        for name, arm in params.arms.present_arms.items():
+        for name, arm in params.arms.driven_arms.items():
             self._edges += [
                 _base(name, arm, params, states),
                 (f"{name}_base", name, _newest(states[f"{name}/local/measured_cp"])),
@@ -98,6 +98,8 @@ class _Template:
 def _base(name: str, arm: MountedArm, params: GatewayParams, states: Mapping[str, State]) -> _Edge:
     """Return the edge to an arm's base: the pose from the motion controller if movable, else fixed."""
     child = f"{name}_base"
+    if isinstance(arm, MountedMtm):
+        return "Cart" if params.mounting == "cart" else "world", child, _fixed(matrix_to_pose(arm.pose))
     if params.mounting == "cart":
         return "Cart", child, _newest(states[f"SUJ/{name}/local/measured_cp"])
     if params.reference == "world":

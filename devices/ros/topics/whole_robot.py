@@ -18,7 +18,7 @@ from schemas.vectors import VectorCodec
 
 __all__ = ["inputs_of_all", "periods_between", "robot_description", "whole_robot_sources"]
 
-_PARTS = ("", "jaw/", "hand/")
+_PARTS = ("", "jaw/", "hand/", "gripper/")
 
 
 def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, WantedSource]:
@@ -39,7 +39,7 @@ def inputs_of_all(params: GatewayParams) -> frozenset[str]:
     poses = ("{}/local/measured_cp", "SUJ/{}/measured_cp", "SUJ/{}/local/measured_cp")
     joints = (f"{{}}/{part}measured_js" for part in _PARTS)
     names = (*poses, *joints)
-    return frozenset(name.format(arm) for arm in params.arms.present_arms for name in names)
+    return frozenset(name.format(arm) for arm in params.arms.driven_arms for name in names)
 
 
 def periods_between(name: str, period_ns: int) -> int:
@@ -71,7 +71,7 @@ class _JointStates:
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
         found = (
             (arm, states.get(f"{arm}/{part}measured_js"))
-            for arm in params.arms.present_arms
+            for arm in params.arms.driven_arms
             for part in _PARTS
         )
         self._parts = [(arm, state) for arm, state in found if state is not None]
