@@ -68,7 +68,7 @@ upright: x to the right, y ahead, z up.
 DISPLAY_FRAME = "HRSV"
 """`frame_id` of the stereo viewer (same file)."""
 
-HOME = (0.0,) * 7
+HOME = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """Joint positions after homing (SAW mtsIntuitiveResearchKitMTM.cpp, SetGoalHomingArm)."""
 GRIPPER_OPEN = radians(60.0)
 """Largest opening of the gripper (SAW mtsIntuitiveResearchKit.h, GripperMax)."""

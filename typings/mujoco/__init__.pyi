@@ -29,6 +29,7 @@ class mjtJoint(IntEnum):
 class mjtTrn(IntEnum):
     mjTRN_JOINT = ...
     mjTRN_TENDON = ...
+    mjTRN_SITE = ...
 
 class mjtLightType(IntEnum):
     mjLIGHT_DIRECTIONAL = ...
@@ -252,6 +253,7 @@ class _Element:
     qposadr: NDArray[np.int32]
     geomadr: NDArray[np.int32]
     geomnum: NDArray[np.int32]
+    mocapid: NDArray[np.int32]
 
 class _Skin:
     id: int
@@ -371,6 +373,9 @@ class _Contacts:
     frame: _Array
 
 class MjData:
+    actuator_force: _Array
+    mocap_pos: _Array
+    mocap_quat: _Array
     flexvert_xpos: _Array
     contact: _Contacts
     efc_force: _Array

@@ -164,7 +164,7 @@ def _simulated_arm(arm: DrivenArm, mounted: AnyArm, reference: str) -> Iterator[
         yield from _events_and_commands(arm, {}, gripper_commands, grasping)
 
 
-def _own_topics(arm: str) -> tuple[Mapping[str, str], Mapping[str, str]]:
+def _own_topics(arm: str) -> tuple[dict[str, str], dict[str, str]]:
     """Return events and commands of this kind of arm alone."""
     if arm.startswith("MTM"):
         return crtk.MTM_EVENTS, crtk.MTM_COMMANDS

@@ -41,7 +41,11 @@ docs/decisions/0010.
 
 _MODES = (_OFF, _POSITION, _EFFORT, _POSITION + _BARE, _EFFORT + _BARE)
 _LOCKS = (_LOCKED, _LOCKED + 1.0)
-_BARE_MODES = {_POSITION + _BARE: _POSITION, _EFFORT + _BARE: _EFFORT, _LOCKED + 1.0: _LOCKED}
+_BARE_MODES: Mapping[float, float] = {
+    _POSITION + _BARE: _POSITION,
+    _EFFORT + _BARE: _EFFORT,
+    _LOCKED + 1.0: _LOCKED,
+}
 """Mode of the drives in each mode without gravity compensation."""
 _OF_ARM = frozenset(joint.name for joint in ARM_JOINTS)
 """Joints that all instruments of an arm have in common."""
