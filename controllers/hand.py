@@ -121,11 +121,11 @@ class HandState(Record):
     gripper = number(radians(30.0))
     """Opening commanded to the gripper, rad."""
     pose = array(7)
-    """Of the hand, in the viewer's frame."""
+    """Pose of the hand in the viewer's frame."""
     start = array(7)
-    """Of the gripper when the hand took hold."""
+    """Pose of the gripper when the hand took hold."""
     device = array(7)
-    """Of the device at that time."""
+    """Pose of the device when the hand took hold."""
 
 
 class Hand(Controller):
@@ -255,8 +255,9 @@ class Hand(Controller):
             gripper = float(inputs["gripper"][0])
             if gripper >= 0.0:
                 return min(gripper, 1.0) * GRIPPER_OPEN
-            return 0.0 if now.jaw else 0.5 * GRIPPER_OPEN if now.holds else GRIPPER_OPEN
-        if now.holds:
+            if now.following or not self._waits:
+                return 0.0 if now.jaw else 0.5 * GRIPPER_OPEN
+        elif now.holds:
             return float(self._on_path()[6])
         return 0.5 * (GRIPPER_OPEN + _SQUEEZE * cos(2.0 * pi * _SQUEEZES * now.time))
 

@@ -49,7 +49,7 @@ class LockState(Record):
 
     locked = flag()
     orientation = array(3, 3)
-    """In the arm's base frame."""
+    """Locked orientation in the arm's base frame."""
     joints = array(7)
     """Joint positions when it was locked."""
 
@@ -121,7 +121,7 @@ class MasterGripper:
         self.state = GripperState()
         self.state.measured[0] = start
         self.measured = np.array(self.state.measured)
-        """As last published: opening, velocity, effort."""
+        """Last published opening, velocity and effort."""
 
     def sense(self, inputs: Inputs) -> None:
         """Read the measurement."""

@@ -39,7 +39,7 @@ class _Link(NamedTuple):
     """Joint and factor of each term of the angle."""
     mass: float
     centre: tuple[float, float, float]
-    """In the axes of the base with every joint at 0, from the link's origin, m."""
+    """Centre of mass from the link's origin, along the axes of the base with every joint at 0, m."""
     tensor: tuple[float, float, float, float, float, float]
     """About the centre, same axes: xx, xy, xz, yy, yz, zz, kg m^2."""
 
