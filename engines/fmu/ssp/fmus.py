@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from engines.fmu.description import Description, describe
 from engines.fmu.model import read_model
-from engines.fmu.ssp.package import Package
-from engines.fmu.ssp.structure import Component, System
+from engines.fmu.ssp.package import Document
+from engines.fmu.ssp.structure import FMU, Component, System
 from engines.fmu.ssp.units import Unit, model_units
 from engines.fmu.start import settable, unit_of
 from schemas.errors import ScenarioError, did_you_mean
@@ -23,7 +23,6 @@ __all__ = ["RESOURCES", "Fmu", "Variable", "load_fmus"]
 
 RESOURCES = "resources"
 """Folder of the FMUs, in an archive of a system and beside an imported scenario."""
-_FMU = "application/x-fmu-sharedlibrary"
 _UNSAFE = re.compile(r"[^A-Za-z0-9_.-]")
 
 
@@ -72,39 +71,37 @@ class Fmu:
         return describe(self.file, start)
 
 
-def load_fmus(
-    system: System, package: Package, directory: Path, lost: Callable[[str], None]
-) -> dict[tuple[str, ...], Fmu]:
+def load_fmus(system: System, directory: Path, lost: Callable[[str], None]) -> dict[tuple[str, ...], Fmu]:
     """Unpack the FMUs of all components into `directory`; return the FMUs by the path of the component.
 
     A component that is no FMU is reported to `lost`. Raises ScenarioError for a missing or refused FMU, and
     for a connector that contradicts the FMU.
     """
-    files: dict[str, Path] = {}
-    read: dict[str, Fmu] = {}
+    read: dict[Document, Fmu] = {}
     fmus: dict[tuple[str, ...], Fmu] = {}
     for component in system.components():
         what = f"{component.place}: component '{component.label}'"
         if problem := _no_fmu(component):
             lost(f"{what} {problem}, with all its connections")
             continue
-        name = package.resolve(component.source, what)
-        if name not in read:
-            files[name] = directory / _file_name(name, {file.name for file in files.values()})
-            package.extract(name, files[name])
-            read[name] = _read(files[name], what)
-        fmus[component.path] = read[name]
+        document = component.document.resolve(component.source, what)
+        if document not in read:
+            file = directory / _file_name(document.name, {fmu.file.name for fmu in read.values()})
+            with file.open("wb") as target:
+                document.package.extract(document.name, target)
+            read[document] = _read(file, what)
+        fmus[component.path] = fmu = read[document]
         if component.implementation not in {"any", "CoSimulation"}:
             lost(f"{what}: implementation '{component.implementation}'; the FMU is co-simulated")
-        _check_connectors(component, read[name])
+        _check_connectors(component, fmu)
     return fmus
 
 
 def _no_fmu(component: Component) -> str:
     if not component.source:
         return "has no source: it is a place without an implementation"
-    if component.type != _FMU:
-        return f"is of type '{component.type}'; only FMUs ('{_FMU}') and systems in the same file are read"
+    if component.type != FMU:
+        return f"is of type '{component.type}'; FMUs ('{FMU}') and systems are read"
     return ""
 
 

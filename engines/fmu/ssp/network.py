@@ -154,7 +154,8 @@ class Network:
             there = self._unit(end)
             try:
                 step = read_transformation(node, self._items(at), self._items(end))
-                if unit and there and not node.boolean("suppressUnitConversion"):
+                suppressed = node.boolean("suppressUnitConversion")
+                if unit and there and not suppressed:
                     change = compose(change, conversion(unit, there))
                 change = compose(change, step)
             except ValueError as error:
@@ -162,5 +163,6 @@ class Network:
                     f"{node.place}: the connection {at} -> {end} cannot be converted: {error}. Correct"
                     " the unit of a connector, or state suppressUnitConversion"
                 ) from error
-            unit, at = there or unit, end
+            # a value whose conversion is suppressed is in the unit of whatever comes next
+            unit, at = there or (None if suppressed else unit), end
         return Wire(origin, target, change, first, place)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from engines.fmu.ssp.package import Package
+from engines.fmu.ssp.structure import Binding
 from engines.fmu.ssp.transformations import Linear, Transformation, compose, read_transformation
 from engines.fmu.ssp.units import Unit, conversion, read_units
 from engines.fmu.ssp.xml_file import Node
@@ -52,9 +52,10 @@ class ParameterValue:
 
 
 def read_binding(
-    binding: Node, package: Package, owner: str, lost: Callable[[str], None]
+    given: Binding, owner: str, lost: Callable[[str], None]
 ) -> Iterator[tuple[str, ParameterValue]]:
     """Yield names and values of a parameter binding, mapped and with its prefix. Raises ScenarioError."""
+    binding, document = given.node, given.document
     what = f"{binding.place}: a parameter binding of '{owner}'"
     if binding.get("type", "application/x-ssp-parameter-set") != "application/x-ssp-parameter-set":
         lost(f"{what} of type '{binding.get('type')}': only parameter sets of SSP are read")
@@ -64,7 +65,7 @@ def read_binding(
         return
     parent, source = binding.find("ssd:ParameterValues"), binding.get("source")
     if source:
-        root: Node | None = package.xml(package.resolve(source, what))
+        root: Node | None = document.resolve(source, what).xml()
     else:
         root = parent.find("ssv:ParameterSet") if parent else None
     if root is None or root.name != "ssv:ParameterSet":
@@ -76,7 +77,7 @@ def read_binding(
         yield from values.items()
         return
     source = mapping.get("source")
-    table = package.xml(package.resolve(source, what)) if source else mapping.find("ssm:ParameterMapping")
+    table = document.resolve(source, what).xml() if source else mapping.find("ssm:ParameterMapping")
     if table is None or table.name != "ssm:ParameterMapping":
         raise ScenarioError(f"{what} has a mapping without ParameterMapping, inline or as 'source'")
     yield from _mapped(table, values, lost)

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from engines.fmu.ssp.package import Document
 from engines.fmu.ssp.units import Unit, read_units
 from engines.fmu.ssp.xml_file import Node
 from schemas.errors import ScenarioError
 
-__all__ = ["Component", "Connector", "Description", "Element", "System", "read_description"]
+__all__ = ["FMU", "Binding", "Component", "Connector", "Description", "Element", "System", "read_description"]
 
+FMU = "application/x-fmu-sharedlibrary"
+_DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
+"""Types of components that are a system in a file of its own."""
 KINDS = (
     *("input", "output", "inout", "parameter", "calculatedParameter", "structuralParameter"),
     *("constant", "local", "unspecified"),
@@ -18,6 +22,8 @@ KINDS = (
 _NO_TYPES = {"ssd:ConnectorGeometry", "ssc:Dimension", "ssd:Dimension", "ssd:Clock", "ssc:Annotations"}
 _DEEPEST = 20
 """Levels of systems in systems."""
+_MOST_ELEMENTS = 10_000
+"""Systems and components; a file may be an element many times."""
 
 _KNOWN: Mapping[str, frozenset[str]] = {
     "ssd:SystemStructureDescription": frozenset(
@@ -71,6 +77,14 @@ class Connector:
     place: str
 
 
+@dataclass(frozen=True)
+class Binding:
+    """A parameter binding, and the file from which its URIs start."""
+
+    node: Node
+    document: Document
+
+
 @dataclass
 class Element:
     """A system or a component: what both have."""
@@ -80,8 +94,10 @@ class Element:
     """Names from the outermost system's child to this element; empty for the outermost system."""
     place: str
     connectors: dict[str, Connector]
-    bindings: list[Node]
+    bindings: list[Binding]
     annotations: Node | None
+    document: Document
+    """File of the element, from which its URIs start."""
 
     @property
     def label(self) -> str:
@@ -126,9 +142,7 @@ class Description:
     """A description of a system."""
 
     name: str
-    version: str
     root: System
-    units: Mapping[str, Unit]
     start_time: float
     stop_time: float | None
     annotations: list[Node]
@@ -137,17 +151,11 @@ class Description:
     """Elements that are not carried over, each a sentence."""
 
 
-def read_description(root: Node) -> Description:
+def read_description(document: Document) -> Description:
     """Return the structure in an SSD file. Raises ScenarioError, with line, for a broken one."""
-    if root.name != "ssd:SystemStructureDescription":
-        raise ScenarioError(f"{root.place}: the root element is {root.name}, not SystemStructureDescription")
-    version = root.require("version")
-    if version not in {"1.0", "2.0"}:
-        raise ScenarioError(f"{root.place}: version '{version}' of SSP; 1.0 and 2.0 are allowed")
-    reader = _Reader(root)
-    outer = root.find("ssd:System")
-    if outer is None:
-        raise ScenarioError(f"{root.place}: the description has no System")
+    root = document.xml()
+    outer = _outermost(root)
+    reader = _Reader(document, root)
     experiment = root.find("ssd:DefaultExperiment")
     notes = [root.find("ssd:Annotations"), outer.find("ssd:Annotations")]
     start, stop = 0.0, None
@@ -158,21 +166,42 @@ def read_description(root: Node) -> Description:
             stop = experiment.number("stopTime", 0.0)
             if stop <= start:
                 raise ScenarioError(f"{experiment.place}: stopTime {stop:g} is not after startTime {start:g}")
-    system = reader.system(outer, ())
-    lost = [*reader.lost, *_lost(root)]
     return Description(
-        root.require("name"), version, system, reader.units, start, stop, [one for one in notes if one], lost
+        name=root.require("name"),
+        root=reader.system(outer, ()),
+        start_time=start,
+        stop_time=stop,
+        annotations=[one for one in notes if one],
+        lost=reader.lost,
     )
 
 
-_Common = tuple[str, tuple[str, ...], str, dict[str, Connector], list[Node], Node | None]
+def _outermost(root: Node) -> Node:
+    if root.name != "ssd:SystemStructureDescription":
+        raise ScenarioError(f"{root.place}: the root element is {root.name}, not SystemStructureDescription")
+    version = root.require("version")
+    if version not in {"1.0", "2.0"}:
+        raise ScenarioError(f"{root.place}: version '{version}' of SSP; 1.0 and 2.0 are allowed")
+    outer = root.find("ssd:System")
+    if outer is None:
+        raise ScenarioError(f"{root.place}: the description has no System")
+    return outer
+
+
+_Common = tuple[str, tuple[str, ...], str, dict[str, Connector], list[Binding], Node | None, Document]
 """The fields of `Element`."""
 
 
 class _Reader:
     """Reads elements with the units and enumerations of their file."""
 
-    def __init__(self, root: Node) -> None:
+    def __init__(self, document: Document, root: Node, lost: list[str] | None = None) -> None:
+        """Read units and enumerations of a file; what is not carried over goes to `lost`."""
+        self._document = document
+        self.lost: list[str] = [] if lost is None else lost
+        """Elements that are not carried over, each a sentence."""
+        self.lost += _lost(root)
+        self._count = 0
         self.units = read_units(root.find("ssd:Units"))
         enumerations = root.find("ssd:Enumerations")
         self._items = {
@@ -181,7 +210,6 @@ class _Reader:
             }
             for node in (enumerations.all("ssc:Enumeration") if enumerations else ())
         }
-        self.lost: list[str] = []
 
     def system(self, node: Node, path: tuple[str, ...]) -> System:
         """Return a system with everything inside."""
@@ -198,20 +226,45 @@ class _Reader:
                 raise ScenarioError(
                     f"{child.place}: '{name}' is the name of two elements of the system (the other: {other})"
                 )
-            inside = (*path, name)
+            self._count += 1
+            if self._count > _MOST_ELEMENTS:
+                raise ScenarioError(f"{child.place}: more than {_MOST_ELEMENTS} systems and components")
             read = self.system if child.name == "ssd:System" else self._component
-            system.elements[name] = read(child, inside)
+            system.elements[name] = read(child, (*path, name))
         connections = node.find("ssd:Connections")
         system.connections = list(connections.all("ssd:Connection")) if connections else []
         return system
 
-    def _component(self, node: Node, path: tuple[str, ...]) -> Component:
+    def _component(self, node: Node, path: tuple[str, ...]) -> Element:
+        source, type_ = node.get("source"), node.get("type", FMU)
+        if source and not source.startswith("#") and type_ in {_DEFINITION, _PACKAGE}:
+            return self._file_system(node, path, source, type_)
         return Component(
             *self._common(node, path),
-            source=node.get("source"),
-            type=node.get("type", "application/x-fmu-sharedlibrary"),
+            source=source,
+            type=type_,
             implementation=node.get("implementation", "any"),
         )
+
+    def _file_system(self, node: Node, path: tuple[str, ...], source: str, type_: str) -> System:
+        """Return the system in a file that a component names, with the component's parameter bindings."""
+        what = f"{node.place}: component '{node.get('name')}'"
+        if type_ == _PACKAGE:
+            document = self._document.open_package(source, what)
+        else:
+            document = self._document.resolve(source, what)
+        root = document.xml()
+        inner = _Reader(document, root, self.lost)
+        inner._count = self._count
+        system = inner.system(_outermost(root), path)
+        self._count = inner._count
+        system.name = node.require("name")
+        system.bindings += self._bindings(node)
+        return system
+
+    def _bindings(self, node: Node) -> list[Binding]:
+        parent = node.find("ssd:ParameterBindings")
+        return [Binding(one, self._document) for one in parent.all("ssd:ParameterBinding")] if parent else []
 
     def _common(self, node: Node, path: tuple[str, ...]) -> _Common:
         connectors: dict[str, Connector] = {}
@@ -224,14 +277,14 @@ class _Reader:
                     f" (the other: {connectors[connector.name].place})"
                 )
             connectors[connector.name] = connector
-        bindings = node.find("ssd:ParameterBindings")
         return (
             node.require("name"),
             path,
             node.place,
             connectors,
-            list(bindings.all("ssd:ParameterBinding")) if bindings else [],
+            self._bindings(node),
             node.find("ssd:Annotations"),
+            self._document,
         )
 
     def _connector(self, node: Node) -> Connector:

@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 
 from engines.fmu.ssp.fmus import RESOURCES, Fmu, load_fmus
 from engines.fmu.ssp.network import End, Network, Wire
-from engines.fmu.ssp.package import DESCRIPTION, open_package
+from engines.fmu.ssp.package import open_package
 from engines.fmu.ssp.settings import (
     COMPONENT_KEYS,
     SCENARIO_KEYS,
@@ -79,18 +79,18 @@ class _Import:
 
     def run(self) -> ImportedSystem:
         """Return the scenario. Raises ScenarioError."""
-        with open_package(self._path) as package:
-            description = read_description(package.xml(DESCRIPTION))
+        with open_package(self._path) as document:
+            description = read_description(document)
             self._lost += description.lost + unread_annotations(description)
             root = description.root
-            fmus = load_fmus(root, package, self._directory / RESOURCES, self._lost.append)
+            fmus = load_fmus(root, self._directory / RESOURCES, self._lost.append)
             if not fmus:
                 raise ScenarioError(
                     f"'{self._path}' has no component that is an FMU: there is nothing to run."
                     f" {'; '.join(self._lost[:5])}"
                 )
             network = Network(description, fmus, self._lost.append)
-            values = StartValues(root, package, fmus, self._lost.append)
+            values = StartValues(root, fmus, self._lost.append)
             wires = network.wires()
             values.follow(wires)
             names = self._names(root.components(), fmus)

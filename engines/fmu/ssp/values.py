@@ -7,7 +7,6 @@ from typing import Any
 
 from engines.fmu.ssp.fmus import Fmu, Variable
 from engines.fmu.ssp.network import End, Wire
-from engines.fmu.ssp.package import Package
 from engines.fmu.ssp.parameters import ParameterValue, read_binding
 from engines.fmu.ssp.structure import Component, Element, System
 from schemas.errors import ScenarioError, did_you_mean
@@ -21,13 +20,11 @@ class StartValues:
     def __init__(
         self,
         system: System,
-        package: Package,
         fmus: Mapping[tuple[str, ...], Fmu],
         lost: Callable[[str], None],
     ) -> None:
         """Read all parameter bindings. Raises ScenarioError."""
         self._fmus = fmus
-        self._package = package
         self._lost = lost
         self._values: dict[End, ParameterValue] = {}
         self._apply(system)
@@ -36,7 +33,7 @@ class StartValues:
         for inner in element.elements.values() if isinstance(element, System) else ():
             self._apply(inner)
         for binding in element.bindings:
-            for name, value in read_binding(binding, self._package, element.label, self._lost):
+            for name, value in read_binding(binding, element.label, self._lost):
                 ends = self._find(element, name)
                 if not ends:
                     self._lost(f"{value.place}: parameter '{name}' of '{element.label}' is no variable there")

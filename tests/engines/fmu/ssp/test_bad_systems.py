@@ -259,7 +259,7 @@ def test_what_is_not_carried_over_is_named(fmus: Path) -> None:
         "ssd:SignalDictionaryReference of 'root': signal dictionaries are not supported",
         "ssd:Valve of 'root' is no element that SSP has here",
         "component 'later' has no source: it is a place without an implementation",
-        "component 'model' is of type 'text/x-modelica'; only FMUs",
+        "component 'model' is of type 'text/x-modelica'; FMUs",
         "the connection later.x -> two.F: component 'later' is left out",
         "the connection ball.y -> ball.u: single elements of arrays cannot be connected",
         "the connection free -> one.F: 'free' of the system has no source and no value",
