@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from engines.fmu.ssp.fmus import Fmu
-from engines.fmu.ssp.structure import Component, Description, Element, System
+from engines.fmu.ssp.structure import Component, Description, DictionaryReference, Element, System
 from engines.fmu.ssp.transformations import Linear, Transformation, compose, read_transformation
 from engines.fmu.ssp.units import Unit, conversion
 from engines.fmu.ssp.xml_file import Node
@@ -57,6 +57,12 @@ class Network:
         for system in description.root.systems():
             self._elements[system.path] = system
             self._elements |= {one.path: one for one in system.elements.values()}
+        for element in list(self._elements.values()):
+            if isinstance(element, DictionaryReference):
+                signals = self._elements.setdefault(
+                    self._dictionary(element), replace(element, connectors={})
+                )
+                signals.connectors |= element.connectors
         for system in description.root.systems():
             for node in system.connections:
                 self._add(system, node, lost)
@@ -91,7 +97,23 @@ class Network:
                 f"{node.place}: element '{element.label}' has no connector"
                 f" '{connector}'.{did_you_mean(connector, element.connectors)}"
             )
+        if isinstance(element, DictionaryReference):
+            return End(self._dictionary(element), connector)
         return End(element.path, connector)
+
+    def _dictionary(self, reference: DictionaryReference) -> tuple[str, ...]:
+        """Return the path that stands for a signal dictionary: all references to it are one element.
+
+        The innermost system with a dictionary of the name has it (SSP 2.0, section 5.5).
+        """
+        for length in range(len(reference.path) - 1, -1, -1):
+            system = self._elements[reference.path[:length]]
+            if isinstance(system, System) and reference.dictionary in system.dictionaries:
+                return (*system.path, f"dictionary {reference.dictionary}")
+        raise ScenarioError(
+            f"{reference.place}: '{reference.label}' refers to the signal dictionary"
+            f" '{reference.dictionary}', which no enclosing system has"
+        )
 
     def _direct(self, system: System, start: End, end: End, text: str) -> tuple[End, End]:
         """Return source and target: the kinds of the connectors decide, not `start` and `end`."""

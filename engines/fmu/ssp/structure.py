@@ -10,7 +10,17 @@ from engines.fmu.ssp.units import Unit, read_units
 from engines.fmu.ssp.xml_file import Node
 from schemas.errors import ScenarioError
 
-__all__ = ["FMU", "Binding", "Component", "Connector", "Description", "Element", "System", "read_description"]
+__all__ = [
+    "FMU",
+    "Binding",
+    "Component",
+    "Connector",
+    "Description",
+    "DictionaryReference",
+    "Element",
+    "System",
+    "read_description",
+]
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
@@ -30,10 +40,14 @@ _KNOWN: Mapping[str, frozenset[str]] = {
         {"ssd:System", "ssd:Enumerations", "ssd:Units", "ssd:DefaultExperiment", "ssd:Annotations"}
     ),
     "ssd:System": frozenset(
-        {"ssd:Connectors", "ssd:ParameterBindings", "ssd:Elements", "ssd:Connections", "ssd:Annotations"}
+        {
+            *("ssd:Connectors", "ssd:ParameterBindings", "ssd:Elements", "ssd:Connections"),
+            *("ssd:SignalDictionaries", "ssd:Annotations"),
+        }
     ),
+    "ssd:SignalDictionaryReference": frozenset({"ssd:Connectors", "ssd:Annotations"}),
     "ssd:Component": frozenset({"ssd:Connectors", "ssd:ParameterBindings", "ssd:Annotations"}),
-    "ssd:Elements": frozenset({"ssd:System", "ssd:Component"}),
+    "ssd:Elements": frozenset({"ssd:System", "ssd:Component", "ssd:SignalDictionaryReference"}),
     "ssd:Connectors": frozenset({"ssd:Connector"}),
     "ssd:Connections": frozenset({"ssd:Connection"}),
     "ssd:ParameterBindings": frozenset({"ssd:ParameterBinding"}),
@@ -59,8 +73,6 @@ _REASONS: Mapping[str, str] = {
     "GraphicalElements": "drawing",
     "MetaData": "meta data",
     "Signature": "signature",
-    "SignalDictionaries": "signal dictionaries are not supported: connect the elements to one another",
-    "SignalDictionaryReference": "signal dictionaries are not supported: connect the elements to one another",
 }
 
 
@@ -115,9 +127,18 @@ class Component(Element):
 
 
 @dataclass
+class DictionaryReference(Element):
+    """Access to the signals of a signal dictionary."""
+
+    dictionary: str
+
+
+@dataclass
 class System(Element):
     """Elements and the connections among them."""
 
+    dictionaries: frozenset[str] = frozenset()
+    """Names of the signal dictionaries."""
     elements: dict[str, Element] = field(default_factory=dict[str, Element])
     connections: list[Node] = field(default_factory=list[Node])
 
@@ -218,7 +239,7 @@ class _Reader:
         system = System(*self._common(node, path))
         elements = node.find("ssd:Elements")
         for child in elements.children if elements else ():
-            if child.name not in {"ssd:System", "ssd:Component"}:
+            if child.name not in _KNOWN["ssd:Elements"]:
                 continue
             name = child.require("name")
             if name in system.elements:
@@ -229,11 +250,22 @@ class _Reader:
             self._count += 1
             if self._count > _MOST_ELEMENTS:
                 raise ScenarioError(f"{child.place}: more than {_MOST_ELEMENTS} systems and components")
-            read = self.system if child.name == "ssd:System" else self._component
-            system.elements[name] = read(child, (*path, name))
+            system.elements[name] = self._element(child, (*path, name))
+        dictionaries = node.find("ssd:SignalDictionaries")
+        if dictionaries is not None:
+            system.dictionaries = frozenset(
+                one.require("name") for one in dictionaries.all("ssd:SignalDictionary")
+            )
         connections = node.find("ssd:Connections")
         system.connections = list(connections.all("ssd:Connection")) if connections else []
         return system
+
+    def _element(self, node: Node, path: tuple[str, ...]) -> Element:
+        if node.name == "ssd:System":
+            return self.system(node, path)
+        if node.name == "ssd:Component":
+            return self._component(node, path)
+        return DictionaryReference(*self._common(node, path), dictionary=node.require("dictionary"))
 
     def _component(self, node: Node, path: tuple[str, ...]) -> Element:
         source, type_ = node.get("source"), node.get("type", FMU)
