@@ -55,6 +55,10 @@ class Fmu:
     model: ModelDescription
     variables: Mapping[str, Variable]
     """Variables by name."""
+    ports: frozenset[str]
+    """Names of inputs and outputs that are ports."""
+    strict: bool
+    """False: the FMU's description breaks a rule of FMI in a way that leaves something undefined."""
 
     @property
     def step_s(self) -> float:
@@ -68,7 +72,7 @@ class Fmu:
 
     def describe(self, start: Mapping[str, object]) -> Description:
         """Return inputs, outputs and checked start values. Raises ScenarioError."""
-        return describe(self.file, start)
+        return describe(self.file, start, strict=self.strict)
 
 
 def load_fmus(system: System, directory: Path, lost: Callable[[str], None]) -> dict[tuple[str, ...], Fmu]:
@@ -89,7 +93,7 @@ def load_fmus(system: System, directory: Path, lost: Callable[[str], None]) -> d
             file = directory / _file_name(document.name, {fmu.file.name for fmu in read.values()})
             with file.open("wb") as target:
                 document.package.extract(document.name, target)
-            read[document] = _read(file, what)
+            read[document] = _read(file, what, lost)
         fmus[component.path] = fmu = read[document]
         if component.implementation not in {"any", "CoSimulation"}:
             lost(f"{what}: implementation '{component.implementation}'; the FMU is co-simulated")
@@ -115,10 +119,16 @@ def _file_name(name: str, taken: set[str]) -> str:
     return file
 
 
-def _read(file: Path, what: str) -> Fmu:
+def _read(file: Path, what: str, lost: Callable[[str], None]) -> Fmu:
+    strict = True
     try:
-        describe(file, {})
-        model, _, _ = read_model(file, strict=True)
+        try:
+            description = describe(file, {})
+        except ScenarioError:
+            strict = False
+            description = describe(file, {}, strict=False)
+            lost(f"{what}: rules of FMI that its modelDescription.xml breaks are ignored (strict: false)")
+        model, _, _ = read_model(file, strict=strict)
     except ScenarioError as error:
         raise ScenarioError(f"{what}: {error}") from error
     units = model_units(model)
@@ -131,7 +141,7 @@ def _read(file: Path, what: str) -> Fmu:
             units.get(unit, Unit(unit)) if unit else None,
             {item.name: int(item.value) for item in items if item.value is not None},
         )
-    return Fmu(file, model, variables)
+    return Fmu(file, model, variables, frozenset(port.name for port in description.ports), strict)
 
 
 def _check_connectors(component: Component, fmu: Fmu) -> None:

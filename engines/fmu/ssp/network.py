@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from engines.fmu.ssp.fmus import Fmu
@@ -12,7 +12,7 @@ from engines.fmu.ssp.units import Unit, conversion
 from engines.fmu.ssp.xml_file import Node
 from schemas.errors import ScenarioError, did_you_mean
 
-__all__ = ["End", "Network", "Wire"]
+__all__ = ["End", "Network", "Wire", "find_loop"]
 
 _INTO = frozenset({"input", "parameter", "structuralParameter"})
 _OUT = frozenset({"output", "local", "calculatedParameter", "constant"})
@@ -188,3 +188,24 @@ class Network:
             # a value whose conversion is suppressed is in the unit of whatever comes next
             unit, at = there or (None if suppressed else unit), end
         return Wire(origin, target, change, first, place)
+
+
+def find_loop(wires: Sequence[Wire]) -> list[Wire]:
+    """Return the wires of a loop of elements in order; empty: there is none."""
+    feeding: dict[tuple[str, ...], list[Wire]] = {}
+    for wire in wires:
+        feeding.setdefault(wire.target.path, []).append(wire)
+    while ended := [
+        path for path, into in feeding.items() if not any(w.source.path in feeding for w in into)
+    ]:
+        for path in ended:
+            del feeding[path]
+    if not feeding:
+        return []
+    loop: list[Wire] = []
+    at = next(iter(feeding))
+    while at not in [wire.target.path for wire in loop]:
+        loop.insert(0, next(wire for wire in feeding[at] if wire.source.path in feeding))
+        at = loop[0].source.path
+    last = next(index for index, wire in enumerate(loop) if wire.target.path == at)
+    return loop[: last + 1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any, cast
 from ruamel.yaml import YAML
 
 from engines.fmu.ssp.fmus import RESOURCES, Fmu, load_fmus
-from engines.fmu.ssp.network import End, Network, Wire
+from engines.fmu.ssp.network import End, Network, Wire, find_loop
 from engines.fmu.ssp.package import open_package
 from engines.fmu.ssp.settings import (
     COMPONENT_KEYS,
@@ -93,11 +93,11 @@ class _Import:
             values = StartValues(root, fmus, self._lost.append)
             wires = network.wires()
             values.follow(wires)
-            names = self._names(root.components(), fmus)
+            components = [one for one in root.components() if one.path in fmus]
+            names = self._names(components)
             participants = {
                 names[one.path]: self._participant(one, fmus[one.path], values.of(one.path))
-                for one in root.components()
-                if one.path in fmus
+                for one in components
             }
             connections = self._connect(wires, fmus, participants, names)
             self._view(network, fmus, names)
@@ -107,12 +107,10 @@ class _Import:
         file = self._directory / f"{scenario['name']}.yaml"
         return ImportedSystem(file, scenario, self._notes, self._lost)
 
-    def _names(self, components: Any, fmus: Mapping[tuple[str, ...], Fmu]) -> dict[tuple[str, ...], str]:
+    def _names(self, components: Iterable[Component]) -> dict[tuple[str, ...], str]:
         """Return the names of participants: the path with underscores."""
         names: dict[tuple[str, ...], str] = {}
-        for component in cast("list[Component]", components):
-            if component.path not in fmus:
-                continue
+        for component in components:
             name = _unique(_identifier("_".join(component.path), "fmu"), set(names.values()))
             names[component.path] = name
             if name != component.label:
@@ -121,6 +119,8 @@ class _Import:
 
     def _participant(self, component: Component, fmu: Fmu, start: dict[str, Any]) -> dict[str, Any]:
         spec: dict[str, Any] = {"kind": "fmu", "path": f"{RESOURCES}/{fmu.file.name}"}
+        if not fmu.strict:
+            spec["strict"] = False
         if start:
             spec["start"] = start
             try:
@@ -137,20 +137,16 @@ class _Import:
         names: Mapping[tuple[str, ...], str],
     ) -> list[str]:
         """Return the connections; conversions are added to the participants."""
-        ports = {path: {port.name for port in fmu.describe({}).ports} for path, fmu in fmus.items()}
         connections: list[str] = []
         for wire in wires:
             source, target = wire.source, wire.target
             text = f"{wire.place}: the connection {source} -> {target}"
             if source.path not in fmus:
-                if (
-                    "start" not in participants[names[target.path]]
-                    or target.name not in participants[names[target.path]]["start"]
-                ):
+                if target.name not in participants[names[target.path]].get("start", {}):
                     self._lost.append(f"{text}: '{source}' of the system has no source and no value")
                 continue
             ends = [(end, port_name(end.name)) for end in (source, target)]
-            missing = [end for end, port in ends if port not in ports[end.path]]
+            missing = [end for end, port in ends if port not in fmus[end.path].ports]
             if missing:
                 row = fmus[missing[0].path].variables[missing[0].name]
                 self._lost.append(
@@ -160,7 +156,13 @@ class _Import:
                 continue
             self._convert(wire, fmus, participants[names[target.path]])
             connections.append(" -> ".join(f"{names[end.path]}.{port}" for end, port in ends))
-        self._name_loop(wires, fmus)
+        if loop := find_loop([wire for wire in wires if wire.source.path in fmus]):
+            named = ", ".join(f"{wire.source} -> {wire.target}" for wire in loop)
+            self._notes.append(
+                f"connections form a loop: {named}. It is not iterated: each FMU reads the values of the last"
+                " communication point. Where outputs follow inputs at once, choose a step in which that does"
+                " not matter"
+            )
         return connections
 
     def _convert(self, wire: Wire, fmus: Mapping[tuple[str, ...], Fmu], spec: dict[str, Any]) -> None:
@@ -181,34 +183,6 @@ class _Import:
             conversion["table"] = dict(wire.change.entries)
         if conversion:
             spec.setdefault("inputs", {})[wire.target.name] = conversion
-
-    def _name_loop(self, wires: Sequence[Wire], fmus: Mapping[tuple[str, ...], Fmu]) -> None:
-        """Note the connections of a loop."""
-        feeding: dict[tuple[str, ...], list[Wire]] = {}
-        for wire in wires:
-            if wire.source.path in fmus:
-                feeding.setdefault(wire.target.path, []).append(wire)
-        left = dict(feeding)
-        while True:
-            ended = [path for path, into in left.items() if all(one.source.path not in left for one in into)]
-            if not ended:
-                break
-            for path in ended:
-                del left[path]
-        if not left:
-            return
-        loop: list[Wire] = []
-        at = next(iter(left))
-        while at not in [wire.target.path for wire in loop]:
-            loop.insert(0, next(one for one in left[at] if one.source.path in left))
-            at = loop[0].source.path
-        loop = loop[: 1 + next(index for index, wire in enumerate(loop) if wire.target.path == at)]
-        named = ", ".join(f"{wire.source} -> {wire.target}" for wire in loop)
-        self._notes.append(
-            f"connections form a loop: {named}. It is not iterated: each FMU reads the values of the last"
-            " communication point. Where outputs follow inputs at once, choose a step in which that does not"
-            " matter"
-        )
 
     def _view(
         self, network: Network, fmus: Mapping[tuple[str, ...], Fmu], names: Mapping[tuple[str, ...], str]

@@ -15,7 +15,9 @@ from typer.testing import CliRunner
 from engines.fmu.ssp.system_import import import_system
 from hub.command_line.app import app
 from hub.planning.scenario_file import load
+from hub.recording.recording import Recording
 from hub.session.launch import launch
+from hub.verify import verify
 from tests.engines.fmu.driving import SPRING, STAIR
 from tests.engines.fmu.ssp.systems import (
     MEANT,
@@ -86,6 +88,26 @@ def test_settings_measures_and_texts_survive(libraries: dict[str, Path], tmp_pat
     assert (scenario.scenario.step, scenario.scenario.order) == (5_000_000, ["two", "one"])
     assert scenario.scenario.participants["one"].period == 10_000_000
     assert scenario.params["one"].model_dump()["tolerance"] == 1e-5
+
+
+def test_texts_survive(libraries: dict[str, Path], tmp_path: Path) -> None:
+    write_fmus(libraries, tmp_path)
+    (tmp_path / "texts.yaml").write_text(
+        "name: texts\nstep: 1 ms\nparticipants:\n  one: {kind: fmu, path: resources/mass_spring_damper.fmu,"
+        ' start: {label: "a <b> & \\"c\\"\\n  d"}}\n'
+    )
+    command("export", tmp_path / "texts.yaml", "-o", tmp_path / "texts.ssp")
+    command("import", tmp_path / "texts.ssp", "-o", tmp_path / "back")
+    start = load(str(tmp_path / "back" / "texts.yaml")).params["one"].model_dump()["start"]
+    assert start == {"label": 'a <b> & "c"\n  d'}
+
+
+def test_a_recording_with_conversions_verifies(libraries: dict[str, Path], tmp_path: Path) -> None:
+    write_fmus(libraries, tmp_path)
+    (tmp_path / "full.yaml").write_text(FULL)
+    launch(load(str(tmp_path / "full.yaml")), record=tmp_path / "recording").run()
+    again = verify(Recording(tmp_path / "recording"), trust=True)
+    assert (again.same, again.steps) == (True, 40)
 
 
 FULL = """\
