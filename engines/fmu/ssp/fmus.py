@@ -19,10 +19,12 @@ from schemas.errors import ScenarioError, did_you_mean
 if TYPE_CHECKING:
     from fmpy.model_description import ModelDescription, ModelVariable
 
-__all__ = ["RESOURCES", "Fmu", "Variable", "load_fmus"]
+__all__ = ["MODEL_EXCHANGE", "RESOURCES", "Fmu", "Variable", "load_fmus"]
 
 RESOURCES = "resources"
 """Folder of the FMUs, in an archive of a system and beside an imported scenario."""
+MODEL_EXCHANGE = "ModelExchange"
+"""Implementation of a component for which a solver is needed."""
 _UNSAFE = re.compile(r"[^A-Za-z0-9_.-]")
 
 
@@ -95,10 +97,18 @@ def load_fmus(system: System, directory: Path, lost: Callable[[str], None]) -> d
                 document.package.extract(document.name, target)
             read[document] = _read(file, what, lost)
         fmus[component.path] = fmu = read[document]
-        if component.implementation not in {"any", "CoSimulation"}:
-            lost(f"{what}: implementation '{component.implementation}'; the FMU is co-simulated")
+        _check_implementation(component, fmu, what)
         _check_connectors(component, fmu)
     return fmus
+
+
+def _check_implementation(component: Component, fmu: Fmu, what: str) -> None:
+    has = {"CoSimulation": fmu.model.coSimulation, MODEL_EXCHANGE: fmu.model.modelExchange}
+    if component.implementation != "any" and not has.get(component.implementation):
+        raise ScenarioError(
+            f"{what}: implementation '{component.implementation}' of the FMU '{fmu.file.name}'; it has"
+            f" {', '.join(name for name in has if has[name]) or 'none that runs here'}"
+        )
 
 
 def _no_fmu(component: Component) -> str:

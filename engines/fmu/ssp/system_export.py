@@ -15,7 +15,7 @@ from engines.fmu.conversions import InputConversion
 from engines.fmu.description import Description, describe
 from engines.fmu.engine import FmuParams
 from engines.fmu.model import read_model
-from engines.fmu.ssp.fmus import RESOURCES
+from engines.fmu.ssp.fmus import MODEL_EXCHANGE, RESOURCES
 from engines.fmu.ssp.package import DESCRIPTION
 from engines.fmu.ssp.settings import ANNOTATION, COMPONENT_KEYS, SCENARIO_KEYS, SETTINGS, json_text
 from engines.fmu.ssp.xml_file import NAMESPACES
@@ -51,6 +51,7 @@ class _Exported:
     spec: Mapping[str, Any]
     file: str
     """Name in the archive."""
+    implementation: str
 
 
 def export_system(
@@ -80,7 +81,7 @@ def export_system(
         f"'{key}' of participant '{name}' is no part of a system"
         for name, one in fmus.items()
         for key in one.spec
-        if key not in {"kind", "path", "start", "inputs", *COMPONENT_KEYS}
+        if key not in {"kind", "path", "start", "inputs", "solver", *COMPONENT_KEYS}
     ] + [
         f"'{key}' is no part of a system"
         for key in tree
@@ -108,11 +109,12 @@ def _read(tree: Mapping[str, Any], params: Mapping[str, FmuParams]) -> Iterator[
         yield (
             name,
             _Exported(
-                describe(one.path, one.start, strict=one.strict),
+                describe(one.path, one.start, strict=one.strict, solver=one.solver),
                 {row.name: row for row in model.modelVariables},
                 one,
                 tree["participants"][name],
                 files[one.path],
+                MODEL_EXCHANGE if one.solver or model.coSimulation is None else "CoSimulation",
             ),
         )
 
@@ -156,7 +158,7 @@ def _component(parent: Element, name: str, one: _Exported, version: str) -> None
         name=name,
         type="application/x-fmu-sharedlibrary",
         source=one.file,
-        implementation="CoSimulation",
+        implementation=one.implementation,
     )
     variables = [*one.description.inputs, *one.description.outputs]
     connectors = _add(component, "ssd:Connectors")

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 from ruamel.yaml import YAML
 
-from engines.fmu.ssp.fmus import RESOURCES, Fmu, load_fmus
+from engines.fmu.ssp.fmus import MODEL_EXCHANGE, RESOURCES, Fmu, load_fmus
 from engines.fmu.ssp.network import End, Network, Wire, find_loop
 from engines.fmu.ssp.package import open_package
 from engines.fmu.ssp.settings import (
@@ -121,6 +121,8 @@ class _Import:
         spec: dict[str, Any] = {"kind": "fmu", "path": f"{RESOURCES}/{fmu.file.name}"}
         if not fmu.strict:
             spec["strict"] = False
+        if component.implementation == MODEL_EXCHANGE and fmu.model.coSimulation:
+            spec["solver"] = "cvode"
         if start:
             spec["start"] = start
             try:

@@ -18,6 +18,7 @@ from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
+from schemas.errors import ScenarioError
 from tests.engines.fmu.driving import SPRING, STAIR
 from tests.engines.fmu.ssp.systems import (
     MEANT,
@@ -199,3 +200,32 @@ def test_pyssp_standard_reads_an_export(name: str, libraries: dict[str, Path], t
         assert {one.name for one in structure.system.elements} == set(scenario.participants)
         assert len(structure.connections()) == len(scenario.connections)
         assert structure.check_connections() == []
+
+
+def test_model_exchange_is_kept(libraries: dict[str, Path], tmp_path: Path) -> None:
+    write_fmus(libraries, tmp_path)
+    folder = tmp_path / "resources"
+    library = build.compile_library("hopper", tmp_path)
+    build.pack("hopper", library, folder / "hopper.fmu")
+    text = elements(component("one", "hopper")).replace(
+        "<ssd:Component", '<ssd:Component implementation="ModelExchange"'
+    )
+    path = write_system(System(text, "", fmus=("hopper",)), "hopping", tmp_path)
+    imported = import_system(path, tmp_path / "out")
+    command("export", imported.file, "-o", tmp_path / "again.ssp")
+    with zipfile.ZipFile(tmp_path / "again.ssp") as archive:
+        assert b'implementation="ModelExchange"' in archive.read("SystemStructure.ssd")
+    again = import_system(tmp_path / "again.ssp", tmp_path / "back")
+    assert run(again.file) == run(imported.file)
+
+
+def test_an_implementation_that_the_fmu_lacks(libraries: dict[str, Path], tmp_path: Path) -> None:
+    write_fmus(libraries, tmp_path)
+    text = elements(component("one", STAIR)).replace(
+        "<ssd:Component", '<ssd:Component implementation="ModelExchange"'
+    )
+    path = write_system(System(text, "", fmus=(STAIR,)), "stair", tmp_path)
+    with pytest.raises(
+        ScenarioError, match=r"implementation 'ModelExchange' of the FMU.*; it has CoSimulation"
+    ):
+        import_system(path, tmp_path / "out")
