@@ -75,8 +75,12 @@ class Block:
         """The values in their C type, shape (size,)."""
         self.values: Vector = self.raw if self.type.dtype == np.float64 else np.zeros(size)
         """The values as doubles, shape (size,)."""
-        self._always_usable = self.type.dtype.kind != "f" and self.type.dtype.itemsize < self.values.itemsize
+        self.always_usable = self.type.dtype.kind != "f" and self.type.dtype.itemsize < self.values.itemsize
+        """Whether any value is a number of ports."""
         self._taken = b""
+        self.is_changed = True
+        """Whether values have changed since the last call; True for floats."""
+        self._zeros = np.zeros(size)
         ends = np.cumsum([variable.size for variable in variables]).tolist()
         self.parts = {
             variable.port: slice(end - variable.size, end)
@@ -118,13 +122,21 @@ class Block:
         """
         for port, part in self.parts.items():
             self.values[part] = inputs[port] if self.discrete else inputs.at(port, tau)
+        if self.raw is self.values:
+            return
         # converting costs more than comparing
-        if self.raw is not self.values and (taken := self.values.tobytes()) != self._taken:
+        taken = self.values.tobytes()
+        self.is_changed = taken != self._taken
+        if self.is_changed:
             try:
                 self.raw[:] = self.type.from_float64(self.values, self.names)
             except ValueError as error:
                 raise SessionError(f"input {error}") from error
             self._taken = taken
+
+    def forget(self) -> None:
+        """Take all values as changed: the FMU has another state."""
+        self._taken = b""
 
     def publish(self) -> None:
         """Convert the outputs written by the FMU from their C type to doubles.
@@ -133,8 +145,10 @@ class Block:
         """
         if self.raw is not self.values:
             np.copyto(self.values, self.raw)
-        if self._always_usable:
+        if self.always_usable:
             return
+        if self.type.dtype.kind == "f" and self.values.dot(self._zeros) == 0.0:
+            return  # a sum of zeros, unless one is infinite or NaN: a third of the cost of the rest
         usable = (
             np.isfinite(self.values) if self.type.dtype.kind == "f" else np.abs(self.values) <= LARGEST_EXACT
         )

@@ -57,7 +57,7 @@ class _Output:
 
     def __init__(self, instance: Instance, quantity: Quantity) -> None:
         self._instance, self._factor = instance, quantity.factor
-        self._block = instance.bond_output(quantity.variables)
+        self._block = instance.block("Get", quantity.variables)
 
     def read(self) -> Vector:
         self._instance.transfer(self._block)

@@ -47,6 +47,8 @@ _KINDS = {
 }
 """Class of an instance by FMI's major version, and whether it is for co-simulation."""
 
+_ALL_READ = frozenset[str]()
+
 
 class FmuParams(Params):
     """Parameters of an FMU."""
@@ -326,7 +328,8 @@ class FmuEngine(Stepped):
     def _read(self, t: int) -> Outputs:
         self._time[0] = t
         try:
-            self._running().read_outputs()
+            # without a hash of its state, the FMU is known by its outputs
+            self._running().read_outputs(self.unread if self._hashes_state else _ALL_READ)
         except SessionError as error:
             raise SessionError(f"{error}, at {t / 1e9:.9g} s") from error
         return self._outputs

@@ -62,6 +62,8 @@ class Fmi2Instance(Instance):
         ]
         self._slope_ports = [variable.port for variable in continuous]
         self._slopes, self._set_slopes = self._slope_call(continuous)
+        self._moved = False
+        """Whether an input had a slope in the last step; the FMU begins with slopes of 0."""
 
     def _slope_call(self, variables: Sequence[Variable]) -> tuple[Vector, Callable[[], None]]:
         """Return the slopes of scalar inputs, shape (n,), and the call that sets them."""
@@ -87,7 +89,7 @@ class Fmi2Instance(Instance):
         """Return the inputs `variables` as inputs of a bond, with slopes if the FMU interpolates."""
         if not self._interpolates:
             return super().bond_input(variables)
-        block = Block("Set", variables, self._prepare_access)
+        block = self.block("Set", variables)
         return LinearInput(block, self.transfer, *self._slope_call(variables))
 
     def _initialise(self, starts: Sequence[Start], tolerance: float | None) -> None:
@@ -99,15 +101,22 @@ class Fmi2Instance(Instance):
 
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
         """Set the inputs: value and slope if the FMU interpolates, else the mean over the `dt` seconds."""
-        interpolates = bool(self._slope_ports)
+        if not self._slope_ports:
+            tau += dt / 2
         for block in self.inputs:
-            block.store(inputs, tau if interpolates else tau + dt / 2)
-            self.transfer(block)
-        if interpolates:
-            for index, port in enumerate(self._slope_ports):
-                rate = inputs.rate(port)
-                self._slopes[index] = 0.0 if rate is None else rate[0]
+            block.store(inputs, tau)
+            self.set_changed(block)
+        rates = [inputs.rate(port) for port in self._slope_ports]
+        moves = any(rate is not None for rate in rates)
+        if moves or self._moved:
+            self._slopes[:] = [0.0 if rate is None else rate[0] for rate in rates]
             self._set_slopes()
+        self._moved = moves
+
+    def deserialise(self, state: bytes) -> None:
+        """Bring the FMU back to a state from `serialise`, perhaps with slopes of inputs."""
+        super().deserialise(state)
+        self._moved = True
 
     def advance(self, t: int, h: int) -> None:
         """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation.

@@ -97,7 +97,7 @@ class Fmi3Instance(Instance):
         """Set continuous inputs to their mean over `dt` seconds, changed discrete inputs in event mode."""
         for block in self._step_blocks:
             block.store(inputs, tau + dt / 2)
-            self.transfer(block)
+            self.set_changed(block)
         if not self._event_blocks:
             return
         for block in self._event_blocks:

@@ -8,6 +8,7 @@ import logging
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -68,6 +69,7 @@ class Instance(ABC):
         required function; SessionError if the FMU refuses all options.
         """
         self._name = name
+        self._functions: dict[str, Callable[..., int]] = {}
         self.ended = ""
         """Time and manner of the FMU's end of the simulation; empty: running."""
         self.now_ns = 0
@@ -92,8 +94,24 @@ class Instance(ABC):
         self.memory = np.zeros(0)
         """State between steps apart from the FMU's own; written in place, never replaced."""
         self._serialised: Any = (self.byte * 0)()
+        self._size = ctypes.c_size_t()
+        if self.can_save:
+            word = self.state_word
+            self._get_state = partial(
+                self._function(f"Get{word}"), self._component, ctypes.byref(self._state)
+            )
+            self._size_of_state = partial(
+                self._function(f"Serialized{word}Size"),
+                self._component,
+                self._state,
+                ctypes.byref(self._size),
+            )
+            self._serialise_state = partial(self._function(f"Serialize{word}"), self._component, self._state)
         self.inputs = [Block("Set", group, self._prepare_access) for group in grouped(description.inputs)]
-        self.outputs = [Block("Get", group, self._prepare_access) for group in grouped(description.outputs)]
+        self._unread = frozenset[str]()
+        self.outputs = self._read = [
+            Block("Get", group, self._prepare_access) for group in grouped(description.outputs)
+        ]
 
     def _check_functions(self, description: Description) -> None:
         needed = dict.fromkeys(self.prefix + name for name in self.required)
@@ -153,11 +171,7 @@ class Instance(ABC):
 
     def bond_input(self, variables: Sequence[Variable]) -> LinearInput:
         """Return the inputs `variables`, all of the same type, as inputs of a bond."""
-        return LinearInput(Block("Set", variables, self._prepare_access), self.transfer)
-
-    def bond_output(self, variables: Sequence[Variable]) -> Block:
-        """Return the outputs `variables`, all of the same type, for reading in the middle of a step."""
-        return Block("Get", variables, self._prepare_access)
+        return LinearInput(self.block("Set", variables), self.transfer)
 
     def block(self, verb: Literal["Set", "Get"], variables: Sequence[Variable]) -> Block:
         """Return variables of one type, to be set or got apart from inputs and outputs."""
@@ -168,25 +182,35 @@ class Instance(ABC):
         for block in blocks:
             self.transfer(block)
 
-    def read_outputs(self) -> None:
-        """Bring the FMU's outputs into the blocks."""
-        for block in self.outputs:
+    def read_outputs(self, unread: frozenset[str] = frozenset()) -> None:
+        """Bring the FMU's outputs into the blocks, all but whole numbers and truth values that are `unread`.
+
+        Floats are read in any case: a NaN ends the session whether somebody looks or not.
+        """
+        if unread is not self._unread:
+            self._unread = unread
+            self._read = [
+                block for block in self.outputs if not (block.always_usable and block.parts.keys() <= unread)
+            ]
+        for block in self._read:
             self.transfer(block)
             block.publish()
 
     def serialise(self) -> bytes:
         """Return the FMU's state."""
-        self.call(f"Get{self.state_word}", ctypes.byref(self._state))
-        size = ctypes.c_size_t()
-        self.call(f"Serialized{self.state_word}Size", self._state, ctypes.byref(size))
-        if len(self._serialised) != size.value:
-            self._serialised = (self.byte * size.value)()
-        self.call(f"Serialize{self.state_word}", self._state, self._serialised, size)
+        word = self.state_word
+        self._check(f"Get{word}", self._get_state())
+        self._check(f"Serialized{word}Size", self._size_of_state())
+        if len(self._serialised) != self._size.value:
+            self._serialised = (self.byte * self._size.value)()
+        self._check(f"Serialize{word}", self._serialise_state(self._serialised, self._size))
         return bytes(self._serialised)
 
     def deserialise(self, state: bytes) -> None:
         """Bring the FMU back to a state from `serialise`."""
         self.ended = ""
+        for block in self.inputs:
+            block.forget()
         restored = ctypes.c_void_p()
         self.call(
             f"{self.deserialise_word}{self.state_word}",
@@ -217,7 +241,9 @@ class Instance(ABC):
 
     def call(self, function: str, *arguments: Any) -> None:
         """Call an FMI function, named without prefix."""
-        status = self._function(function)(self._component, *arguments)
+        self._check(function, self._function(function)(self._component, *arguments))
+
+    def _check(self, function: str, status: int) -> None:
         if status > WARNING:
             raise self.failure(function, status)
 
@@ -235,7 +261,9 @@ class Instance(ABC):
         return f"; the FMU reports: {message}" if message else ""
 
     def _function(self, name: str) -> Callable[..., int]:
-        return getattr(self.library, self.prefix + name)
+        if name not in self._functions:
+            self._functions[name] = getattr(self.library, self.prefix + name)
+        return self._functions[name]
 
     def _end(self, time_s: float, how: str) -> None:
         """Note the FMU's request to end the simulation."""
@@ -245,6 +273,11 @@ class Instance(ABC):
         self, function: str, references: Sequence[int], raw: NDArray[Any]
     ) -> Callable[[], int]:
         return prepared(self._function(function), self._component, references, raw, counted=self.counted)
+
+    def set_changed(self, block: Block) -> None:
+        """Set a block of whole numbers or truth values if one has changed, any other in any case."""
+        if block.is_changed:
+            self.transfer(block)
 
     def transfer(self, block: Block) -> None:
         """Set or get a block."""

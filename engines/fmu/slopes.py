@@ -115,6 +115,6 @@ def _respond(
 
 def _read(instance: Instance, quantity: Quantity) -> Vector:
     """Return the values of a quantity in the FMU's unit."""
-    block = instance.bond_output(quantity.variables)
+    block = instance.block("Get", quantity.variables)
     instance.transfer(block)
     return block.values
