@@ -116,7 +116,7 @@ class Fmi2Instance(Instance):
     def deserialise(self, state: bytes) -> None:
         """Bring the FMU back to a state from `serialise`, perhaps with slopes of inputs."""
         super().deserialise(state)
-        self._moved = True
+        self._moved = bool(self._slope_ports)
 
     def advance(self, t: int, h: int) -> None:
         """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation.
