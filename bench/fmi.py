@@ -18,7 +18,6 @@ import statistics
 import sys
 import tempfile
 import time
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -131,11 +130,8 @@ def book() -> dict[str, float]:
     """Return the work (J) through the drive's bond, the largest residual of its book, and the share."""
     with tempfile.TemporaryDirectory() as folder:
         summary = launch(load("tendon", []), record=Path(folder) / "tendon").run()
-        with closing(Recording(Path(folder) / "tendon")) as recording:
-            rows = [
-                (entry.motion_work_j, entry.residual_j)
-                for _, entry in recording.energy("robot/PSM1/insertion")
-            ]
+        books = Recording(Path(folder) / "tendon").energy("robot/PSM1/insertion")
+        rows = [(entry.motion_work_j, entry.residual_j) for _, entry in books]
     work, residual = np.array(rows).T
     exchanged = float(np.abs(np.diff(work)).sum())
     worst = float(np.abs(residual).max())
