@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from engines.fmu.blocks import WARNING, Block
+from engines.fmu.blocks import WARNING
 from engines.fmu.description import Description
 from engines.fmu.instance import DISCARD, Instance
 from engines.fmu.linear_input import LinearInput
