@@ -30,6 +30,8 @@ _CLEARANCE_FREED, _CLEARANCE = 0.004, 0.0006
 """Width of the gap between liver and gallbladder where it has been freed, and elsewhere, m."""
 _OPENED = 0.36
 """Share of the cystic plate that is free in the critical view of safety: a little more than a third."""
+_BEFORE_DISSECTION: tuple[Phase, ...] = ("calot-dissection", "cholecystectomy")
+"""Phases that begin with fat over the triangle, and a whole plate."""
 _MMHG = 133.322
 
 _SOFT: dict[str, Any] = {"poisson_ratio": 0.45, "friction": 0.2}
@@ -57,7 +59,7 @@ _FAT_GAP = 0.0008
 
 def organs_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
     """Return the organs by name."""
-    layout = Layout(patient)
+    layout = Layout(patient, is_dissected=phase not in _BEFORE_DISSECTION)
     makers: dict[str, Callable[[Patient, Layout], dict[str, Any]]] = {
         "liver": _liver,
         "gallbladder": _gallbladder,
@@ -67,7 +69,7 @@ def organs_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
         "hepatic_artery": _hepatic_artery,
     }
     made = {name: make(patient, layout) for name, make in makers.items()}
-    if phase in ("calot-dissection", "cholecystectomy"):
+    if phase in _BEFORE_DISSECTION:
         made["fat"] = _fat(patient, layout)
     if phase in ("gallbladder-bed", "cholecystectomy"):
         made["liver"] |= {"cutting": {}, "bleeding": {}}
@@ -78,24 +80,19 @@ def organs_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
 
 def attachments_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
     """Return the attachments by name."""
-    found = _plate(patient, 0.0 if phase in ("calot-dissection", "cholecystectomy") else _OPENED)
+    found = _plate(patient, 0.0 if phase in _BEFORE_DISSECTION else _OPENED)
     if phase != "gallbladder-bed":
         found |= _joints(patient)
-    if phase in ("calot-dissection", "cholecystectomy"):
+    if phase in _BEFORE_DISSECTION:
         for name in _under_fat(patient):
             found[f"fat_{name}"] = {"organs": ["fat", name], "surface": "underside", "within": 0.002, **_FAT}
     return found
 
 
 def _under_fat(patient: Patient) -> list[str]:
-    """Return the organs that the fat lies on: an artery in front keeps it off a short duct."""
+    """Return the organs that the fat lies on: an artery in front keeps it off the ducts."""
     in_front = patient.artery == "front"
-    return [
-        "gallbladder",
-        *["cystic_artery"] * in_front,
-        *["cystic_duct"] * (not (in_front and patient.short_duct)),
-        "common_bile_duct",
-    ]
+    return ["gallbladder", *(["cystic_artery"] if in_front else ["cystic_duct", "common_bile_duct"])]
 
 
 def _plate(patient: Patient, opened: float) -> dict[str, dict[str, Any]]:
@@ -221,13 +218,13 @@ def _cystic_duct(patient: Patient, layout: Layout) -> dict[str, Any]:
             "diameters": np.round(diameters, _DIGITS).tolist(),
             "wall": DUCT_WALL,
         },
-        "nodes": 180 if patient.short_duct else 240,
+        "nodes": 300 if patient.short_duct else 240,
         "young_modulus": patient.duct_modulus,
         "inertia": _TUBE_INERTIA,
         **_SOFT,
         "anchors": [],
         "cutting": _DUCT_CUTTING,
-        "lumen": {**_BILE, "supply": ["left", "right"]},
+        "lumen": {**_BILE, "supply": ["left", "right"], "reserve": _BILE_VOLUME},
     }
 
 

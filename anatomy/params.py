@@ -36,7 +36,7 @@ class AnatomyParams(BaseModel):
         default=None, description="course of the cystic artery about the duct; default: as the seed draws it"
     )
     short_duct: bool | None = Field(
-        default=None, description="a cystic duct of 8 to 14 mm; default: as the seed draws it"
+        default=None, description="a cystic duct of 10 to 14 mm; default: as the seed draws it"
     )
     thick_wall: bool | None = Field(
         default=None, description="an inflamed gallbladder; default: as the seed draws it"

@@ -23,8 +23,8 @@ THICK_WALL = Spread(0.0045, 0.0005, 0.0035, 0.0055)
 """Inflamed: above 3 mm is thickened; mean and deviation are assumed."""
 DUCT_LENGTH = Spread(0.0274, 0.004, 0.020, 0.035)
 """27.4 mm (80 dissections: Marniok 1999), about 20 mm (55 studies: Priya et al. 2023); deviation assumed."""
-SHORT_DUCT_LENGTH = Spread(0.011, 0.002, 0.008, 0.014)
-"""Assumed: there is room for three clips and a cut, and no more."""
+SHORT_DUCT_LENGTH = Spread(0.012, 0.0015, 0.010, 0.014)
+"""Assumed: room for three clips and a cut, 8.2 mm, and half a jaw at each end."""
 DUCT_LUMEN = Spread(0.00284, 0.0004, 0.0022, 0.0036)
 """2.84 mm (80 dissections: Marniok 1999), taken as the lumen; the deviation is assumed."""
 DUCT_WALL = 0.0011

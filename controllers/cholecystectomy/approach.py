@@ -16,12 +16,16 @@ from robots.transform import pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Obstacles", "choose_pose", "jaw_poses", "withdraw"]
+__all__ = ["Obstacles", "choose_pose", "jaw_poses", "skewed", "withdraw"]
 
 MARGIN = 0.06
 """Least share of each joint's range, from its middle to its end, that stays free."""
 _ROOMY, _CLEAR = 0.3, 4.0e-3
 """Margin, and distance from obstacles (m), beyond which more is no better."""
+_TOUCHING = 1.0e-3
+"""Distance from nodes of an organ within which an instrument may touch the faces between, m."""
+_WAY = np.array([1.0, 0.5, 0.2, 0.0])
+"""Checked parts of the straight way to a goal, from its beginning."""
 _ALONE = 2.0e-3
 """Distance of other tissue from the space between the jaws beyond which more is no better, m."""
 _HALF_CLIP, _HALF_GAP = 1.0e-3, 2.5e-3
@@ -30,6 +34,8 @@ _NEAR = 0.06
 """Obstacles farther from the goal do not count, m."""
 _TILTS = np.radians(np.arange(-75.0, 76.0, 15.0))
 """Angles about the tube, from the direction in which the shaft comes."""
+_SKEW = radians(20.0)
+"""Deviation from a right angle to a tube out of reach; a clip may lie 30 degrees off square."""
 _SPREAD = np.linspace(0.25, 1.0, 4)
 """Points along a finger, as shares of its length."""
 
@@ -87,6 +93,15 @@ def jaw_poses(hand: SurgeonHand, point: Vector, along: Vector, bite: float) -> V
     return np.array(poses)
 
 
+def skewed(along: Vector) -> Vector:
+    """Return directions around that of a tube, shape (3,), as if it lay askew, shape (4, 3)."""
+    across = np.eye(3)[int(np.abs(along).argmin())]
+    across -= (across @ along) * along
+    across /= np.linalg.norm(across)
+    sides = np.stack([across, np.cross(along, across)])
+    return np.cos(_SKEW) * along + np.sin(_SKEW) * np.concatenate([sides, -sides])
+
+
 def choose_pose(
     hand: SurgeonHand, poses: Vector, away: float, opening: float, obstacles: Obstacles, what: str
 ) -> Vector:
@@ -102,9 +117,9 @@ def choose_pose(
         obstacles: in the neighbourhood.
         what: the goal, for the message.
     """
-    before = poses.copy()
-    before[:, :3, 3] -= away * poses[:, :3, 2]
-    margins, joints = path_margins(hand, np.stack([before, poses], axis=1))
+    ways = np.repeat(poses[:, None], len(_WAY), axis=1)
+    ways[:, :, :3, 3] -= away * _WAY[:, None] * poses[:, None, :3, 2]
+    margins, joints = path_margins(hand, ways)
     if margins.max() < MARGIN:
         x, y, z = (1e3 * poses[int(margins.argmax()), :3, 3]).tolist()
         raise MotionError(
@@ -114,7 +129,7 @@ def choose_pose(
     clearances = np.array(
         [
             min(clearance(hand, pose, q, opening, obstacles) for pose, q in zip(way, angles, strict=True))
-            for way, angles in zip(np.stack([before, poses], axis=1), joints, strict=True)
+            for way, angles in zip(ways, joints, strict=True)
         ]
     )
     gaps = np.array([gap_between(hand, pose, obstacles) for pose in poses])
@@ -123,6 +138,7 @@ def choose_pose(
     score = (
         np.minimum(margins / _ROOMY, 1.0)
         + np.clip(clearances / _CLEAR, -0.5, 1.0)
+        + np.clip(clearances / _TOUCHING - 1.0, -2.0, 0.0)
         + np.clip(gaps / _ALONE, -2.0, 1.0)
         - 0.3 * turns
         - 0.1 * travel

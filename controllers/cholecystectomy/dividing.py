@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import radians
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import choose_pose, jaw_poses, withdraw
+from controllers.cholecystectomy.approach import choose_pose, jaw_poses, skewed, withdraw
 from controllers.cholecystectomy.places import choose_places
 from controllers.cholecystectomy.procedure import Procedure, opening
 from controllers.cholecystectomy.sub_task import CUT, Failure, Step
@@ -18,15 +19,18 @@ __all__ = ["Dividing"]
 
 BEFORE_TUBE = 22.0e-3
 """Length of the straight way to a tube, m."""
-_BITES = (11.0e-3, 9.0e-3, 12.0e-3, 8.0e-3)
-"""Distance of the tube from the hinge between the jaws, by attempt, m.
+_BITES = {False: (11.0e-3, 9.0e-3, 12.0e-3, 8.0e-3), True: (8.0e-3, 7.0e-3, 9.0e-3, 6.5e-3)}
+"""Distance of the tube from the hinge between the jaws of the applier and of the scissors, by attempt, m.
 
-The ends of the jaws pass the tube, and what lies close behind stays outside.
+The ends of the jaws pass the tube, and what lies close behind stays outside. Closing blades push a slack tube
+some 6 mm towards their ends.
 """
 _BESIDE = 1.0e-3
 """Way of further attempts beside the place of the first, m."""
 _SQUEEZED, _SNIPPED = radians(12.0), radians(-10.0)
 """Angle of the jaw on a tube before the clip is closed, and of closed scissors."""
+_FREE = 2.5e-3
+"""Distance of the gallbladder from the wall of a tube where the third clip goes, if there is room, m."""
 _CLOSING = 0.5
 """Time for a jaw to close, s."""
 _ANSWER = {False: 0.3, True: 0.6}
@@ -100,7 +104,11 @@ class Dividing(Procedure):
     def _place(self) -> float:
         """Return the place of the present job; further attempts go away from the cut."""
         state = self.state
-        places = choose_places(self.seen.tube(state.tube).length)
+        tube = self.seen.tube(state.tube)
+        if (state.clip_places[state.tube] < 0.0).all():
+            eye = self.hands.applier.base[:3, 3]
+            state.begins[state.tube] = tube.first_place(self.seen.gallbladder, _FREE, eye)
+        places = choose_places(tube.length, float(state.begins[state.tube]))
         if self.cuts:
             return places.cut
         outwards = 1.0 if state.job < CUT - 1 else -1.0
@@ -111,8 +119,14 @@ class Dividing(Procedure):
         state, hand, seen = self.state, self.hand, self.seen
         tube = seen.tube(state.tube)
         point, along = tube.point(state.along), tube.direction(state.along)
-        bite = _BITES[state.attempts % len(_BITES)]
+        bite = _BITES[self.cuts][state.attempts % len(_BITES[self.cuts])]
         obstacles = seen.obstacles(hand, self.hands, state.tube).near(point)
         what = f"{self.params.tubes[state.tube]} {1e3 * state.along:.0f} mm from the gallbladder"
-        poses = jaw_poses(hand, point, along, bite)
-        state.goal[:] = matrix_to_pose(choose_pose(hand, poses, BEFORE_TUBE, opening(hand), obstacles, what))
+        chosen = partial(
+            choose_pose, hand, away=BEFORE_TUBE, opening=opening(hand), obstacles=obstacles, what=what
+        )
+        try:
+            pose = chosen(jaw_poses(hand, point, along, bite))
+        except MotionError:
+            pose = chosen(np.concatenate([jaw_poses(hand, point, each, bite) for each in skewed(along)]))
+        state.goal[:] = matrix_to_pose(pose)

@@ -60,7 +60,7 @@ class Grasping(Procedure):
         if not hand.has_arrived:
             return
         pull, goal = self.seen.pull, hand.line()
-        straight = all(self.seen.tube(tube).slack < _STRAIGHT for tube in range(2) if not state.parted[tube])
+        straight = any(self.seen.tube(tube).slack < _STRAIGHT for tube in range(2) if not state.parted[tube])
         if pull > 1.3 * most and state.pulled > 0.0:
             stride = -_STRIDE
         elif pull < most and not (straight and pull >= least) and state.pulled < self.params.farthest:

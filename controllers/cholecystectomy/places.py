@@ -34,8 +34,10 @@ class Places(NamedTuple):
     """Whether there is room for all wanted distances."""
 
 
-def choose_places(length: float) -> Places:
+def choose_places(length: float, begin: float = 0.0) -> Places:
     """Return the places on a tube of `length`, m: near the gallbladder if there is a choice.
+
+    `begin`: where the tube is free of the gallbladder, m; the third clip goes there if there is room.
 
     Raises MotionError for a tube without room.
     """
@@ -46,5 +48,7 @@ def choose_places(length: float) -> Places:
         )
     wanted = float(_WANTED.sum())
     share = min(1.0, (length - LEAST_LENGTH) / (wanted - LEAST_LENGTH))
-    third, cut, second, first = np.cumsum(_LEAST + share * (_WANTED - _LEAST))[:4].tolist()
+    distances = _LEAST + share * (_WANTED - _LEAST)
+    distances[0] += min(max(0.0, begin - float(distances[0])), max(0.0, length - wanted))
+    third, cut, second, first = np.cumsum(distances)[:4].tolist()
     return Places(np.array([first, second, third]), cut, share == 1.0)

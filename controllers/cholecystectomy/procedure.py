@@ -51,6 +51,10 @@ class SurgeonState(Record):
     """Whether the present attempt has succeeded."""
     slipped = flag()
     """Whether the clip of the present attempt has slipped."""
+    second_first = flag()
+    """Whether the second tube lies in front of the first, and is clipped and cut first."""
+    begins = array(2)
+    """Where each tube is free of the gallbladder, m."""
     clip_places = array(2, 3)
     """Place of each clip on its tube at rest, m; -1: none."""
     clips = integer()

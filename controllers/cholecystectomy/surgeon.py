@@ -129,8 +129,10 @@ class Surgeon(Grasping, Dividing):
         if state.parted.all() and (state.clip_places >= 0.0).all():
             state.done, state.sub_task = True, SubTask.DONE
             return
+        if state.clips == 0 and not state.parted.any():
+            state.second_first = self.seen.tube(1).hides(self.seen.tube(0), self.hands.applier.base[:3, 3])
         tube, job = self._next_job()
-        task = SubTask.GRASP_GALLBLADDER if tube == GRASP else sub_task_of(tube, job)
+        task = SubTask.GRASP_GALLBLADDER if tube == GRASP else sub_task_of(self._order.index(tube), job)
         if task is not state.sub_task:
             state.sub_task, state.tube, state.job = task, tube, job
             state.attempts, state.spent, state.reason = 0, 0.0, Failure.NONE
@@ -142,11 +144,16 @@ class Surgeon(Grasping, Dividing):
         else:
             self.aim_at_tube()
 
+    @property
+    def _order(self) -> tuple[int, int]:
+        """Numbers of the tubes, that in front first."""
+        return (1, 0) if self.state.second_first else (0, 1)
+
     def _next_job(self) -> tuple[int, int]:
         state = self.state
         if not state.grasped and not state.parted.all():
             return GRASP, 0
-        for tube in range(len(self.params.tubes)):
+        for tube in self._order:
             for job in range(CLIPS):
                 if state.clip_places[tube, job] < 0.0:
                     return tube, job

@@ -13,6 +13,9 @@ __all__ = ["Tube"]
 _BESIDE = 2.0e-3
 """Distance along the tube, to both sides, over which its direction is measured, m."""
 
+_ACROSS = 0.8
+"""Cosine of the least angle between a tube and the view, where jaws can stand across it."""
+
 
 class Tube:
     """The present line; places are distances along the line at rest, from the gallbladder's end."""
@@ -53,6 +56,29 @@ class Tube:
         ends = np.clip([along - _BESIDE, along + _BESIDE], self._along[0], self._along[-1])
         way = self.point(float(ends[1])) - self.point(float(ends[0]))
         return way / max(float(np.linalg.norm(way)), 1e-9)
+
+    def hides(self, other: Tube, eye: Vector) -> bool:
+        """Return whether this tube lies across the way from an eye (m, shape (3,)) to another tube."""
+        ways = eye - other.points
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        off = self.points - other.points[:, None]
+        ahead = (off * ways[:, None]).sum(axis=2)
+        aside = np.linalg.norm(off - ahead[:, :, None] * ways[:, None], axis=2)
+        reach = self.radii + other.radii[:, None]
+        return bool(((ahead > reach) & (aside < reach)).any())
+
+    def first_place(self, nodes: Vector, gap: float, eye: Vector) -> float:
+        """Return the first place that is free, and lies across the view, m; 0 without any.
+
+        nodes: of an organ that the wall is at least `gap` (m) away from, m, shape (n, 3). eye: m, shape (3,).
+        """
+        apart = np.linalg.norm(self.points[:, None] - nodes, axis=2).min(axis=1) - self.radii
+        ways = np.gradient(self.points, axis=0)
+        views = eye - self.points
+        lengths = np.linalg.norm(ways, axis=1) * np.linalg.norm(views, axis=1)
+        foreshortened = np.abs((ways * views).sum(axis=1)) / np.maximum(lengths, 1e-12)
+        good = np.flatnonzero((apart >= gap) & (foreshortened < _ACROSS))
+        return float(self._along[good[0]]) if good.size else 0.0
 
     def nearest(self, point: Vector) -> float:
         """Return the place nearest to a point (m, shape (3,))."""

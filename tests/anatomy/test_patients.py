@@ -29,6 +29,7 @@ from engines.fem.params import FemParams
 from engines.tissue.meshing.mesh_check import checked_mesh
 from engines.tissue.meshing.tet_mesh import shape_quality
 from engines.tissue.organs.anchors import AnchorParams
+from tests.anatomy.gaps import gaps_of
 
 SEEDS = st.integers(0, 2**53)
 JOINTS = {"neck_duct", "duct_confluence", "neck_artery", "artery_origin"}
@@ -101,6 +102,25 @@ def test_every_patient_has_sound_hollow_organs_that_hang_together(seed):
         assert len(ties.areas) >= (5 if name in JOINTS else 25)
 
 
+@given(SEEDS, st.sampled_from(COURSES), st.booleans())
+@example(88, "cranial", True)  # a wide gallbladder, and the longest artery
+@example(4, "behind", True)
+@example(14, "front", False)
+def test_no_tube_overlaps_another_except_where_they_join(seed, artery, short_duct):
+    for phase in ("clip-and-cut", "calot-dissection"):
+        given = tissue(patient=seed, artery=artery, short_duct=short_duct, phase=phase)
+        gaps = gaps_of(given.organs, joint=5e-3)
+        assert min(gaps.values()) > 0.0, (phase, min(gaps, key=gaps.get))
+
+
+@given(SEEDS, st.sampled_from(COURSES), st.booleans())
+def test_a_dissected_triangle_has_room_for_jaws_between_duct_and_artery(seed, artery, short_duct):
+    given = tissue(patient=seed, artery=artery, short_duct=short_duct)
+    gaps = gaps_of(given.organs, joint=6e-3)
+    assert gaps["cystic_artery", "cystic_duct"] > 3.5e-3
+    assert gaps["cystic_artery", "gallbladder"] > 0.5e-3
+
+
 @given(SEEDS, st.sampled_from(["cystic_duct", "cystic_artery"]))
 def test_tubes_begin_at_the_gallbladder_and_end_where_they_join(seed, name):
     given = tissue(patient=seed)
@@ -130,7 +150,7 @@ def test_fat_lies_on_gallbladder_and_ducts_before_the_dissection(seed):
     assert organs["fat"].solid.longest_step > 40e-6
     under = given.organs["fat"].surface(AnchorParams(surface="underside"))
     beds = [one for name, one in given.attachments.items() if name.startswith("fat_")]
-    assert len(beds) >= 3
+    assert len(beds) >= 2
     for bed in beds:
         assert len(find_ties(organs["fat"], organs[bed.organs[1]], under, bed.within).areas) >= 4
 
@@ -154,7 +174,7 @@ def test_meshes_are_the_same_on_all_platforms():
     for params in tissue(patient=7, phase="calot-dissection").organs.values():
         digest.update(np.round(1e6 * params.rest.nodes).astype(np.int64).tobytes())
         digest.update(params.rest.tetrahedra.tobytes())
-    assert digest.hexdigest()[:16] == "8e0e86bcff08b5e3"
+    assert digest.hexdigest()[:16] == "19050dd92f14d2e3"
 
 
 def test_fields_of_an_organ_of_the_same_name_replace_those_of_the_patient():

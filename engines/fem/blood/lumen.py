@@ -80,8 +80,8 @@ class Lumen:
         self._area = float(self.areas(organ.mesh.nodes).mean())
         self._cell = 0.5 * (float(np.diff(self.along).mean()) + sqrt(4.0 * pi * self._area) / len(points[0]))
         """Mean distance of neighbouring nodes of the inner wall, m."""
-        self.left: Vector = np.array([params.volume or 0.0])
-        """Liquid left in a sac, m^3."""
+        self.left: Vector = np.array([params.volume or params.reserve or 0.0])
+        """Liquid left in a sac, or in the reserve at the left end, m^3."""
         self.openings: list[Opening] = []
         self.partings: list[Parting] = []
         """Places where the tube is parted, from the left end to the right."""
@@ -260,11 +260,24 @@ class Lumen:
             for opening in self.openings if end == "left" else self.openings[::-1]:
                 # nodes of a parted ring stay with the left part
                 behind = resistance[: opening.first] if end == "left" else resistance[opening.last + 1 :]
-                is_parted = opening.share >= 1.0
-                self._pour(found, opening, self._flow(opening, behind), end if is_parted else "", nodes)
-                if is_parted:
+                self._supply(found, opening, behind, end, nodes, seconds)
+                if opening.share >= 1.0:
                     break
         return found
+
+    def _supply(
+        self, found: Vector, opening: Opening, behind: Vector, end: str, nodes: Vector, seconds: float
+    ) -> None:
+        """Let out of an opening what comes from an end through the resistances `behind`."""
+        side = end if opening.share >= 1.0 else ""
+        reserve = self._params.reserve if end == "left" else None
+        if reserve is None:
+            self._pour(found, opening, self._flow(opening, behind), side, nodes)
+            return
+        left = float(self.left[0])
+        flow = min(self._flow(opening, behind, left / reserve), left / seconds)
+        if flow > 0.0 and self._pour(found, opening, flow, side, nodes):
+            self.left[0] = max(0.0, left - flow * seconds)
 
     def _empty(self, found: Vector, volume: float, nodes: Vector, seconds: float) -> None:
         """Let a sac run out through its openings, by a pressure that falls with what is left."""
@@ -275,10 +288,10 @@ class Lumen:
             if flow > 0.0 and self._pour(found, opening, flow, "", nodes):
                 self.left[0] = max(0.0, float(self.left[0]) - flow * seconds)
 
-    def _flow(self, opening: Opening, resistances: Vector) -> float:
-        """Return the flow out of an opening behind these resistances, m^3/s."""
+    def _flow(self, opening: Opening, resistances: Vector, full: float = 1.0) -> float:
+        """Return the flow out of an opening behind resistances, m^3/s. `full`: share of the pressure."""
         area, density = opening.share * self._area, self._liquid.density
-        flow = opening_flow(self._params.pressure, area, float(resistances.sum()), density)
+        flow = opening_flow(full * self._params.pressure, area, float(resistances.sum()), density)
         return flow if self._params.most_flow is None else min(flow, self._params.most_flow)
 
     def _pour(self, found: Vector, opening: Opening, flow: float, side: str, nodes: Vector) -> bool:

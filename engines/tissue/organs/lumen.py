@@ -50,6 +50,15 @@ class LumenParams(BaseModel):
     supply: tuple[Literal["left", "right"], ...] = Field(
         default=("left", "right"), min_length=1, max_length=2, description="ends through which liquid comes"
     )
+    reserve: Volume | None = Field(
+        default=None,
+        gt=0,
+        le=1e-2,
+        description=(
+            "liquid behind the left end, such as that of the gallbladder behind a cystic duct: the pressure"
+            " there falls with what is left; default: supplied without end"
+        ),
+    )
     most_flow: VolumeFlow | None = Field(
         default=None,
         gt=0,

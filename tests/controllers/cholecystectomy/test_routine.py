@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from controllers.cholecystectomy.places import choose_places
 from controllers.cholecystectomy.sub_task import Failure, Step, SubTask
 from schemas.errors import ScenarioError
 from tests.controllers.cholecystectomy.world import FAR, NECK, World
@@ -25,6 +26,22 @@ def test_the_17_sub_tasks_follow_each_other_and_clips_and_cuts_are_where_they_sh
             assert 1.6e-3 < abs(clip - world.cuts[tube]) < 3.6e-3  # a cuff of 1 to 3 mm
         assert third < world.cuts[tube] < second
         assert length - first > 5e-3
+
+
+def test_a_tube_in_front_of_the_other_is_clipped_and_cut_first():
+    world = World(far=[FAR[0], [30e-3, -22e-3, 8e-3]])
+    assert world.run() is SubTask.DONE
+    assert world.state.second_first
+    first, second = (world.said.index(f"{tube} is parted") for tube in ("cystic_artery", "cystic_duct"))
+    assert first < second
+    assert world.tasks == [SubTask(number) for number in range(1, 19)]
+
+
+def test_a_long_tube_is_clipped_where_it_is_free_of_the_gallbladder():
+    near, free = choose_places(30e-3), choose_places(30e-3, 8e-3)
+    assert free.clips[2] == pytest.approx(8e-3)
+    assert np.ptp(free.clips) == pytest.approx(np.ptp(near.clips))
+    assert choose_places(10e-3, 8e-3).clips[2] == choose_places(10e-3).clips[2]
 
 
 def test_the_gallbladder_is_pulled_away_from_the_ducts_within_the_limits():

@@ -120,6 +120,19 @@ def test_a_hole_lets_out_its_share_and_one_end_supplies_half():
         assert 0.2 * rig.rate < hole < 0.8 * rig.rate
 
 
+def test_a_reserve_behind_the_left_end_runs_out():
+    lumen = {"liquid": "bile", "pressure": "10 mmHg", "supply": ["left"], "reserve": "1 ml"}
+    with TubeRig(lumen=lumen) as rig:
+        rig.open(0.0)
+        rig.hold(0.016)
+        first = rig.rate
+        rig.hold(0.1)
+        assert 0.0 < rig.rate < 0.8 * first
+        rig.hold(0.5)
+        assert rig.rate < 1e-6 * first
+        assert float(rig.outputs["block/blood/lost"][0]) == pytest.approx(1.0, rel=0.05)
+
+
 def test_most_flow_bounds_an_artery():
     with TubeRig(lumen={"pressure": "78 mmHg", "most_flow": "4 ml/s"}) as rig:
         rig.open(0.0)
