@@ -283,6 +283,7 @@ def test_the_period_of_an_output_is_a_multiple_of_the_participants():
         ((motion(), force()), {"motion": "a.top"}, r"'a' has no bond 'top'. Did you mean 'tip'\?"),
         ((motion(), force()), {"motion": "b.tip"}, "'b.tip' is a force side, expected a motion side"),
         ((motion(dof=3), force(dof=1)), {}, "'a.tip' has 3 degrees of freedom, 'b.tip' has 1"),
+        ((motion(dof=1, coordinate="angle"), force(dof=1)), {}, "'a.tip' moves by angle, 'b.tip' by length"),
         ((motion(dof=3, points=4), force(dof=3)), {}, "'a.tip' bonds 4 points, 'b.tip' bonds 1"),
         (
             (motion(frame="world"), force(frame="base")),
