@@ -46,8 +46,8 @@ def ros(
         typer.echo(
             json.dumps(
                 [
-                    {"session": session, "gateway": name} | status.model_dump()
-                    for (session, name), status in gateways.items()
+                    {"session": session, "gateway": name, "place": place} | status.model_dump()
+                    for (session, name), (status, place) in gateways.items()
                 ],
                 indent=2,
             )
@@ -59,8 +59,9 @@ def ros(
             "no gateway to ROS is running; a scenario has one with `kind: ros2-zenoh`: trocar run ros",
             soft_wrap=True,
         )
-    for (session, name), status in gateways.items():
-        _print(out, session, name, status)
+    for (session, name), (status, place) in gateways.items():
+        where = f"session '{session}'{f' at {place}' if place else ''}"
+        _print(out, where, name, status)
 
 
 @app.command()
@@ -86,12 +87,12 @@ def bag(
     show(asdict(export(Recording(recording), target, gateway, trust=trust)), as_json=as_json)
 
 
-def _print(out: Console, session: str, name: str, status: GatewayStatus) -> None:
+def _print(out: Console, where: str, name: str, status: GatewayStatus) -> None:
     clients = ", ".join(
         f"{client.name}{f' ({client.address})' if client.address else ''}" for client in status.clients
     )
     out.print(
-        f"[bold]{name}[/] ({status.kind}) in session '{session}', connected: {escape(clients) or 'none'}",
+        f"[bold]{name}[/] ({status.kind}) in {escape(where)}, connected: {escape(clients) or 'none'}",
         soft_wrap=True,
     )
     shown = table(

@@ -16,7 +16,7 @@ from typing import ClassVar, cast
 import numpy as np
 
 from devices.ros.params import GatewayParams
-from devices.ros.status import StatusCounters
+from devices.ros.status import PLACE, StatusCounters
 from devices.ros.topics.arbitration import CommandArbiter
 from devices.ros.topics.diagnostics import DIAGNOSTICS_PERIOD_NS, DIAGNOSTICS_ROW, Diagnostics
 from devices.ros.topics.dvrk_table import dvrk_table
@@ -79,7 +79,9 @@ class Gateway(Device):
         """All topics and services."""
         meaning = "once a second: who is connected, and the rates of all topics"
         self._status = event_out("gateway", GatewayStatus, meaning, clock="wall")
-        self._ports = (*(row.port for row in self.rows if row.port is not None), self._status)
+        place = "once a second: where programs reach it, by a router, a domain or a master"
+        own = (self._status, event_out(PLACE, StringMessage, place, clock="wall"))
+        self._ports = (*(row.port for row in self.rows if row.port is not None), *own)
         self._inputs = {
             row.port.name: row for row in self.rows if row.port is not None and row.way == "publish"
         }
@@ -123,7 +125,7 @@ class Gateway(Device):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """A port per topic, with the name of the topic, and `gateway`, the status."""
+        """A port per topic, with the name of the topic, `gateway`, the status, and `place`."""
         return self._ports
 
     def open(self, directory: Path) -> None:
@@ -225,6 +227,7 @@ class Gateway(Device):
         samples = [self._received.popleft() for _ in range(len(self._received))]
         if self._transport is not None and t >= self._status_due_ns:
             self._status_due_ns = t + _STATUS_NS
+            samples.append(Sample(PLACE, StringMessage(data=self._transport.endpoint)))
             samples.append(Sample(self._status.name, self._counters.status(self._transport.clients())))
         return samples
 

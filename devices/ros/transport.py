@@ -77,6 +77,8 @@ class Transport(ABC):
 
     changed: Callable[[], None] = staticmethod(lambda: None)
     """Is called, in any thread, when a publisher has become `wanted` or is so no longer."""
+    endpoint = ""
+    """Where programs reach the graph, in words: a master, a domain."""
 
     @abstractmethod
     def advertise(self, row: Row) -> Publisher:

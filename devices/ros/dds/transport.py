@@ -68,6 +68,7 @@ class DdsTransport(Transport):
     def __init__(self, domain: Domain, number: int, services: ServiceParticipant) -> None:
         """Join `domain` with the number `number`; `services`: a participant of the same domain."""
         self._domain, self._services = domain, services
+        self.endpoint = f"ROS_DOMAIN_ID={number}"
         self._participant = DomainParticipant(number, Qos(Policy.Userdata(b"enclave=/;")))
         self._guid = self._participant.guid.bytes
         services.ignore(self._guid)

@@ -42,6 +42,7 @@ class Ros1Transport(Transport):
             host: address of this machine for programs.
         """
         self._node, self._host, self._master = node, host, master
+        self.endpoint = f"ROS_MASTER_URI={master}"
         self._publications: dict[str, Publication] = {}
         self._services: dict[str, Service] = {}
         self._connections: dict[Connection, Publication | None] = {}

@@ -75,6 +75,7 @@ class ZenohTransport(Transport):
             node: name of the node.
             congestion: how messages are sent while the router is busy.
         """
+        self.endpoint = f"ROS_DOMAIN_ID={domain}"
         self._session = connect()
         self._connect_pictures, self._pictures = connect, None
         self._node, self._congestion = node, congestion

@@ -12,9 +12,11 @@ from hub.transport.loopback_port import LoopbackPort
 from hub.transport.session_secret import listen_with_secret
 from schemas.codec import encode
 from schemas.keys import Keys
+from schemas.ros import StringMessage
 from schemas.trocar_msgs import GatewayClient, GatewayStatus, GatewayTopic
 from tests.hub.authorities import free_endpoint
 
+PLACE = "ROS_DOMAIN_ID=3"
 STATUS = GatewayStatus(
     kind="ros2-dds",
     clients=[GatewayClient(name="/console", address="10.0.0.7")],
@@ -40,6 +42,7 @@ def endpoint() -> Generator[str]:
     def tell() -> None:
         while not over.wait(0.1):
             hub.put(Keys("surgery").output("device", "ros", "gateway"), encode(STATUS))
+            hub.put(Keys("surgery").output("device", "ros", "place"), encode(StringMessage(data=PLACE)))
             hub.put(Keys("surgery").output("device", "broken", "gateway"), b"nonsense")
 
     with listen_with_secret(LoopbackPort(endpoint)) as hub:
@@ -52,7 +55,7 @@ def endpoint() -> Generator[str]:
 
 def test_people_see_who_is_connected_and_what_goes_through(endpoint: str) -> None:
     shown = CliRunner().invoke(app, ["--connect", endpoint], env={"COLUMNS": "160"}).stdout
-    assert "ros (ros2-dds) in session 'surgery', connected: /console (10.0.0.7)" in shown
+    assert "ros (ros2-dds) in session 'surgery' at ROS_DOMAIN_ID=3, connected: /console (10.0.0.7)" in shown
     lines = [line.split() for line in shown.splitlines()]
     assert ["/PSM1/measured_js", "published", "100.0", "1000"] in lines
     assert "5 values in position, expected 6" in shown
@@ -61,10 +64,17 @@ def test_people_see_who_is_connected_and_what_goes_through(endpoint: str) -> Non
 
 def test_programs_get_json(endpoint: str) -> None:
     (found,) = json.loads(CliRunner().invoke(app, ["--connect", endpoint, "--json"]).stdout)
-    assert found == {"session": "surgery", "gateway": "ros"} | STATUS.model_dump()
+    assert found == {"session": "surgery", "gateway": "ros", "place": PLACE} | STATUS.model_dump()
 
 
 def test_nobody_there() -> None:
     result = CliRunner().invoke(app, ["--connect", free_endpoint()])
     assert result.exit_code == 0
     assert "no gateway to ROS is running" in result.stdout
+
+
+def test_programs_over_zenoh_meet_at_the_hub(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    over_zenoh = STATUS.model_copy(update={"kind": "ros2-zenoh"})
+    monkeypatch.setitem(globals(), "STATUS", over_zenoh)
+    (found,) = json.loads(CliRunner().invoke(app, ["--connect", endpoint, "--json"]).stdout)
+    assert found["place"] == f"{endpoint}, {PLACE}"
