@@ -60,7 +60,9 @@ def gateway(tmp_path: Path) -> Generator[MemoryGateway]:
 
 
 def commands(gateway: MemoryGateway) -> list[tuple[str, Message]]:
-    return [(sample.port, sample.message) for sample in gateway.read(0) if sample.port not in ("gateway", "place")]
+    return [
+        (sample.port, sample.message) for sample in gateway.read(0) if sample.port not in ("gateway", "place")
+    ]
 
 
 def words(gateway: MemoryGateway, topic: str) -> list[str]:
