@@ -55,11 +55,11 @@ def prepared(
 def grouped(variables: Iterable[Variable]) -> Iterator[list[Variable]]:
     """Yield groups of variables for a common call.
 
-    The variables of a group have the same type, and all change at events only, or all at any time.
+    The variables of a group have the same type and clocks, and all change at events only, or all at any time.
     """
-    groups: dict[tuple[str, bool], list[Variable]] = {}
+    groups: dict[tuple[str, bool, tuple[int, ...]], list[Variable]] = {}
     for variable in variables:
-        groups.setdefault((variable.type.name, variable.discrete), []).append(variable)
+        groups.setdefault((variable.type.name, variable.discrete, variable.clocks), []).append(variable)
     yield from groups.values()
 
 
@@ -70,6 +70,7 @@ class Block:
         """Prepare the calls on the variables; `verb` is `Set` or `Get`."""
         self.type = variables[0].type
         self.discrete = variables[0].discrete
+        self.clocks = variables[0].clocks
         size = sum(variable.size for variable in variables)
         self.raw = np.zeros(size, self.type.dtype)
         """The values in their C type, shape (size,)."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from engines.fmu.bond_params import FmuBond
 from engines.fmu.bond_variables import BondVariables, find_bond
+from engines.fmu.clock import Clock, clock_of
 from engines.fmu.model import interface_of, read_model, suggested_tolerance
 from engines.fmu.sources import listed_sources
 from engines.fmu.start import Start, declared_start, given_start, settable, size_of, unit_of
@@ -58,6 +59,8 @@ class Description:
     """The scenario's bonds; their inputs are neither `inputs` nor `ports`."""
     tunable: tuple[Variable, ...] = ()
     """Parameters that may change while the session runs."""
+    clocks: tuple[Clock, ...] = ()
+    """Input and output clocks, of an FMU with an event mode."""
     states: int = 0
     """For model exchange: number of continuous states (FMI 2)."""
     indicators: int = 0
@@ -92,12 +95,13 @@ def describe(
     model, major, names = read_model(path, strict=strict)
     part = interface_of(path, model, major, names, solver)
     starts = {value.name: value for value in _starts(path, model, major, start)}
+    clocks = _clocks(path, model, part)
     variables: dict[str, list[Variable]] = {"input": [], "output": []}
     ports: list[Port] = []
     for row in model.modelVariables:
         if row.causality not in variables or row.alias is not None:
             continue
-        variable = _variable(path, row, major, _size(path, row, start))
+        variable = _variable(path, row, major, _size(path, row, start), clocked=bool(clocks))
         if variable is not None:
             variables[row.causality].append(variable)
             ports.append(_port(row, variable, _input_start(path, row, variable, starts, strict=strict)))
@@ -113,16 +117,42 @@ def describe(
         model.coSimulation if part is model.coSimulation else None,
         tuple(variable for variable in variables["input"] if variable.name not in bonded),
         tuple(variables["output"]),
-        (*(port for port in ports if port.name not in bonded.values()), *(port for _, port in tuned)),
+        (
+            *(port for port in ports if port.name not in bonded.values()),
+            *(port for _, port in tuned),
+            *(port for clock in clocks for port in clock.ports),
+        ),
         tuple(starts.values()),
         listed_sources(model),
         tuple(found),
         tuple(variable for variable, _ in tuned),
+        clocks,
         model.numberOfContinuousStates,
         model.numberOfEventIndicators,
         completes_steps=bool(model.modelExchange and model.modelExchange.needsCompletedIntegratorStep),
         tolerance=suggested_tolerance(model),
     )
+
+
+def _clocks(path: Path, model: ModelDescription, part: InterfaceType) -> tuple[Clock, ...]:
+    """Return the clocks that can tick here.
+
+    Raises ScenarioError for clocks of known times without an event mode, in which they would tick.
+    """
+    try:
+        clocks = tuple(clock for row in model.modelVariables if (clock := clock_of(row)) is not None)
+    except (ValueError, ZeroDivisionError) as error:
+        raise ScenarioError(f"'{path}': a clock has times that are no numbers: {error}") from error
+    if wrong := [one.name for one in clocks if one.interval is not None and not one.interval > 0.0]:
+        raise ScenarioError(f"'{path}': clocks with an interval that is not above 0: {', '.join(wrong)}")
+    if model.coSimulation is not None and part is model.coSimulation and model.coSimulation.hasEventMode:
+        return clocks
+    if timed := [clock.name for clock in clocks if clock.is_timed]:
+        raise ScenarioError(
+            f"'{path}' has time-based input clocks ({', '.join(timed)}), and no event mode in"
+            " co-simulation to let them tick. Export it for co-simulation with event mode, or without clocks."
+        )
+    return ()
 
 
 def _bonded_inputs(bonds: Sequence[BondVariables]) -> dict[str, str]:
@@ -188,8 +218,10 @@ def _starts(path: Path, model: ModelDescription, major: int, start: Mapping[str,
             raise ScenarioError(f"'{path}': {error}", path=("start", name)) from error
 
 
-def _variable(path: Path, row: ModelVariable, major: int, size: int) -> Variable | None:
+def _variable(path: Path, row: ModelVariable, major: int, size: int, *, clocked: bool) -> Variable | None:
     number = number_type(major, row.type)
+    if row.type == "Clock" and clocked:
+        return None
     if number is None or size == 0:
         reason = (
             "it is empty"
@@ -205,6 +237,7 @@ def _variable(path: Path, row: ModelVariable, major: int, size: int) -> Variable
         number,
         size,
         discrete=row.variability != "continuous",
+        clocks=tuple(one.valueReference for one in row.clocks or ()) if clocked else (),
     )
 
 

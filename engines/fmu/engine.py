@@ -28,7 +28,7 @@ from engines.fmu.instance import Instance
 from engines.fmu.model_exchange import Fmi2ModelExchange, Fmi3ModelExchange, default_tolerance
 from engines.fmu.repeated_reads import warn_of_changes
 from engines.fmu.tunable import TunableParameters
-from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from hub.participant.state import split_state
 from schemas.errors import ScenarioError, SessionError, StateError
 from schemas.files import find_file
@@ -135,7 +135,7 @@ class FmuEngine(Stepped):
         super().__init__(name, params)
         self._instance: Instance | None = None
         self._hashes_state = False
-        self._outputs: dict[str, Vector] = {}
+        self._outputs: dict[str, Value] = {}
         self._time = np.zeros(1)
         self._sides: dict[str, BondSide] = {}
         """Bonds with the numbers known after `configure`, by name."""
@@ -257,6 +257,7 @@ class FmuEngine(Stepped):
                 bond.read(begin / 1e9, sub / 1e9)
         for bond in self._bonds:
             self._outputs |= bond.result()
+        self._outputs |= instance.take_ticks()
         return self._read(t + h)
 
     @property
@@ -293,6 +294,7 @@ class FmuEngine(Stepped):
         instance.memory[:], *bonds = split_state(self.name, kept, state[:size])
         for bond, part in zip(self._bonds, bonds, strict=True):
             bond.state = part
+        instance.recall()
         self._tunable.read()
 
     def _kept(self) -> list[Vector]:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from engines.fmu.blocks import WARNING, Block
+from engines.fmu.clock import Clock
 from engines.fmu.description import Description
 from engines.fmu.instance import Instance
 from engines.fmu.log import log_everything, log_message
 from engines.fmu.start import Start
+from engines.fmu.ticks import Ticks
 from hub.participant import Inputs
 from schemas.errors import SessionError
+from schemas.ros import EmptyMessage
 
 __all__ = ["Fmi3Instance"]
 
@@ -60,10 +63,17 @@ class Fmi3Instance(Instance):
         super().__init__(FMU3Slave, description, name, [common | {"eventModeUsed": used} for used in modes])
         self._has_events = bool(self.options["eventModeUsed"])
         self._splits = self._has_events and capabilities.canHandleVariableCommunicationStepSize
-        self._event_blocks = [block for block in self.inputs if block.discrete and self._has_events]
-        self._step_blocks = [block for block in self.inputs if block not in self._event_blocks]
-        # time of the next event, discrete inputs
-        self.memory = np.full(1 + sum(block.values.size for block in self._event_blocks), math.inf)
+        if description.clocks and not self._has_events:
+            raise SessionError("the FMU has clocks and refuses its event mode, in which they tick")
+        self._ticks = Ticks(self, description.clocks)
+        free = [block for block in self.inputs if not block.clocks]
+        self._event_blocks = [block for block in free if block.discrete and self._has_events]
+        self._step_blocks = [block for block in free if block not in self._event_blocks]
+        self._clocked_blocks = [block for block in self.inputs if block.clocks]
+        # time of the next event, discrete inputs, and the state of the clocks
+        self._events_end = 1 + sum(block.values.size for block in self._event_blocks)
+        self.memory = np.full(self._events_end + self._ticks.size, math.inf)
+        self._ticks.bind(self.memory[self._events_end :])
         self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
         self._again, self._nominals, self._states, self._scheduled = (
             ctypes.c_bool(),
@@ -89,7 +99,8 @@ class Fmi3Instance(Instance):
         self.call("EnterInitializationMode", tolerance is not None, tolerance or 0.0, 0.0, False, 0.0)
         self.call("ExitInitializationMode")
         if self._has_events:
-            if not self._update_discrete_states():
+            self._ticks.start()
+            if not self._update_discrete_states(self._ticks.due(_SAME_INSTANT_S), at=0.0):
                 raise SessionError(f"the FMU asks to end the simulation before it begins{self._reason()}")
             self.call("EnterStepMode")
 
@@ -98,14 +109,25 @@ class Fmi3Instance(Instance):
         for block in self._step_blocks:
             block.store(inputs, tau + dt / 2)
             self.set_changed(block)
-        if not self._event_blocks:
-            return
-        for block in self._event_blocks:
+        for block in (*self._event_blocks, *self._clocked_blocks):
             block.store(inputs, tau)
-        values = np.concatenate([block.values for block in self._event_blocks])
-        if not np.array_equal(values, self.memory[1:]):
-            self.memory[1:] = values
-            self._handle_event(self._event_blocks, at=self.now_ns / 1e9)
+        if self._event_blocks:
+            values = np.concatenate([block.values for block in self._event_blocks])
+            if not np.array_equal(values, self.memory[1 : self._events_end]):
+                self.memory[1 : self._events_end] = values
+                self._handle_event(self._event_blocks, at=self.now_ns / 1e9)
+        for port, clock in self._ticks.triggered.items() if tau == 0.0 else ():
+            for _ in inputs.events(port):
+                if not self.ended:
+                    self._handle_event(clocks=[clock], at=self.now_ns / 1e9)
+
+    def recall(self) -> None:
+        """Take over `memory`, after a return to a saved state."""
+        self._ticks.recall()
+
+    def take_ticks(self) -> Mapping[str, tuple[EmptyMessage, ...]]:
+        """Return the ticks of output clocks since the last call, by port."""
+        return self._ticks.take_found()
 
     def tune(self, blocks: Sequence[Block]) -> None:
         """Set tunable parameters between two steps; in event mode, if the FMU has one."""
@@ -118,15 +140,20 @@ class Fmi3Instance(Instance):
         """Bring the FMU from `t` to `t + h` (ns), event by event, or to the FMU's end of the simulation."""
         now, end = t / 1e9, (t + h) / 1e9
         for _ in range(_MOST_EVENTS):
-            target = min(end, float(self.memory[0])) if self._splits else end
+            tick = self._ticks.next_time
+            target = min(end, float(self.memory[0]), tick) if self._splits else end
+            if target - tick > _SAME_INSTANT_S:
+                raise SessionError(
+                    f"a clock of the FMU ticks at {tick:.9g} s, inside the step to {end:.9g} s, and the FMU"
+                    " takes no shorter steps; choose a 'step' that divides the clock's interval"
+                )
             needs_event = target - now < _SAME_INSTANT_S  # an event scheduled for this instant
             if not needs_event:
                 now = self._step_to(now, target)
-                needs_event = self._has_events and (
-                    self._event.value or now > self.memory[0] - _SAME_INSTANT_S
-                )
+                scheduled = min(self.memory[0], tick)
+                needs_event = self._has_events and (self._event.value or now > scheduled - _SAME_INSTANT_S)
             if needs_event and not self.ended:
-                self._handle_event(at=now)
+                self._handle_event(clocks=self._ticks.due(now + _SAME_INSTANT_S), at=now)
             if self.ended or end - now < _SAME_INSTANT_S:
                 return
         raise SessionError(
@@ -143,28 +170,35 @@ class Fmi3Instance(Instance):
             self._end(reached, "terminateSimulation of fmi3DoStep")
         return reached
 
-    def _handle_event(self, inputs: Sequence[Block] = (), *, at: float) -> None:
+    def _handle_event(self, inputs: Sequence[Block] = (), *, clocks: Sequence[Clock] = (), at: float) -> None:
         """Handle the event at `at` (s). An FMU at the end of its simulation stays in event mode."""
         self.call("EnterEventMode")
         for block in inputs:
             self.transfer(block)
-        if self._update_discrete_states():
+        if self._update_discrete_states(clocks, at=at):
             self.call("EnterStepMode")
         else:
             self._end(at, "terminateSimulation of fmi3UpdateDiscreteStates")
 
-    def _update_discrete_states(self) -> bool:
+    def _update_discrete_states(self, clocks: Sequence[Clock], *, at: float) -> bool:
         """Iterate the event until the discrete states stay, and note the time of the next event.
 
-        Returns whether the simulation goes on: the FMU may ask for the end.
+        `clocks` tick in the first iteration. Returns whether the simulation goes on: the FMU may ask for the
+        end.
         """
+        self._ticks.tick(clocks)
         for _ in range(_MOST_EVENTS):
+            self._ticks.collect(clocks)
+            self._ticks.schedule(clocks)
             self.call("UpdateDiscreteStates", *self._update_results)
+            self._ticks.count_down(at)
             if self._terminate.value:
                 return False
             if not self._again.value:
                 self.memory[0] = self._next.value if self._scheduled.value else math.inf
                 return True
+            clocks = self._ticks.due(at + _SAME_INSTANT_S)
+            self._ticks.tick(clocks)
         raise SessionError(
             f"the discrete states of the FMU do not settle in {_MOST_EVENTS} iterations of one event"
         )

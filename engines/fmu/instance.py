@@ -27,6 +27,7 @@ from engines.fmu.start import Start
 from engines.fmu.variables import Variable
 from hub.participant import Inputs
 from schemas.errors import ScenarioError, SessionError
+from schemas.ros import EmptyMessage
 
 __all__ = ["DISCARD", "Instance"]
 
@@ -109,9 +110,8 @@ class Instance(ABC):
             self._serialise_state = partial(self._function(f"Serialize{word}"), self._component, self._state)
         self.inputs = [Block("Set", group, self._prepare_access) for group in grouped(description.inputs)]
         self._unread = frozenset[str]()
-        self.outputs = self._read = [
-            Block("Get", group, self._prepare_access) for group in grouped(description.outputs)
-        ]
+        self.outputs = [Block("Get", group, self._prepare_access) for group in grouped(description.outputs)]
+        self._read = [block for block in self.outputs if not block.clocks]
 
     def _check_functions(self, description: Description) -> None:
         needed = dict.fromkeys(self.prefix + name for name in self.required)
@@ -185,16 +185,26 @@ class Instance(ABC):
     def read_outputs(self, unread: frozenset[str] = frozenset()) -> None:
         """Bring the FMU's outputs into the blocks, all but whole numbers and truth values that are `unread`.
 
-        Floats are read in any case: a NaN ends the session whether somebody looks or not.
+        Clocked ones hold the value of the last tick. Floats are read in any case: a NaN ends the session
+        whether somebody looks or not.
         """
         if unread is not self._unread:
             self._unread = unread
             self._read = [
-                block for block in self.outputs if not (block.always_usable and block.parts.keys() <= unread)
+                block
+                for block in self.outputs
+                if not (block.clocks or (block.always_usable and block.parts.keys() <= unread))
             ]
         for block in self._read:
             self.transfer(block)
             block.publish()
+
+    def recall(self) -> None:  # noqa: B027
+        """Take over `memory`, after a return to a saved state; nothing to do without clocks."""
+
+    def take_ticks(self) -> Mapping[str, tuple[EmptyMessage, ...]]:
+        """Return the ticks of output clocks since the last call, by port."""
+        return {}
 
     def serialise(self) -> bytes:
         """Return the FMU's state."""

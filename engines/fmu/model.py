@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from engines.fmu.archive import opened_archive
+from engines.fmu.clock import complete_clocks
 from engines.fmu.sources import NO_COMPILER, find_compiler, listed_sources
 from engines.fmu.start import settable, unit_of
 from schemas.errors import MissingExtraError, ScenarioError
@@ -16,7 +17,7 @@ from schemas.errors import MissingExtraError, ScenarioError
 if TYPE_CHECKING:
     from typing import IO
 
-    from fmpy.model_description import InterfaceType, ModelDescription, ModelVariable
+    from fmpy.model_description import InterfaceType, ModelDescription
 
 __all__ = ["interface_of", "library_path", "read_model", "suggested_tolerance"]
 
@@ -49,6 +50,8 @@ def read_model(path: Path, *, strict: bool) -> tuple[ModelDescription, int, list
             major = int(model.fmiVersion.split(".")[0])
             if model.coSimulation is not None and _DERIVATIVES.search(archive.read("modelDescription.xml")):
                 model.coSimulation.providesDirectionalDerivative = True
+            if any(row.type == "Clock" for row in model.modelVariables):
+                complete_clocks(model, archive.read("modelDescription.xml"))
     except ScenarioError:
         raise
     except Exception as error:  # FMPy raises BadZipFile, KeyError, XMLSyntaxError, TypeError, bare Exception
@@ -135,12 +138,6 @@ def interface_of(
             "leave 'solver' out" if model.coSimulation else "export it for co-simulation or model exchange"
         )
         raise ScenarioError(f"'{path}' is for {has} only; {remedy}")
-    clocks = [v.name for v in model.modelVariables if _is_time_based_input(v)]
-    if clocks:
-        raise ScenarioError(
-            f"'{path}' has time-based input clocks ({', '.join(map(_shown, clocks))}), which Trocar does not"
-            " support. Export it without clocks, or with triggered input clocks."
-        )
     library = library_path(found.modelIdentifier, major)
     if library not in names:
         _require_compiler(path, library, names, has_sources=bool(listed_sources(model)))
@@ -155,11 +152,6 @@ def suggested_tolerance(model: ModelDescription) -> float | None:
     except ValueError:
         return None
     return tolerance if 0.0 < tolerance < 1.0 else None
-
-
-def _is_time_based_input(row: ModelVariable) -> bool:
-    """Return whether a variable is a time-based input clock, with ticks known to the importer (FMI 3.0.1)."""
-    return row.type == "Clock" and row.causality == "input" and row.intervalVariability != "triggered"
 
 
 def library_path(identifier: str, major: int) -> str:

@@ -69,6 +69,8 @@ class Variable:
     size: int
     discrete: bool
     """Whether the variable changes at events only."""
+    clocks: tuple[int, ...] = ()
+    """Value references of the clocks at whose ticks the variable exists; empty: it exists always."""
 
 
 _FMI2 = {

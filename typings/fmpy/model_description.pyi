@@ -61,6 +61,12 @@ class ModelVariable:
     variability: str
     initial: str | None
     intervalVariability: str | None
+    intervalDecimal: str | None
+    shiftDecimal: str | None
+    resolution: str | None
+    intervalCounter: str | None
+    shiftCounter: str | None
+    clocks: list[ModelVariable] | None
     declaredType: SimpleType | None
     dimensions: list[Dimension]
     unit: str | None

@@ -91,24 +91,3 @@ class TestStrict:
     def test_an_array_that_would_fill_the_memory(self, make: Make) -> None:
         error = error_of(make, BALL, {'<Dimension start="2"/>': '<Dimension start="2000000000"/>'})
         assert "'state' (line 25) are no numbers whose product is at most 1000000" in error
-
-
-class TestClocks:
-    @pytest.mark.parametrize("kind", ["constant", "fixed", "tunable", "changing", "countdown"])
-    def test_time_based_input_clocks_are_refused(self, make: Make, kind: str) -> None:
-        clock = (
-            f'<Clock name="tick" intervalVariability="{kind}" intervalDecimal="0.1" valueReference="30"'
-            ' causality="input"/>'
-        )
-        error = error_of(make, BALL, {'<Binary name="image"': clock + '<Binary name="image"'})
-        assert "has time-based input clocks (tick), which Trocar does not support" in error
-        assert "Export it without clocks" in error
-
-    @pytest.mark.parametrize(
-        "clock", ['intervalVariability="triggered" causality="input"', 'intervalVariability="triggered"']
-    )
-    def test_others_are_left_alone(self, make: Make, clock: str) -> None:
-        edits = {
-            '<Binary name="image"': f'<Clock name="tick" valueReference="30" {clock}/><Binary name="image"'
-        }
-        assert run(make(BALL, edits=edits), 10)["h"] < 1

@@ -19,6 +19,7 @@ FOLDERS = {
     "bouncing_ball": "x86_64-linux",
     "stair": "linux64",
     "hopper": "linux64",
+    "metronome": "x86_64-linux",
 }
 """Platform folders of FMI 2.0 and 3.0."""
 
