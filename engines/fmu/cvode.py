@@ -42,7 +42,7 @@ class Integrator:
     """Brings the states of an FMU forward in time, up to the next zero of an event indicator."""
 
     def __init__(self, equations: Equations, tolerance: float) -> None:
-        """Take the FMU at time 0; `tolerance` is relative, absolute tolerances follow from nominal values.
+        """Begin at time 0; `tolerance` is relative, absolute tolerances follow from nominal values.
 
         Raises ScenarioError where FMPy has no CVode for this platform.
         """

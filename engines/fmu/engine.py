@@ -1,10 +1,10 @@
-"""FMUs as engines: FMI 2.0 and 3.0 for co-simulation, through FMPy.
+"""FMUs as engines: FMI 2.0 and 3.0, through FMPy.
 
 Inputs and outputs of the FMU are ports, with names by `engines.fmu.variables.port_name`, in the FMU's units:
 a length in mm fits an input in mm alone, unless `inputs` states a conversion. Scalars are
 `std_msgs/msg/Float64`, FMI 3 arrays `std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and
 booleans (0, 1) are exchanged as doubles; an input without a valid number of its type ends the session.
-Strings, binaries and clocks become no ports, with an entry in the log.
+Triggered clocks are event ports. Strings and binaries become no ports, with an entry in the log.
 """
 
 from __future__ import annotations
