@@ -7,12 +7,12 @@ from math import radians
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import choose_pose, jaw_poses, skewed, withdraw
+from controllers.cholecystectomy.approach import choose_pose, gap_between, jaw_poses, skewed, withdraw
 from controllers.cholecystectomy.places import choose_places
 from controllers.cholecystectomy.procedure import Procedure, opening
 from controllers.cholecystectomy.sub_task import CUT, Failure, Step
 from robots import rotation
-from robots.transform import matrix_to_pose
+from robots.transform import matrix_to_pose, pose_to_matrix
 from schemas.errors import MotionError
 
 __all__ = ["Dividing"]
@@ -80,11 +80,19 @@ class Dividing(Procedure):
     def close_on_tube(self) -> None:
         """Close the jaw, and then the clip."""
         state, hand = self.state, self.hand
+        if state.elapsed == 0.0 and self.cuts and self._would_hurt():
+            self.retry(Failure.BLOCKED, "an organ to be spared lies between the blades")
+            return
         if state.elapsed == 0.0:
             hand.move_jaw(max(hand.jaw.lower, _SNIPPED) if self.cuts else _SQUEEZED)
         if state.elapsed >= _CLOSING:
             self.fires = not self.cuts
             self.enter(Step.CHECK)
+
+    def _would_hurt(self) -> bool:
+        """Whether the blades would close on an organ to be spared."""
+        pose = pose_to_matrix(self.hand.measured)
+        return gap_between(self.hand, pose, self.seen.spared.near(pose[:3, 3])) <= 0.0
 
     def check_tube(self) -> None:
         """Wait for the sign of success."""

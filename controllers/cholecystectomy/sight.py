@@ -18,6 +18,9 @@ from schemas.vectors import Vector
 
 __all__ = ["Sight"]
 
+_FACE = 2.0e-3
+"""Distance of a face from its nodes, m."""
+
 
 class Sight:
     """Lines of the tubes, nodes of the organs, and the state of the grasp."""
@@ -55,6 +58,12 @@ class Sight:
     def pull(self) -> float:
         """Force of the grasper on the tissue, N."""
         return float(np.linalg.norm(self._inputs[f"{self._params.grasper}/pull"]))
+
+    @property
+    def spared(self) -> Obstacles:
+        """Organs on which scissors never close."""
+        organs = [self._nodes(organ) for organ in self._params.avoid if organ != self._params.gallbladder]
+        return Obstacles.join([Obstacles(nodes, np.full(len(nodes), _FACE)) for nodes in organs])
 
     def obstacles(self, hand: SurgeonHand, hands: Sequence[SurgeonHand], tube: int | None) -> Obstacles:
         """Return what a hand keeps away from at work on a tube, or, with None, at the gallbladder."""

@@ -114,6 +114,17 @@ def test_a_cut_that_leaves_the_tube_together_is_made_again():
     assert world.state.failure is Failure.NOT_PARTED
 
 
+def test_scissors_do_not_close_on_an_organ_to_be_spared():
+    world = World("avoid=[wall]")
+    world.run(lambda world: world.is_at(SubTask.CUT_LEFT) and world.state.step is Step.REACH)
+    world.spared = world.line(0).points_m.reshape(-1, 3)
+    world.run(lambda world: world.state.recoveries > 0)
+    assert world.cuts == [None, None]
+    assert "an organ to be spared lies between the blades" in world.said[-1]
+    world.spared = world.spared + 0.2
+    assert world.run() is SubTask.DONE
+
+
 def test_a_tube_that_moves_is_aimed_at_anew():
     world = World()
     world.run(lambda world: world.is_at(SubTask.CLIP_1_LEFT) and world.state.step is Step.HOVER)

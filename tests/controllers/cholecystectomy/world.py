@@ -46,6 +46,8 @@ class World:
         self.misses = self.slips = self.blunt = 0
         """How often the next grasps, clips and cuts fail."""
         self.events, self.refused, self.t = ([], []), [], 0
+        self.spared = np.full((1, 3), 0.2)
+        """Nodes of an organ `wall` to be spared, m."""
         self.tasks, self.said, self.held = [], [], False
 
     @property
@@ -88,6 +90,7 @@ class World:
                 header=HEADER, body="", nodes_m=(self.nodes + self.shift).astype(np.float32).ravel()
             ),
         }
+        values["wall/nodes"] = SoftBodyState(header=HEADER, body="", nodes_m=np.float32(self.spared).ravel())
         for tube, name in enumerate(self.routine.params.tubes):
             values[f"{name}/line"] = self.line(tube)
         for arm, hand in self.hands.items():
