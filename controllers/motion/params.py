@@ -12,7 +12,13 @@ from controllers.motion.joint_errors import JointErrors
 from hub.participant import Params
 from robots.dvrk import ecm, mtm, psm
 from robots.dvrk.crtk import Mounting, Reference
-from robots.dvrk.mounted import MountedEcm, MountedMtml, MountedMtmr, MountedPsm
+from robots.dvrk.mounted import (
+    MountedEcm,
+    MountedMtml,
+    MountedMtmr,
+    MountedPsm,
+    require_classic_cart,
+)
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm, DrivenArm
 from robots.serial_chain import Joint
@@ -202,3 +208,9 @@ class MotionParams(Params):
             " system"
         ),
     )
+
+    @model_validator(mode="after")
+    def _stands_on_the_cart_of_the_classic(self) -> Self:
+        if self.mounting == "cart":
+            require_classic_cart(self.arms.present_arms)
+        return self

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from controllers.motion.params import Arms
 from controllers.teleoperation.contact_model import ForceParams, PlanesParams
 from hub.participant import Params
-from robots.dvrk import ecm, psm
+from robots.dvrk import ecm, psm, si
 from robots.dvrk.mounted import DEFAULT_INSTRUMENT, PsmTool
 from robots.dvrk.parameters import ArmName, InstrumentName, MountedPositions, UnitQuaternion, home
 from schemas.quantity import Angle, Duration
@@ -34,6 +34,13 @@ def _tip_by_arms(data: dict[str, Any]) -> Path | None:
     arms: Arms | None = data["arms"]
     led = None if arms is None else arms.present_arms.get(data["arm"])
     return led.tip if isinstance(led, PsmTool) else None
+
+
+def _generation_by_arms(data: dict[str, Any]) -> si.Generation:
+    """Return the led arm's generation by `arms`, if stated there."""
+    arms: Arms | None = data["arms"]
+    led = None if arms is None else arms.present_arms.get(data["arm"])
+    return led.generation if isinstance(led, PsmTool) else "classic"
 
 
 class Buttons(Params):
@@ -66,6 +73,10 @@ class TeleoperationParams(PsmTool, _LedArm):
 
     open_to_pages: ClassVar[bool] = True
 
+    generation: si.Generation = Field(
+        default_factory=_generation_by_arms,
+        description="of the led arm; default: as in `arms`, without them the Classic",
+    )
     instrument: InstrumentName = Field(
         default_factory=_instrument_by_arms,
         description=(

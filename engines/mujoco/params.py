@@ -24,7 +24,7 @@ from engines.mujoco.object_params import ObjectParams, TableParams
 from engines.mujoco.tools import instrument_tools
 from hub.participant import Params, Tool, ToolParams
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
-from robots.dvrk.mounted import AnyArm, MountedArms, MountedMtm, MountedPsm
+from robots.dvrk.mounted import AnyArm, MountedArms, MountedMtm, MountedPsm, require_classic_cart
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import SIMULATED, CartArm, DrivenArm, base_pose
 from robots.training.fixtures import FixtureParams
@@ -127,6 +127,8 @@ class SceneParams(Params):
             for name, arm in self.arms.items()
             if arm.model_fields_set & {"position", "orientation"} and not isinstance(arm, MountedMtm)
         ]
+        if self.mounting == "cart":
+            require_classic_cart(self.arms)
         if self.mounting == "cart" and placed:
             raise ValueError(
                 f"{', '.join(placed)}: position and orientation are for 'mounting: free'; on the cart,"

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from robots.dvrk import ecm
+from robots.dvrk import ecm, si
 from robots.limits import TOLERANCE, distinct
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
@@ -47,7 +47,7 @@ class Cannula:
     def of(cls, chain: SerialChain) -> Cannula:
         """Return the rule for a PSM or the ECM."""
         insertion, roll = chain.joints[_INSERTION : _INSERTION + 2]
-        if chain.joints == ecm.JOINTS:
+        if chain.joints in (ecm.JOINTS, si.ECM_JOINTS):
             return cls("the endoscope's insertion", 0.0, _ECM_START, _ECM_SAFE)
         return cls(
             "the end of the instrument's shaft", insertion.d + roll.d, _PSM_SAFE - _PSM_BUFFER, _PSM_SAFE

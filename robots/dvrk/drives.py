@@ -18,13 +18,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from robots.dvrk import ecm, identified_mtm, mtm
+from robots.dvrk import ecm, identified_mtm, mtm, si
 from robots.dvrk import psm as psm_arm
 from robots.dvrk.drive import JAW_COLUMN, Disc, Drive, disc_shares
 from robots.dvrk.instruments import Instrument
+from robots.serial_chain import Joint
 from schemas.plain_sum import plain_sum
 
-__all__ = ["ECM", "MTM", "discs", "friction", "psm"]
+__all__ = ["ECM", "ECM_SI", "MTM", "discs", "friction", "psm"]
 
 _ARM = {
     "yaw": (120.0, 6.0, 0.136392294, 0.063000355, 0.135144709, 0.00726440463),
@@ -32,6 +33,8 @@ _ARM = {
     "insertion": (6000.0, 200.0, 2.69, 0.596, 0.0, 0.0),
 }
 """p, d (SAW), Fv, Fs, K, O (FONT). The inertia of these drives is in the identified masses."""
+_ARM_SI = {"yaw": (600.0, 30.0), "pitch": (600.0, 30.0), "insertion": (6000.0, 200.0)}
+"""p, d (SAW share/pid/sawControllersPID-PSM-Si.json); friction and elasticity of the Classic stand in."""
 
 _DISC_FRICTION = ((0.0013, 0.0077), (0.0104, 0.0198), (0.0047, 0.0152), (0.0061, 0.0081))
 """Fv, Fs of the four discs (FONT, motors 4 to 7)."""
@@ -47,13 +50,29 @@ _ECM_GAINS = {
     "roll": (20.0, 0.5),
 }
 """p, d (SAW)."""
+_ECM_GAINS_SI = {
+    "yaw": (600.0, 30.0),
+    "pitch": (600.0, 30.0),
+    "insertion": (15000.0, 500.0),
+    "roll": (100.0, 3.0),
+}
+"""p, d (SAW share/pid/sawControllersPID-ECM-Si.json)."""
 
 
-def psm(tool: Instrument) -> Mapping[str, Drive]:
+def psm(tool: Instrument, generation: si.Generation = "classic") -> Mapping[str, Drive]:
     """Return the drives of a PSM with `tool` by joint, then of the end effector by motor."""
+    joints, gains = psm_arm.ARM_JOINTS, dict[str, tuple[float, float]]()
+    if generation == "si":
+        joints, gains = si.PSM_JOINTS, _ARM_SI
     drives = {
-        joint.name: Drive(*_ARM[joint.name], 0.0, joint.effort, joint.velocity)
-        for joint in psm_arm.ARM_JOINTS
+        joint.name: Drive(
+            *gains.get(joint.name, _ARM[joint.name][:2]),
+            *_ARM[joint.name][2:],
+            0.0,
+            joint.effort,
+            joint.velocity,
+        )
+        for joint in joints
     }
     turning = discs(tool)
     for joint in tool.joints:
@@ -81,8 +100,8 @@ def _column(joint: str) -> int:
     return next(i for i, kind in enumerate(_COLUMNS) if joint.startswith(kind))
 
 
-def _of_ecm() -> Mapping[str, Drive]:
-    """Return the drives of an ECM by joint.
+def _of_ecm(joints: Sequence[Joint], gains: Mapping[str, tuple[float, float]]) -> Mapping[str, Drive]:
+    """Return the drives of an ECM by joint, with p and d by joint.
 
     No friction is published: the same share of the largest effort as in the PSM's joint of the same name
     stands in.
@@ -92,18 +111,20 @@ def _of_ecm() -> Mapping[str, Drive]:
     psm_friction = {name: row[2:4] for name, row in _ARM.items()} | {"roll": tuple(friction_of_roll.tolist())}
     psm_effort = {joint.name: joint.effort for joint in psm_arm.ARM_JOINTS} | {"roll": 0.33}
     drives: dict[str, Drive] = {}
-    for joint in ecm.JOINTS:
+    for joint, classic in zip(joints, ecm.JOINTS, strict=True):
         viscous, coulomb = (
-            value * joint.effort / psm_effort[joint.name] for value in psm_friction[joint.name]
+            value * classic.effort / psm_effort[joint.name] for value in psm_friction[joint.name]
         )
         drives[joint.name] = Drive(
-            *_ECM_GAINS[joint.name], viscous, coulomb, 0.0, 0.0, 0.0, joint.effort, joint.velocity
+            *gains[joint.name], viscous, coulomb, 0.0, 0.0, 0.0, joint.effort, joint.velocity
         )
     return MappingProxyType(drives)
 
 
-ECM = _of_ecm()
+ECM = _of_ecm(ecm.JOINTS, _ECM_GAINS)
 """The drives of the ECM by joint."""
+ECM_SI = _of_ecm(si.ECM_JOINTS, _ECM_GAINS_SI)
+"""The drives of the Si's ECM by joint; the Classic's friction stands in."""
 
 
 _MTM_GAINS = ((100.0, 10.0), (80.0, 5.0), (80.0, 5.0), (3.0, 0.35), (1.0, 0.028), (0.4, 0.015), (0.15, 0.005))

@@ -69,6 +69,8 @@ def tip(endoscope: Endoscope, frame: TipFrame = "kinematic") -> Vector:
     return pose
 
 
-def chain(endoscope: Endoscope = "straight", frame: TipFrame = "kinematic") -> SerialChain:
+def chain(
+    endoscope: Endoscope = "straight", frame: TipFrame = "kinematic", joints: tuple[Joint, ...] = JOINTS
+) -> SerialChain:
     """Return the kinematics of the arm, from the RCM frame `ECM_base` to the camera frame."""
-    return SerialChain(JOINTS, tip(endoscope, frame))
+    return SerialChain(joints, tip(endoscope, frame))

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import cached_property
 from math import radians
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from pydantic import (
@@ -26,7 +26,7 @@ from pydantic import (
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
 from robots import rotation
-from robots.dvrk import arm_bodies, drives, ecm, mtm, psm
+from robots.dvrk import arm_bodies, drives, ecm, mtm, psm, si
 from robots.dvrk.drive import Disc, Drive
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
 from robots.dvrk.end_effectors.electrode import Electrode
@@ -73,6 +73,7 @@ __all__ = [
     "MountedMtmr",
     "MountedPsm",
     "PsmTool",
+    "require_classic_cart",
 ]
 
 DEFAULT_INSTRUMENT = "palpation-probe"
@@ -207,6 +208,13 @@ class PsmTool(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    generation: si.Generation = Field(
+        default="classic",
+        description=(
+            "of the da Vinci: si has the Si's ranges, efforts and gains, and instruments of the S and Si"
+            " (numbers from 420001), with the Classic's masses and looks"
+        ),
+    )
     instrument: InstrumentName = Field(
         default=DEFAULT_INSTRUMENT, description="what the arm holds: name or number, such as 400006"
     )
@@ -246,6 +254,13 @@ class PsmTool(BaseModel):
     def tool(self) -> Instrument:
         """The instrument's numbers."""
         shaft = instrument(self.instrument)
+        if self.generation == "si":
+            if not si.fits(shaft):
+                raise ValueError(
+                    f"generation: {shaft.name} does not fit a PSM of the Si, which takes instruments of the S"
+                    " and Si, with numbers from 420001, such as LARGE_NEEDLE_DRIVER_420006"
+                )
+            shaft = si.fitted(shaft)
         try:
             return shaft if self.tip is None else with_own_jaw(shaft, JawFile.load(self.tip))
         except MotionError as error:
@@ -254,7 +269,7 @@ class PsmTool(BaseModel):
     @cached_property
     def chain(self) -> SerialChain:
         """The arm's kinematics, from `<arm>_base` to the tip."""
-        return psm.chain(self.tool)
+        return psm.chain(self.tool) if self.generation == "classic" else si.fitted_chain(self.tool)
 
     @field_validator("tip")
     @classmethod
@@ -374,7 +389,8 @@ class MountedPsm(PsmTool, MountedArm):
 
     @property
     def _published(self) -> _Published:
-        return arm_bodies.psm(self.tool), drives.psm(self.tool), drives.discs(self.tool)
+        driven = drives.psm(self.tool, self.generation)
+        return arm_bodies.psm(self.tool), driven, drives.discs(self.tool)
 
     @property
     def _stated_positions(self) -> Mapping[str, Sequence[float]]:
@@ -384,6 +400,10 @@ class MountedPsm(PsmTool, MountedArm):
 class MountedEcm(MountedArm):
     """The endoscope camera manipulator: endoscope and start."""
 
+    generation: si.Generation = Field(
+        default="classic",
+        description="of the da Vinci: si has the Si's ranges, efforts and gains, with the Classic's masses",
+    )
     endoscope: ecm.Endoscope = Field(
         default="straight", description="where it looks: along its shaft, or 30 degrees up or down"
     )
@@ -401,11 +421,12 @@ class MountedEcm(MountedArm):
     @cached_property
     def chain(self) -> SerialChain:
         """The arm's kinematics, from `ECM_base` to the camera frame."""
-        return ecm.chain(self.endoscope, self.tip_frame)
+        joints = ecm.JOINTS if self.generation == "classic" else si.ECM_JOINTS
+        return ecm.chain(self.endoscope, self.tip_frame, joints)
 
     @property
     def _published(self) -> _Published:
-        return arm_bodies.ecm(), drives.ECM, ()
+        return arm_bodies.ecm(), drives.ECM if self.generation == "classic" else drives.ECM_SI, ()
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
@@ -488,6 +509,16 @@ class MountedMtmr(MountedMtm):
 
 AnyArm = MountedPsm | MountedEcm | MountedMtm
 """Any simulated arm."""
+
+
+def require_classic_cart(arms: Mapping[Any, object]) -> None:
+    """Raise ValueError, as validators do, for an arm of the Si on the cart."""
+    other = [name for name, one in arms.items() if getattr(one, "generation", "classic") == "si"]
+    if other:
+        raise ValueError(
+            f"{', '.join(other)}: the cart is that of the Classic; set 'mounting: free' and place an arm of"
+            " the Si by position and orientation"
+        )
 
 
 @with_config(ConfigDict(extra="forbid"))
