@@ -16,7 +16,7 @@ from robots.transform import pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Obstacles", "choose_pose", "jaw_poses", "skewed", "withdraw"]
+__all__ = ["Obstacles", "choose_pose", "hurts", "jaw_poses", "skewed", "withdraw"]
 
 MARGIN = 0.06
 """Least share of each joint's range, from its middle to its end, that stays free."""
@@ -24,6 +24,8 @@ _ROOMY, _CLEAR = 0.3, 4.0e-3
 """Margin, and distance from obstacles (m), beyond which more is no better."""
 _TOUCHING = 1.0e-3
 """Distance from nodes of an organ within which an instrument may touch the faces between, m."""
+_FACE = 2.0e-3
+"""Distance from nodes of an organ within which blades may close on the faces between, m."""
 _WAY = np.array([1.0, 0.5, 0.2, 0.0])
 """Checked parts of the straight way to a goal, from its beginning."""
 _ALONE = 2.0e-3
@@ -103,11 +105,17 @@ def skewed(along: Vector) -> Vector:
 
 
 def choose_pose(
-    hand: SurgeonHand, poses: Vector, away: float, opening: float, obstacles: Obstacles, what: str
+    hand: SurgeonHand,
+    poses: Vector,
+    away: float,
+    opening: float,
+    obstacles: Obstacles,
+    what: str,
+    spared: Obstacles | None = None,
 ) -> Vector:
     """Return the best of `poses`, shape (4, 4), by joint margins and distance from obstacles.
 
-    Raises MotionError if the joints do not allow any.
+    Raises MotionError if the joints do not allow any, or if all would hurt what is spared.
 
     Args:
         hand: the arm.
@@ -116,6 +124,7 @@ def choose_pose(
         opening: of the jaw on that way, rad.
         obstacles: in the neighbourhood.
         what: the goal, for the message.
+        spared: what blades must not touch; None for other jaws.
     """
     ways = np.repeat(poses[:, None], len(_WAY), axis=1)
     ways[:, :, :3, 3] -= away * _WAY[:, None] * poses[:, None, :3, 2]
@@ -126,12 +135,7 @@ def choose_pose(
             f"{hand.arm} does not reach {what}: with the tip at ({x:.0f}, {y:.0f}, {z:.0f}) mm the joints"
             f" have {max(0.0, float(margins.max())):.2f} of their ranges left, {MARGIN} at least is needed"
         )
-    clearances = np.array(
-        [
-            min(clearance(hand, pose, q, opening, obstacles) for pose, q in zip(way, angles, strict=True))
-            for way, angles in zip(ways, joints, strict=True)
-        ]
-    )
+    clearances = _clearances(hand, ways, joints, opening, obstacles)
     gaps = np.array([gap_between(hand, pose, obstacles) for pose in poses])
     turns = np.abs(np.linspace(-1.0, 1.0, len(poses)))
     travel = np.abs(joints[:, 0] - hand.joints).max(axis=1)
@@ -143,14 +147,37 @@ def choose_pose(
         - 0.3 * turns
         - 0.1 * travel
     )
-    return poses[int(np.where(margins < MARGIN, -np.inf, score).argmax())]
+    refused = margins < MARGIN
+    if spared is not None:
+        refused |= _clearances(hand, ways, joints, opening, spared) < 0.0
+        refused |= np.array([hurts(hand, pose, spared) for pose in poses])
+    if refused.all():
+        raise MotionError(f"{hand.arm} does not reach {what} without touching an organ to be spared")
+    return poses[int(np.where(refused, -np.inf, score).argmax())]
+
+
+def _clearances(
+    hand: SurgeonHand, ways: Vector, joints: Vector, opening: float, obstacles: Obstacles
+) -> Vector:
+    """Return the least clearance of each way, shape (n,)."""
+    return np.array(
+        [
+            min(clearance(hand, pose, q, opening, obstacles) for pose, q in zip(way, angles, strict=True))
+            for way, angles in zip(ways, joints, strict=True)
+        ]
+    )
+
+
+def hurts(hand: SurgeonHand, pose: Vector, spared: Obstacles) -> bool:
+    """Whether closing blades at a pose, shape (4, 4), would meet an organ to be spared."""
+    return gap_between(hand, pose, spared) <= _FACE
 
 
 def gap_between(hand: SurgeonHand, pose: Vector, obstacles: Obstacles) -> float:
     """Return the distance of the nearest obstacle from the space between the closing jaws, m."""
     local = (obstacles.points - pose[:3, 3]) @ pose[:3, :3]
     nearest = np.clip(local, [-_HALF_CLIP, -_HALF_GAP, JAW_ROOT], [_HALF_CLIP, _HALF_GAP, hand.jaw.length])
-    return float((np.linalg.norm(local - nearest, axis=1) - obstacles.radii).min(initial=_ALONE))
+    return float((np.linalg.norm(local - nearest, axis=1) - obstacles.radii).min(initial=np.inf))
 
 
 def clearance(hand: SurgeonHand, pose: Vector, joints: Vector, opening: float, obstacles: Obstacles) -> float:

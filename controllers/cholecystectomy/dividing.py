@@ -7,7 +7,7 @@ from math import radians
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import choose_pose, gap_between, jaw_poses, skewed, withdraw
+from controllers.cholecystectomy.approach import choose_pose, hurts, jaw_poses, skewed, withdraw
 from controllers.cholecystectomy.places import choose_places
 from controllers.cholecystectomy.procedure import Procedure, opening
 from controllers.cholecystectomy.sub_task import CUT, Failure, Step
@@ -92,7 +92,7 @@ class Dividing(Procedure):
     def _would_hurt(self) -> bool:
         """Whether the blades would close on an organ to be spared."""
         pose = pose_to_matrix(self.hand.measured)
-        return gap_between(self.hand, pose, self.seen.spared.near(pose[:3, 3])) <= 0.0
+        return hurts(self.hand, pose, self.seen.spared.near(pose[:3, 3]))
 
     def check_tube(self) -> None:
         """Wait for the sign of success."""
@@ -129,9 +129,16 @@ class Dividing(Procedure):
         point, along = tube.point(state.along), tube.direction(state.along)
         bite = _BITES[self.cuts][state.attempts % len(_BITES[self.cuts])]
         obstacles = seen.obstacles(hand, self.hands, state.tube).near(point)
+        spared = seen.spared.near(point) if self.cuts else None
         what = f"{self.params.tubes[state.tube]} {1e3 * state.along:.0f} mm from the gallbladder"
         chosen = partial(
-            choose_pose, hand, away=BEFORE_TUBE, opening=opening(hand), obstacles=obstacles, what=what
+            choose_pose,
+            hand,
+            away=BEFORE_TUBE,
+            opening=opening(hand),
+            obstacles=obstacles,
+            what=what,
+            spared=spared,
         )
         try:
             pose = chosen(jaw_poses(hand, point, along, bite))

@@ -26,7 +26,7 @@ def path_margins(hand: SurgeonHand, paths: Vector) -> tuple[Vector, Vector]:
     """
     start, chain = pose_to_matrix(hand.line()), hand.chain
     lines = np.array([line_poses(start, path[0], _SHARES) for path in paths])
-    q = hand.joints_at(np.concatenate([lines, paths], axis=1))
+    q = hand.joints_along(np.concatenate([lines, paths], axis=1))
     free = 2.0 * np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)
     least: Vector = free.min(axis=(-2, -1))
     return least, q[:, len(_SHARES) :]

@@ -18,9 +18,6 @@ from schemas.vectors import Vector
 
 __all__ = ["Sight"]
 
-_FACE = 2.0e-3
-"""Distance of a face from its nodes, m."""
-
 
 class Sight:
     """Lines of the tubes, nodes of the organs, and the state of the grasp."""
@@ -61,9 +58,9 @@ class Sight:
 
     @property
     def spared(self) -> Obstacles:
-        """Organs on which scissors never close."""
-        organs = [self._nodes(organ) for organ in self._params.avoid if organ != self._params.gallbladder]
-        return Obstacles.join([Obstacles(nodes, np.full(len(nodes), _FACE)) for nodes in organs])
+        """Organs that scissors never touch."""
+        organs = [organ for organ in self._params.avoid if organ != self._params.gallbladder]
+        return Obstacles.join([self._organ(organ) for organ in organs])
 
     def obstacles(self, hand: SurgeonHand, hands: Sequence[SurgeonHand], tube: int | None) -> Obstacles:
         """Return what a hand keeps away from at work on a tube, or, with None, at the gallbladder."""

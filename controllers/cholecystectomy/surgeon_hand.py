@@ -14,6 +14,8 @@ from schemas.vectors import Vector
 
 __all__ = ["SurgeonHand", "line_poses"]
 
+_INSERTION, _ROLL = 2, 3
+"""Numbers of two joints of a PSM."""
 _SHARES = np.linspace(0.0, 1.0, 13)
 _PEAK_SPEED = 1.875
 """Largest speed of a least-jerk motion over a length of 1 in a time of 1."""
@@ -29,20 +31,30 @@ class SurgeonHand(RobotHand):
         self.joints: Vector = np.zeros(len(chain.joints))
         """Measured joint positions, rad and m, shape (6,)."""
 
-    def joints_at(self, poses: Vector) -> Vector:
-        """Return the joints at poses of the tip, shape (..., 4, 4), on the present branch, shape (..., 6)."""
+    def joints_along(self, paths: Vector) -> Vector:
+        """Return the joints along paths of the tip from the present pose, shape (..., n, 6).
+
+        They stay on the present branch, and the roll goes on beyond half a turn, in range or not.
+
+        paths: shape (..., n, 4, 4).
+        """
         chain, into_base = self.chain, inverse_transform(self.base)
-        now = branches(chain, into_base @ pose_to_matrix(self.line()))
-        branch = int((np.abs(now - self.joints) / (chain.upper - chain.lower)).max(axis=-1).argmin())
-        return branches(chain, into_base @ poses)[branch]
+        off = branches(chain, into_base @ pose_to_matrix(self.line())) - self.joints
+        off[:, _ROLL] = np.remainder(off[:, _ROLL] + np.pi, 2.0 * np.pi) - np.pi
+        branch = int((np.abs(off) / (chain.upper - chain.lower)).max(axis=-1).argmin())
+        q = branches(chain, into_base @ paths)[branch]
+        present = np.full((*q.shape[:-2], 1), self.joints[_ROLL])
+        q[..., _ROLL] = np.unwrap(np.concatenate([present, q[..., _ROLL]], axis=-1))[..., 1:]
+        return q
 
     def go(self, goal: Vector, share: float = 1.0) -> None:
         """Begin a line to `goal`, shape (7,), at a fraction of the speed, slower where joints turn far."""
         poses = line_poses(pose_to_matrix(self.line()), pose_to_matrix(goal), _SHARES)
-        q = self.joints_at(poses)
-        steps = np.abs(np.diff(np.delete(q, 2, axis=1), axis=0)).max(initial=0.0) * (len(_SHARES) - 1)
+        q = self.joints_along(poses)
+        turns = np.abs(np.diff(np.delete(q, _INSERTION, axis=1), axis=0)).max(initial=0.0)
         super().go(goal, share)
-        self.state.duration = max(self.state.duration, _PEAK_SPEED * float(steps) / _TURN)
+        speed = _PEAK_SPEED * float(turns) * (len(_SHARES) - 1)
+        self.state.duration = max(self.state.duration, speed / _TURN)
 
 
 def line_poses(start: Vector, end: Vector, shares: Vector) -> Vector:

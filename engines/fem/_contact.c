@@ -13,6 +13,7 @@ force. A sphere has one contact for each nearest point; faces that share the poi
 #define RECOVERY 0.2f   /* share of a penetration that is undone in a sub-step */
 #define SAME_POINT 1e-7f /* m */
 #define DEEPEST 0.5f     /* of a centre behind a face, in radii */
+#define LEVER 0.2f       /* share of the free nodes in a contact beside a held node below which the push no longer grows */
 
 typedef struct {
     const int32_t *node; /* three */
@@ -58,7 +59,8 @@ int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_step
 /* Fill in the contact of a face with a sphere at `centre`; return whether there is one. */
 static int touch(const Body *body, const int32_t *node, const double *centre, float radius, Contact *contact)
 {
-    float x[3][3], normal[3], away[3], inverse = 0.0f;
+    float x[3][3], normal[3], away[3], inverse = 0.0f, lightest = 0.0f;
+    int has_held = 0;
     for (int a = 0; a < 3; a++)
         for (int i = 0; i < 3; i++)
             x[a][i] = (float)((double)body->rest[4 * node[a] + i] - centre[i]) + body->displacement[4 * node[a] + i];
@@ -75,10 +77,15 @@ static int touch(const Body *body, const int32_t *node, const double *centre, fl
     float side = dotf(away, normal) > 0.0f ? -1.0f : 1.0f; /* -1: the centre is behind the face */
     if (side < 0.0f && distance > DEEPEST * radius)
         return 0; /* a face of the far side */
-    for (int a = 0; a < 3; a++)
-        inverse += contact->share[a] * contact->share[a] * body->inverse_mass[node[a]];
+    for (int a = 0; a < 3; a++) {
+        float free = body->inverse_mass[node[a]];
+        inverse += contact->share[a] * contact->share[a] * free;
+        lightest = free > lightest ? free : lightest, has_held |= free == 0.0f;
+    }
     if (inverse <= 0.0f)
         return 0;
+    if (has_held && inverse < LEVER * LEVER * lightest)
+        inverse = LEVER * LEVER * lightest; /* beside a held node no push on the others stops a sphere */
     contact->node = node;
     for (int i = 0; i < 3; i++)
         contact->normal[i] = side * away[i] / distance; /* out of the sphere */
