@@ -289,7 +289,11 @@ def test_the_library_of_a_device_is_not_loaded(stranger: Stranger, place: Path, 
     """Also not where the device shares a host with an engine, whose process is needed."""
     compiled(place)
     recording = stranger(
-        name="hand", kind="stranger_hand", library="library.so", plan={"role": "device", "host": host}, host=host
+        name="hand",
+        kind="stranger_hand",
+        library="library.so",
+        plan={"role": "device", "host": host},
+        host=host,
     )
     assert verify(recording).same
     assert "ran" not in left(place)
@@ -300,8 +304,12 @@ def test_the_library_of_a_device_is_not_loaded(stranger: Stranger, place: Path, 
 def test_a_device_that_the_plan_has_as_an_engine(stranger: Stranger, place: Path, host: str) -> None:
     """A host process would open it."""
     compiled(place)
-    recording = stranger(name="hand", kind="stranger_hand", library="library.so", plan={"host": host}, host=host)
-    with pytest.raises(RecordingError, match="has participant 'hand' as engine, but kind 'stranger_hand' is one of a"):
+    recording = stranger(
+        name="hand", kind="stranger_hand", library="library.so", plan={"host": host}, host=host
+    )
+    with pytest.raises(
+        RecordingError, match="has participant 'hand' as engine, but kind 'stranger_hand' is one of a"
+    ):
         verify(recording)
     assert left(place) == set()
 
