@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from functools import partial
 from math import radians
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import Obstacles, choose_pose, hurts, jaw_poses, skewed, withdraw
+from controllers.cholecystectomy.approach import choose_pose, hurts, jaw_poses, skewed, withdraw
 from controllers.cholecystectomy.places import choose_places
 from controllers.cholecystectomy.procedure import Procedure, opening
 from controllers.cholecystectomy.sub_task import CUT, Failure, Step
 from robots import rotation
 from robots.transform import matrix_to_pose, pose_to_matrix
 from schemas.errors import MotionError
-from schemas.vectors import Vector
 
 __all__ = ["Dividing"]
 
@@ -131,6 +129,7 @@ class Dividing(Procedure):
         point, along = tube.point(state.along), tube.direction(state.along)
         bite = _BITES[self.cuts][state.attempts % len(_BITES[self.cuts])]
         obstacles = seen.obstacles(hand, self.hands, state.tube).near(point)
+        spared = seen.spared.near(point) if self.cuts else None
         what = f"{self.params.tubes[state.tube]} {1e3 * state.along:.0f} mm from the gallbladder"
         chosen = partial(
             choose_pose,
@@ -139,26 +138,10 @@ class Dividing(Procedure):
             opening=opening(hand),
             obstacles=obstacles,
             what=what,
+            spared=spared,
         )
-        square = jaw_poses(hand, point, along, bite)
-        askew = np.concatenate([jaw_poses(hand, point, each, bite) for each in skewed(along)])
-        state.goal[:] = matrix_to_pose(self._first_way(chosen, (square, askew), point))
-
-    def _first_way(self, choose: Callable[..., Vector], choices: Sequence[Vector], point: Vector) -> Vector:
-        """Return the pose of the first of several choices that the joints and what is spared allow.
-
-        Scissors keep clear of the gallbladder, too, if they can. Raises the last MotionError.
-        """
-        kept_clear: list[Obstacles | None] = [None]
-        if self.cuts:
-            spared = self.seen.spared.near(point)
-            gallbladder = self.seen.gallbladder
-            whole = Obstacles.join([spared, Obstacles(gallbladder, np.zeros(len(gallbladder))).near(point)])
-            kept_clear = [whole, spared]
-        ways = [(poses, obstacles) for obstacles in kept_clear for poses in choices]
-        for poses, obstacles in ways[:-1]:
-            try:
-                return choose(poses, spared=obstacles)
-            except MotionError:
-                continue
-        return choose(ways[-1][0], spared=ways[-1][1])
+        try:
+            pose = chosen(jaw_poses(hand, point, along, bite))
+        except MotionError:
+            pose = chosen(np.concatenate([jaw_poses(hand, point, each, bite) for each in skewed(along)]))
+        state.goal[:] = matrix_to_pose(pose)

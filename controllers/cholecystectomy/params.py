@@ -51,11 +51,6 @@ class ClipAndCutParams(Params):
     )
     end: bool = Field(default=True, description="whether the session ends with the routine")
 
-    @property
-    def spared(self) -> tuple[Name, ...]:
-        """Organs to be avoided, without the gallbladder, which comes out."""
-        return tuple(organ for organ in self.avoid if organ != self.gallbladder)
-
     @model_validator(mode="after")
     def _is_a_team(self) -> Self:
         roles = (self.applier, self.grasper, self.scissors)

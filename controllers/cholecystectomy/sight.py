@@ -59,7 +59,8 @@ class Sight:
     @property
     def spared(self) -> Obstacles:
         """Organs that scissors never touch."""
-        return Obstacles.join([self._organ(organ) for organ in self._params.spared])
+        organs = [organ for organ in self._params.avoid if organ != self._params.gallbladder]
+        return Obstacles.join([self._organ(organ) for organ in organs])
 
     def obstacles(self, hand: SurgeonHand, hands: Sequence[SurgeonHand], tube: int | None) -> Obstacles:
         """Return what a hand keeps away from at work on a tube, or, with None, at the gallbladder."""
