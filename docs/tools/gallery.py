@@ -63,7 +63,7 @@ _FILM, _EYE = (480, 384), (400, 320)
 _NEAR, _TABLE = (0.075, -0.1, 0.085), (0.0, -0.008, 0.048)
 """Where a camera stands, and looks at, beside the needle of `pick` and `hand-over`, m."""
 SHOTS = (
-    Shot("clip-and-cut", "clip-and-cut", 58.0, 1.0, 55.5, 5.0, camera="both", size=_EYE),
+    Shot("clip-and-cut", "clip-and-cut", 58.0, 1.0, 53.5, 5.0, camera="both", size=_EYE),
     Shot("cart", "cart", 2.0, 1.0, camera="overview", looks="plain"),
     Shot("teleop", "teleop", 8.0, 4.0),
     Shot("palpation", "palpation", 8.0, 5.0, camera="overview"),
