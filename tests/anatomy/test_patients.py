@@ -32,6 +32,8 @@ from engines.tissue.organs.anchors import AnchorParams
 from tests.anatomy.gaps import gaps_of
 
 SEEDS = st.integers(0, 2**53)
+MANY = pytest.mark.timeout(900)
+"""Making the organs of a patient takes a second."""
 JOINTS = {"neck_duct", "duct_confluence", "neck_artery", "artery_origin"}
 COURSES = "cranial", "front", "behind"
 
@@ -91,6 +93,7 @@ def test_lines_have_the_lengths_of_the_patient(seed):
     assert length_of(layout.gallbladder) == pytest.approx(patient.gallbladder_length, rel=0.1)
 
 
+@MANY
 @given(SEEDS)
 @example(0)
 @example(284)  # a wall of 5.5 mm and a narrow infundibulum
@@ -113,6 +116,7 @@ def test_every_patient_has_sound_hollow_organs_that_hang_together(seed):
         check_ends(name, given.organs)
 
 
+@MANY
 @given(SEEDS, st.sampled_from(COURSES), st.booleans())
 @example(88, "cranial", True)  # a wide gallbladder, and the longest artery
 @example(4, "behind", True)
@@ -134,6 +138,7 @@ def test_a_thick_wall_is_thick_and_stiff():
     assert ill.gallbladder_modulus > 1.3 * well.gallbladder_modulus
 
 
+@MANY
 @given(SEEDS)
 @example(0)
 @example(28)  # an artery in front of a short duct
