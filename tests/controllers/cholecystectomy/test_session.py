@@ -14,7 +14,7 @@ def told(recording, tube):
 @pytest.mark.search
 def test_the_duct_is_clipped_three_times_and_parted(tmp_path):
     run = tmp_path / "run"
-    summary = trocar.run(SCENE, set={"duration": "31 s"}, record=run, one_host=True)
+    summary = trocar.run(SCENE, set={"duration": "28 s"}, record=run, one_host=True)
     assert summary.measures["failure"] == 0.0
     assert summary.measures["sub_task"] >= 9.0
     assert summary.measures["bile_ml"] == 0.0
