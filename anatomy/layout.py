@@ -72,11 +72,8 @@ class Layout:
     @cached_property
     def confluence(self) -> Line:
         """Where the cystic duct ends, inside the wall of the common bile duct, shape (3,)."""
-        share = np.interp(_CONFLUENCE_Y, _COMMON[:, 1], np.arange(len(_COMMON), dtype=np.float64))
-        low = int(share)
-        middle = _COMMON[low] + (share - low) * (_COMMON[low + 1] - _COMMON[low])
         radius = 0.5 * self.patient.common_duct_diameter
-        return middle + _unit(_DUCT_WAY) * (radius - _EMBEDDED)
+        return self._common_at(_CONFLUENCE_Y) + _unit(_DUCT_WAY) * (radius - _EMBEDDED)
 
     @cached_property
     def neck(self) -> Line:

@@ -22,6 +22,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from controllers.least_jerk import least_jerk
 from controllers.motion.frames import base_in_world
 from controllers.motion.joint_errors import JointErrors
 from controllers.motion.params import Arms, PsmParams, SetupJoints
@@ -200,7 +201,7 @@ class _Hand:
         """Return the share of the way: smooth from rest to rest, or even between the goals of a policy."""
         if self.params.control == "tip":
             return share
-        return share**3 * (10.0 + share * (6.0 * share - 15.0))
+        return least_jerk(share)
 
     def series(self, shares: Sequence[float]) -> tuple[Vector, Vector]:
         """Return joints, shape (n, joints), and jaw, shape (n, 1), at shares of the step's time; end there.

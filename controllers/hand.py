@@ -20,6 +20,7 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import AfterValidator, Field
 
+from controllers.least_jerk import least_jerk
 from controllers.ports import NO_POSE
 from hub.participant import (
     Controller,
@@ -243,7 +244,7 @@ class Hand(Controller):
         i = min(max(int(np.searchsorted(times, since, side="right")) - 1, 0), len(times) - 2)
         if len(times) == 1 or since >= times[-1]:
             return rows[-1]
-        share = _ease(max(since - times[i], 0.0) / (times[i + 1] - times[i]))
+        share = least_jerk(max(since - times[i], 0.0) / (times[i + 1] - times[i]))
         return rows[i] + share * (rows[i + 1] - rows[i])
 
     def _opening(self, inputs: Inputs, *, lost: bool) -> float:
@@ -260,8 +261,3 @@ class Hand(Controller):
         elif now.holds:
             return float(self._on_path()[6])
         return 0.5 * (GRIPPER_OPEN + _SQUEEZE * cos(2.0 * pi * _SQUEEZES * now.time))
-
-
-def _ease(share: float) -> float:
-    """Return a way from 0 to 1 whose velocity begins and ends at 0."""
-    return share * share * share * (10.0 + share * (6.0 * share - 15.0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from controllers.expert.hand import RobotHand
+from controllers.least_jerk import PEAK_SPEED
 from robots import rotation
 from robots.dvrk.instruments import Jaw
 from robots.dvrk.inverse import branches
@@ -17,8 +18,6 @@ __all__ = ["SurgeonHand", "line_poses"]
 _INSERTION, _ROLL = 2, 3
 """Numbers of two joints of a PSM."""
 _SHARES = np.linspace(0.0, 1.0, 13)
-_PEAK_SPEED = 1.875
-"""Largest speed of a least-jerk motion over a length of 1 in a time of 1."""
 _TURN = 2.0
 """Largest speed of a revolute joint, rad/s; the servo lags behind faster ones."""
 
@@ -53,7 +52,7 @@ class SurgeonHand(RobotHand):
         q = self.joints_along(poses)
         turns = np.abs(np.diff(np.delete(q, _INSERTION, axis=1), axis=0)).max(initial=0.0)
         super().go(goal, share)
-        speed = _PEAK_SPEED * float(turns) * (len(_SHARES) - 1)
+        speed = PEAK_SPEED * float(turns) * (len(_SHARES) - 1)
         self.state.duration = max(self.state.duration, speed / _TURN)
 
 

@@ -12,6 +12,7 @@ from math import sqrt
 
 import numpy as np
 
+from controllers.least_jerk import PEAK_ACCELERATION, PEAK_SPEED, least_jerk
 from hub.participant import Record, array, choice, flag, integer, number
 from robots import rotation
 from robots.dvrk.crtk import base_frame
@@ -27,8 +28,6 @@ _ACCELERATION, _TURN = 1.0, 12.0
 """Largest acceleration on a line, m/s^2 and rad/s^2."""
 _SPEED, _SPIN = 0.12, 2.5
 """Largest speed, m/s and rad/s; the joints may do 0.2 m/s and 1.6 rad/s (robots.dvrk.psm)."""
-_PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.774
-"""Largest speed and acceleration of a least-jerk motion over a length of 1 in a time of 1."""
 _LEAST = 0.05
 """Shortest duration of a line, s."""
 _SETTLING, _MOST = 0.06, 4.0e-3
@@ -171,10 +170,10 @@ class RobotHand:
         angle = float(np.linalg.norm(rotation.log(self._turn())))
         state.duration = max(
             _LEAST,
-            _PEAK_SPEED * way / (share * _SPEED),
-            _PEAK_SPEED * angle / _SPIN,
-            sqrt(_PEAK_ACCELERATION * way / _ACCELERATION),
-            sqrt(_PEAK_ACCELERATION * angle / _TURN),
+            PEAK_SPEED * way / (share * _SPEED),
+            PEAK_SPEED * angle / _SPIN,
+            sqrt(PEAK_ACCELERATION * way / _ACCELERATION),
+            sqrt(PEAK_ACCELERATION * angle / _TURN),
         )
         state.elapsed = state.settled = 0.0
 
@@ -187,8 +186,7 @@ class RobotHand:
         state = self.state
         if self.has_arrived:
             return state.goal.copy()
-        s = state.elapsed / state.duration
-        share = s**3 * (10.0 + s * (6.0 * s - 15.0))
+        share = least_jerk(state.elapsed / state.duration)
         position = state.start[:3] + share * (state.goal[:3] - state.start[:3])
         turn = rotation.exp(share * rotation.log(self._turn()))
         return np.concatenate([position, rotation.product(turn, state.start[3:])])

@@ -18,7 +18,7 @@ from xml.parsers import expat
 
 from schemas.errors import ScenarioError
 
-__all__ = ["find_archive_problem", "opened_archive", "unpack"]
+__all__ = ["BROKEN_ENTRY", "find_archive_problem", "opened_archive", "unpack"]
 
 LARGEST_FILE = 1 << 30
 """Most bytes of an unpacked file."""
@@ -28,6 +28,8 @@ LARGEST_XML = 128 << 20
 """Bytes of modelDescription.xml: 500 000 variables at some 250 bytes each."""
 MOST_FILES = 100_000
 
+BROKEN_ENTRY = (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError)
+"""Errors of `zipfile` for entries that are damaged, encrypted or packed in an unknown way."""
 _READ_XML = ("modelDescription.xml", "sources/buildDescription.xml")
 """Files parsed by FMPy."""
 _ENCRYPTED = 1
@@ -70,7 +72,7 @@ def unpack(path: Path, directory: Path) -> None:
     with opened_archive(path) as (_, archive):
         try:
             archive.extractall(directory)
-        except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError) as error:
+        except BROKEN_ENTRY as error:
             raise ScenarioError(f"the FMU '{path}' cannot be unpacked: {error}") from error
 
 

@@ -13,7 +13,7 @@ from tempfile import TemporaryFile
 from typing import IO
 from urllib.parse import unquote, urlsplit
 
-from engines.fmu.archive import find_archive_problem
+from engines.fmu.archive import BROKEN_ENTRY, find_archive_problem
 from engines.fmu.ssp.xml_file import Node, parse_xml
 from schemas.errors import ScenarioError, did_you_mean
 
@@ -24,8 +24,6 @@ DESCRIPTION = "SystemStructure.ssd"
 _LARGEST_XML = 32 << 20
 _MOST_INNER, _LARGEST_INNER = 20, 100 << 20
 """Number of archives inside archives, and bytes of each."""
-_BROKEN = (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError)
-"""Errors of `zipfile` for broken entries."""
 
 
 class Package:
@@ -38,7 +36,7 @@ class Package:
         opened.append(self)
         try:
             self._archive = stack.enter_context(zipfile.ZipFile(file))
-        except (*_BROKEN, ValueError) as error:
+        except (*BROKEN_ENTRY, ValueError) as error:
             raise ScenarioError(f"'{label}' is no system of SSP, which is a ZIP archive: {error}") from error
         if problem := find_archive_problem(self._archive.infolist()):
             raise ScenarioError(f"the system '{label}' is refused: {problem}")
@@ -62,7 +60,7 @@ class Package:
             try:
                 with self._archive.open(name) as stream:
                     data = stream.read(_LARGEST_XML + 1)
-            except _BROKEN as error:
+            except BROKEN_ENTRY as error:
                 raise ScenarioError(f"'{name}' in '{self.label}' cannot be read: {error}") from error
             self._roots[name] = parse_xml(data, self._prefix + name)
         return self._roots[name]
@@ -94,7 +92,7 @@ class Package:
         try:
             with self._archive.open(name) as stream:
                 shutil.copyfileobj(stream, target)
-        except _BROKEN as error:
+        except BROKEN_ENTRY as error:
             raise ScenarioError(f"'{name}' in '{self.label}' cannot be unpacked: {error}") from error
 
     def open_inner(self, name: str) -> Package:
