@@ -5,12 +5,16 @@ numpy computes as in the hosts; markers follow from fixtures.
 from __future__ import annotations
 
 import os
+import sys
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from hub.hosting.numerics import pin_numerics
 
+# Where no bytecode is written, as in many containers, each of hundreds of processes compiles the project.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 pin_numerics(os.environ)  # before any test imports numpy: a process with other kernels has other hashes
 for _name, _examples in (("local", 20), ("ci", 100)):
     settings.register_profile(

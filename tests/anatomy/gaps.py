@@ -17,10 +17,10 @@ JOINTS = {
 """The end at which a tube meets an organ."""
 
 
-def gaps_of(organs, joint):
+def gaps_of(tubes, joint):
     """Least distance of the walls of each pair of tubes, m, without a length (m) at their joints."""
-    tubes = {name: _swept(organs[name].tube) for name in organs if organs[name].tube is not None}
-    return {pair: _gap(tubes, *pair, joint) for pair in combinations(sorted(tubes), 2)}
+    swept = {name: _swept(tube) for name, tube in tubes.items()}
+    return {pair: _gap(swept, *pair, joint) for pair in combinations(sorted(swept), 2)}
 
 
 def _swept(tube):

@@ -20,10 +20,12 @@ from schemas.vectors import Vector
 
 __all__ = ["TubeParams", "Wall", "tube_shape"]
 
-_LAYOUTS = [
-    (along, around, layers) for layers in (1, 2) for around in range(6, 41, 2) for along in range(4, 201, 2)
-]
-"""Numbers of cells; an even number around, so that the diagonals meet."""
+_LAYOUTS = np.array(
+    [(along, around, layers) for layers in (1, 2) for around in range(6, 41, 2) for along in range(4, 201, 2)]
+)
+"""Numbers of cells along, around and across the wall, shape (n, 3); an even number around, so that the
+diagonals meet.
+"""
 _NANOMETRE = 1e-9
 _END = 3e-4
 """Largest distance of the nodes of an end from its plane, m."""
@@ -89,7 +91,8 @@ class TubeParams(BaseModel):
 
     def cells(self, nodes: int) -> tuple[int, int, int]:
         """Return the numbers of cells along, around and across the wall for about `nodes` nodes."""
-        return min(_LAYOUTS, key=lambda cells: self._unfitness(cells, nodes))
+        along, around, layers = _LAYOUTS[self._unfitness(nodes).argmin()].tolist()
+        return along, around, layers
 
     def rings(self, nodes: int) -> Indices:
         """Return the nodes of the inner wall of the mesh, shape (along + 1, around)."""
@@ -107,13 +110,13 @@ class TubeParams(BaseModel):
         ring = np.arange(len(mesh.nodes)) // (around * (layers + 1))
         return wall_along(mesh, rings, at[ring], 2.0 * radii[: len(rings)])
 
-    def _unfitness(self, cells: tuple[int, int, int], nodes: int) -> float:
-        """Return the relative error of the number of nodes, times ten, plus the elongation of the cells."""
-        along, around, layers = cells
-        miss = abs((along + 1) * around * (layers + 1) / nodes - 1.0)
+    def _unfitness(self, nodes: int) -> Vector:
+        """Return ten relative errors of the number of nodes plus the elongation of the cells, by layout."""
+        along, around, layers = _LAYOUTS.T
+        miss = np.abs((along + 1) * around * (layers + 1) / nodes - 1.0)
         length, diameter, wall = self.size
-        edges = np.pi * (diameter - wall) / around, length / along, wall / layers
-        return 10.0 * miss + max(edges) / min(edges)
+        edges = np.stack([np.pi * (diameter - wall) / around, length / along, wall / layers])
+        return 10.0 * miss + edges.max(axis=0) / edges.min(axis=0)
 
     @cached_property
     def size(self) -> tuple[float, float, float]:
