@@ -52,6 +52,12 @@ _EXTENSIONS = (
     ),
     Extension("engines.fem._heat", ["engines/fem/_heat.c"], extra_compile_args=_FLAGS),
     Extension("engines.fem._film", ["engines/fem/_film.c"], extra_compile_args=_FLAGS),
+    Extension(
+        "engines.fmu._calls",
+        ["engines/fmu/_calls.c"],
+        include_dirs=[np.get_include()],
+        extra_compile_args=_FLAGS,
+    ),
     Extension("schemas._cdr", ["schemas/_cdr.c"], include_dirs=[np.get_include()], extra_compile_args=_FLAGS),
 )
 

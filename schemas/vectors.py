@@ -61,7 +61,7 @@ def has_vector(type_name: str) -> bool:
     return type_name in _LAYOUTS
 
 
-def join_parts(parts: Iterable[bytes | Vector]) -> bytes:
+def join_parts(parts: Iterable[bytes | memoryview | Vector]) -> bytes:
     """Return the bytes of `parts`, one after the other."""
     held = tuple(parts)
     try:

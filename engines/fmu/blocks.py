@@ -90,7 +90,8 @@ class Block:
         self._names = {variable.port: variable.name for variable in variables}
         self.function = function = verb + self.type.access
         """Name of the FMI function without prefix."""
-        self.call = access(function, [variable.reference for variable in variables], self.raw)
+        self.references = [variable.reference for variable in variables]
+        self.call = access(function, self.references, self.raw)
         """Set or get all variables."""
         self._single = {
             v.name: access(function, [v.reference], self.raw[self.parts[v.port]]) for v in variables
@@ -139,23 +140,29 @@ class Block:
         """Take all values as changed: the FMU has another state."""
         self._taken = b""
 
-    def publish(self) -> None:
+    def publish(self) -> bool:
         """Convert the outputs written by the FMU from their C type to doubles.
 
-        Raises SessionError for an output beyond the numbers of ports.
+        Returns False for an output beyond the numbers of ports.
         """
         if self.raw is not self.values:
             np.copyto(self.values, self.raw)
         if self.always_usable:
-            return
+            return True
         if self.type.dtype.kind == "f" and self.values.dot(self._zeros) == 0.0:
-            return  # a sum of zeros, unless one is infinite or NaN: a third of the cost of the rest
-        usable = (
-            np.isfinite(self.values) if self.type.dtype.kind == "f" else np.abs(self.values) <= LARGEST_EXACT
+            return True  # a sum of zeros, unless one is infinite or NaN: a third of the cost of the rest
+        return 0 not in self._usable().tobytes()  # a third of the cost of all()
+
+    def unusable(self) -> SessionError:
+        """Return the error for an output beyond the numbers of ports."""
+        usable = self._usable()
+        port, value = next(
+            (port, self.values[part]) for port, part in self.parts.items() if not usable[part].all()
         )
-        if 0 in usable.tobytes():  # a third of the cost of usable.all()
-            port, value = next(
-                (port, self.values[part]) for port, part in self.parts.items() if not usable[part].all()
-            )
-            limit = "finite numbers" if self.type.dtype.kind == "f" else "numbers of at most 2^53"
-            raise SessionError(f"output '{self._names[port]}' is {value}, expected {limit}")
+        limit = "finite numbers" if self.type.dtype.kind == "f" else "numbers of at most 2^53"
+        return SessionError(f"output '{self._names[port]}' is {value}, expected {limit}")
+
+    def _usable(self) -> NDArray[np.bool_]:
+        if self.type.dtype.kind == "f":
+            return np.isfinite(self.values)
+        return np.abs(self.values) <= LARGEST_EXACT

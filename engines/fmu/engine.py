@@ -27,6 +27,7 @@ from engines.fmu.fmi3 import Fmi3Instance
 from engines.fmu.instance import Instance
 from engines.fmu.model_exchange import Fmi2ModelExchange, Fmi3ModelExchange, default_tolerance
 from engines.fmu.repeated_reads import warn_of_changes
+from engines.fmu.transfers import Stop
 from engines.fmu.tunable import TunableParameters
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from hub.participant.state import split_state
@@ -46,8 +47,6 @@ _KINDS = {
     (3, False): Fmi3ModelExchange,
 }
 """Class of an instance by FMI's major version, and whether it is for co-simulation."""
-
-_ALL_READ = frozenset[str]()
 
 
 class FmuParams(Params):
@@ -211,8 +210,17 @@ class FmuEngine(Stepped):
                 side, self._sides[bond.side.name] = coupling.couple(bond, plan)
                 self._bonds.append(side)
                 self._outputs |= side.initial()
-        self._tunable = TunableParameters(instance, description.tunable, description.ports)
-        outputs = self._read(0)
+        self._tunable = None
+        if description.tunable:
+            self._tunable = TunableParameters(instance, description.tunable, description.ports)
+        self._has_clocks = bool(description.clocks)
+        is_whole = step in (None, setup.period_ns)
+        self._is_plain = is_whole and not (
+            self._bonds or description.tunable or description.clocks or self._converted[1]
+        )
+        """Whether a step is one call of the FMU's, with the inputs as they are."""
+        self._has_more = bool(self._bonds or instance.memory.size)
+        outputs = self._read(0, instance, instance.get_outputs())
         warn_of_changes(instance, self.name)
         return outputs
 
@@ -236,29 +244,37 @@ class FmuEngine(Stepped):
         `simulate_fmu` records before and after an event: the second sample equals ours (docs/decisions/0036).
         After the FMU's end of the simulation the last outputs are held.
         """
-        instance = self._running()
+        instance = self._instance or self._running()
+        if self._is_plain:
+            return self._read(t + h, instance, instance.take_step(t, h, inputs))
         if conversions := self._converted[1]:
             inputs = ConvertedInputs(inputs, conversions)
-        sub = self.params.step or h
         for bond in self._bonds:
             bond.begin(inputs, h / 1e9)
-        if not instance.ended:
+        if self._tunable is not None and not instance.ended:
             instance.now_ns = t
             self._tunable.begin(inputs)
+        sub = self.params.step or h
         for begin in range(0, h, sub):
-            instance.now_ns = t + begin
-            if not instance.ended:
-                instance.set_inputs(inputs, begin / 1e9, sub / 1e9)
-                for bond in self._bonds:
-                    bond.write(begin / 1e9, sub / 1e9)
-            if not instance.ended:
-                instance.advance(t + begin, sub)
-            for bond in self._bonds:
-                bond.read(begin / 1e9, sub / 1e9)
+            self._communicate(instance, inputs, t, begin, sub)
         for bond in self._bonds:
             self._outputs |= bond.result()
-        self._outputs |= instance.take_ticks()
-        return self._read(t + h)
+        if self._has_clocks:
+            self._outputs |= instance.take_ticks()
+        return self._read(t + h, instance, instance.get_outputs())
+
+    def _communicate(self, instance: Instance, inputs: Inputs, t: int, begin: int, size: int) -> None:
+        """Take a communication step of the FMU: `size` ns from `begin` ns into the step at `t`."""
+        instance.now_ns = t + begin
+        tau, dt = begin / 1e9, size / 1e9
+        if not instance.ended:
+            instance.set_inputs(inputs, tau, dt)
+            for bond in self._bonds:
+                bond.write(tau, dt)
+        if not instance.ended:
+            instance.advance(t + begin, size)
+        for bond in self._bonds:
+            bond.read(tau, dt)
 
     @property
     def ended(self) -> str:
@@ -267,7 +283,9 @@ class FmuEngine(Stepped):
 
     def state_hash(self) -> int:
         """Return the hash of the FMU's state, or else of inputs, outputs and time."""
-        instance = self._running()
+        instance = self._instance or self._running()
+        if self._hashes_state and not self._has_more:
+            return state_hash(instance.serialise())
         bonds = [bond.state for bond in self._bonds]
         if self._hashes_state:
             return state_hash(instance.memory, *bonds, instance.serialise())
@@ -295,7 +313,8 @@ class FmuEngine(Stepped):
         for bond, part in zip(self._bonds, bonds, strict=True):
             bond.state = part
         instance.recall()
-        self._tunable.read()
+        if self._tunable is not None:
+            self._tunable.read()
 
     def _kept(self) -> list[Vector]:
         """Return the state beside the FMU's own."""
@@ -327,11 +346,12 @@ class FmuEngine(Stepped):
             " functions for it"
         )
 
-    def _read(self, t: int) -> Outputs:
+    def _read(self, t: int, instance: Instance, stop: Stop) -> Outputs:
+        """Return the outputs at `t`; `stop`: the end of getting them."""
         self._time[0] = t
-        try:
-            # without a hash of its state, the FMU is known by its outputs
-            self._running().read_outputs(self.unread if self._hashes_state else _ALL_READ)
-        except SessionError as error:
-            raise SessionError(f"{error}, at {t / 1e9:.9g} s") from error
+        if stop is not None:
+            try:
+                instance.refuse_output(*stop)
+            except SessionError as error:
+                raise SessionError(f"{error}, at {t / 1e9:.9g} s") from error
         return self._outputs

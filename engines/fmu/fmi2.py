@@ -15,6 +15,7 @@ from engines.fmu.instance import DISCARD, Instance
 from engines.fmu.linear_input import LinearInput
 from engines.fmu.log import fmi2_callbacks, log_everything
 from engines.fmu.start import Start
+from engines.fmu.transfers import Stop, Transfers
 from engines.fmu.variables import Variable
 from hub.participant import Inputs
 from schemas.vectors import Vector
@@ -23,6 +24,8 @@ __all__ = ["Fmi2Instance"]
 
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 """fmi2StatusKind (fmi2FunctionTypes.h)."""
+_INPUTS, _OUTPUTS = 0, 2
+"""Parts of a step in `_calls.c`."""
 
 
 class Fmi2Instance(Instance):
@@ -49,6 +52,8 @@ class Fmi2Instance(Instance):
         options = {"callbacks": fmi2_callbacks(), "loggingOn": log_everything()}
         super().__init__(FMU2Slave, description, name, [options])
         self._do_step: Callable[..., int] = self._function("DoStep")
+        self._step_address = self.address("DoStep")
+        self._set_blocks = Transfers(self, self.inputs)
         capabilities = description.co_simulation
         assert capabilities is not None
         self._varies = capabilities.canHandleVariableCommunicationStepSize
@@ -71,7 +76,7 @@ class Fmi2Instance(Instance):
         slopes = np.zeros(count)
         call = partial(
             self._function("SetRealInputDerivatives"),
-            self._component,
+            self.component,
             (ctypes.c_uint * count)(*(variable.reference for variable in variables)),
             count,
             (ctypes.c_int * count)(*[1] * count),
@@ -103,9 +108,9 @@ class Fmi2Instance(Instance):
         """Set the inputs: value and slope if the FMU interpolates, else the mean over the `dt` seconds."""
         if not self._slope_ports:
             tau += dt / 2
-        for block in self.inputs:
-            block.store(inputs, tau)
-            self.set_changed(block)
+        self._set_blocks.set(inputs, tau)
+        if not self._slope_ports:
+            return
         rates = [inputs.rate(port) for port in self._slope_ports]
         moves = any(rate is not None for rate in rates)
         if moves or self._moved:
@@ -118,18 +123,45 @@ class Fmi2Instance(Instance):
         super().deserialise(state)
         self._moved = bool(self._slope_ports)
 
+    def take_step(self, t: int, h: int, inputs: Inputs) -> Stop:
+        """Take a step from `t` to `t + h` (ns) and get the outputs, in one call; return its stop."""
+        compiled, outputs = self._set_blocks.compiled, self._read_blocks.compiled
+        values, rates = inputs.containers
+        is_moving = self._slope_ports and (rates or self._moved)
+        if compiled is None or outputs is None or self.ended or is_moving or type(inputs) is not Inputs:
+            return super().take_step(t, h, inputs)
+        dt = h / 1e9
+        stop = compiled.step2(
+            outputs, self._step_address, values, rates, dt / 2, *self._interval(t, h), self.can_save
+        )
+        if stop is None:
+            return None
+        part, at, status = stop
+        if part == _OUTPUTS:
+            return at, status
+        if part == _INPUTS:
+            self._set_blocks.go_on(at, status, inputs, dt / 2)
+            self.advance(t, h)
+        else:
+            self._take_failure(status, t, h)
+        return outputs.get()
+
     def advance(self, t: int, h: int) -> None:
-        """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation.
+        """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation."""
+        now, size = self._interval(t, h)
+        status = self._do_step(self.component, now, size, not self.can_save)
+        if status > WARNING:
+            self._take_failure(status, t, h)
+
+    def _interval(self, t: int, h: int) -> tuple[float, float]:
+        """Return the communication point `t` (ns) and the size of the step to `t + h`, s.
 
         Point and size of a step add up to the next point in every bit, so an FMU finds no gap between steps,
         except FMUs with steps of a fixed size (FMI 2.0.4 section 4.2.2, fmi2DoStep: "the slave must integrate
         until time instant tc[i+1] = tc[i] + hc[i]").
         """
         now = t / 1e9
-        size = (t + h) / 1e9 - now if self._varies else h / 1e9
-        status = self._do_step(self._component, now, size, not self.can_save)
-        if status > WARNING:
-            self._take_failure(status, t, h)
+        return now, (t + h) / 1e9 - now if self._varies else h / 1e9
 
     def _take_failure(self, status: int, t: int, h: int) -> None:
         """Note the FMU's end of the simulation; raises SessionError after a failure."""
@@ -148,4 +180,4 @@ class Fmi2Instance(Instance):
         """Ask the FMU for a status; return whether the FMU answered."""
         if not self.library.has(f"fmi2{function}"):
             return False
-        return self._function(function)(self._component, kind, ctypes.byref(value)) <= WARNING
+        return self._function(function)(self.component, kind, ctypes.byref(value)) <= WARNING

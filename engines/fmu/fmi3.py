@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -16,6 +16,7 @@ from engines.fmu.instance import Instance
 from engines.fmu.log import log_everything, log_message
 from engines.fmu.start import Start
 from engines.fmu.ticks import Ticks
+from engines.fmu.transfers import Transfers, compiled
 from hub.participant import Inputs
 from schemas.errors import SessionError
 from schemas.ros import EmptyMessage
@@ -68,28 +69,40 @@ class Fmi3Instance(Instance):
         self._ticks = Ticks(self, description.clocks)
         free = [block for block in self.inputs if not block.clocks]
         self._event_blocks = [block for block in free if block.discrete and self._has_events]
-        self._step_blocks = [block for block in free if block not in self._event_blocks]
+        self._set_blocks = Transfers(self, [block for block in free if block not in self._event_blocks])
         self._clocked_blocks = [block for block in self.inputs if block.clocks]
         # time of the next event, discrete inputs, and the state of the clocks
         self._events_end = 1 + sum(block.values.size for block in self._event_blocks)
         self.memory = np.full(self._events_end + self._ticks.size, math.inf)
         self._ticks.bind(self.memory[self._events_end :])
-        self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
-        self._again, self._nominals, self._states, self._scheduled = (
-            ctypes.c_bool(),
-            ctypes.c_bool(),
-            ctypes.c_bool(),
-            ctypes.c_bool(),
+        self._needs_event = False
+        self._again, self._terminate, self._nominals, self._states, self._scheduled = (
+            ctypes.c_bool() for _ in range(5)
         )
-        self._reached, self._next = ctypes.c_double(), ctypes.c_double()
-        self._do_step = partial(self._function("DoStep"), self._component)
-        self._step_results = [
-            ctypes.byref(x) for x in (self._event, self._terminate, self._early, self._reached)
-        ]
+        self._next = ctypes.c_double()
+        self._do_step = self._prepare_step()
         self._update_results = [
             ctypes.byref(x)
             for x in (self._again, self._terminate, self._nominals, self._states, self._scheduled, self._next)
         ]
+
+    def _prepare_step(self) -> Callable[[float, float, bool], tuple[int, int, int, int, float]]:
+        """Return a call of `fmi3DoStep`: time and size (s), and whether earlier states may be set.
+
+        The call returns status, eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime.
+        """
+        if compiled is not None:
+            return partial(compiled.step3, self.address("DoStep"), self.component)
+        function = self._function("DoStep")
+        flags, reached = [ctypes.c_bool() for _ in range(3)], ctypes.c_double()
+        results = [ctypes.byref(one) for one in (*flags, reached)]
+
+        def call(now: float, size: float, keeps: bool) -> tuple[int, int, int, int, float]:
+            status = function(self.component, now, size, not keeps, *results)
+            event, ends, early = (flag.value for flag in flags)
+            return status, event, ends, early, reached.value
+
+        return call
 
     def _initialise(self, starts: Sequence[Start], tolerance: float | None) -> None:
         self._set_structure(starts)
@@ -106,9 +119,7 @@ class Fmi3Instance(Instance):
 
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
         """Set continuous inputs to their mean over `dt` seconds, changed discrete inputs in event mode."""
-        for block in self._step_blocks:
-            block.store(inputs, tau + dt / 2)
-            self.set_changed(block)
+        self._set_blocks.set(inputs, tau + dt / 2)
         for block in (*self._event_blocks, *self._clocked_blocks):
             block.store(inputs, tau)
         if self._event_blocks:
@@ -151,7 +162,7 @@ class Fmi3Instance(Instance):
             if not needs_event:
                 now = self._step_to(now, target)
                 scheduled = min(self.memory[0], tick)
-                needs_event = self._has_events and (self._event.value or now > scheduled - _SAME_INSTANT_S)
+                needs_event = self._has_events and (self._needs_event or now > scheduled - _SAME_INSTANT_S)
             if needs_event and not self.ended:
                 self._handle_event(clocks=self._ticks.due(now + _SAME_INSTANT_S), at=now)
             if self.ended or end - now < _SAME_INSTANT_S:
@@ -162,11 +173,12 @@ class Fmi3Instance(Instance):
 
     def _step_to(self, now: float, target: float) -> float:
         """Step towards `target` and return the reached time."""
-        status = self._do_step(now, target - now, not self.can_save, *self._step_results)
+        status, event, ends, early, reached = self._do_step(now, target - now, self.can_save)
         if status > WARNING:
             raise self.failure("DoStep", status, f" for the step from {now:.9g} s to {target:.9g} s")
-        reached = self._reached.value if self._early.value else target
-        if self._terminate.value:
+        self._needs_event = bool(event)
+        reached = reached if early else target
+        if ends:
             self._end(reached, "terminateSimulation of fmi3DoStep")
         return reached
 

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from engines.fmu.log import last_warning
 from engines.fmu.model import library_path
 from engines.fmu.sources import provide_library
 from engines.fmu.start import Start
+from engines.fmu.transfers import Stop, Transfers, compiled
 from engines.fmu.variables import Variable
 from hub.participant import Inputs
 from schemas.errors import ScenarioError, SessionError
@@ -88,30 +89,23 @@ class Instance(ABC):
             """Those that the FMU has taken."""
             self._loaded = stack.pop_all()
         self.can_save = self._can_save(description)
-        self._component: int = self._fmu.component
+        self.component: int = self._fmu.component
+        """Address of the instance."""
         self._initialised = False
         self._worst = 0
         self._state = ctypes.c_void_p()
         self.memory = np.zeros(0)
         """State between steps apart from the FMU's own; written in place, never replaced."""
-        self._serialised: Any = (self.byte * 0)()
-        self._size = ctypes.c_size_t()
+        self._saving = ()
         if self.can_save:
             word = self.state_word
-            self._get_state = partial(
-                self._function(f"Get{word}"), self._component, ctypes.byref(self._state)
-            )
-            self._size_of_state = partial(
-                self._function(f"Serialized{word}Size"),
-                self._component,
-                self._state,
-                ctypes.byref(self._size),
-            )
-            self._serialise_state = partial(self._function(f"Serialize{word}"), self._component, self._state)
+            self._saving = (f"Get{word}", f"Serialized{word}Size", f"Serialize{word}")
+            self._serialise = self._prepare_serialisation()
         self.inputs = [Block("Set", group, self._prepare_access) for group in grouped(description.inputs)]
-        self._unread = frozenset[str]()
+        self._set_blocks = Transfers(self, [])
+        """Inputs set at the start of each step."""
         self.outputs = [Block("Get", group, self._prepare_access) for group in grouped(description.outputs)]
-        self._read = [block for block in self.outputs if not block.clocks]
+        self._read_blocks = Transfers(self, [block for block in self.outputs if not block.clocks])
 
     def _check_functions(self, description: Description) -> None:
         needed = dict.fromkeys(self.prefix + name for name in self.required)
@@ -182,22 +176,25 @@ class Instance(ABC):
         for block in blocks:
             self.transfer(block)
 
-    def read_outputs(self, unread: frozenset[str] = frozenset()) -> None:
-        """Bring the FMU's outputs into the blocks, all but whole numbers and truth values that are `unread`.
+    def get_outputs(self) -> Stop:
+        """Bring the FMU's outputs into the blocks, and return where that stopped.
 
-        Clocked ones hold the value of the last tick. Floats are read in any case: a NaN ends the session
-        whether somebody looks or not.
+        Clocked ones hold the value of the last tick.
         """
-        if unread is not self._unread:
-            self._unread = unread
-            self._read = [
-                block
-                for block in self.outputs
-                if not (block.clocks or (block.always_usable and block.parts.keys() <= unread))
-            ]
-        for block in self._read:
-            self.transfer(block)
-            block.publish()
+        return self._read_blocks.get()
+
+    def refuse_output(self, at: int, status: int) -> NoReturn:
+        """Raise the error of outputs that stopped at block `at` with the FMU's `status`."""
+        self._read_blocks.refuse(at, status)
+
+    def take_step(self, t: int, h: int, inputs: Inputs) -> Stop:
+        """Take a step from `t` to `t + h` (ns) and get the outputs; return where that stopped."""
+        self.now_ns = t
+        if not self.ended:
+            self.set_inputs(inputs, 0.0, h / 1e9)
+        if not self.ended:
+            self.advance(t, h)
+        return self._read_blocks.get()
 
     def recall(self) -> None:  # noqa: B027
         """Take over `memory`, after a return to a saved state; nothing to do without clocks."""
@@ -208,19 +205,36 @@ class Instance(ABC):
 
     def serialise(self) -> bytes:
         """Return the FMU's state."""
-        word = self.state_word
-        self._check(f"Get{word}", self._get_state())
-        self._check(f"Serialized{word}Size", self._size_of_state())
-        if len(self._serialised) != self._size.value:
-            self._serialised = (self.byte * self._size.value)()
-        self._check(f"Serialize{word}", self._serialise_state(self._serialised, self._size))
-        return bytes(self._serialised)
+        found = self._serialise()
+        if isinstance(found, bytes):
+            return found
+        at, status = found
+        raise self.failure(self._saving[at], status)
+
+    def _prepare_serialisation(self) -> Callable[[], bytes | tuple[int, int]]:
+        """Return a call for the state, or for the failed function (place in `_saving`) and its status."""
+        if compiled is not None:
+            addresses = (*map(self.address, self._saving), self.component, ctypes.addressof(self._state))
+            return partial(compiled.serialise, *addresses)
+        size = ctypes.c_size_t()
+        get, size_of, serialise = map(self._function, self._saving)
+
+        def call() -> bytes | tuple[int, int]:
+            if (status := get(self.component, ctypes.byref(self._state))) > WARNING:
+                return 0, status
+            if (status := size_of(self.component, self._state, ctypes.byref(size))) > WARNING:
+                return 1, status
+            buffer = (self.byte * size.value)()
+            if (status := serialise(self.component, self._state, buffer, size)) > WARNING:
+                return 2, status
+            return bytes(buffer)
+
+        return call
 
     def deserialise(self, state: bytes) -> None:
         """Bring the FMU back to a state from `serialise`."""
         self.ended = ""
-        for block in self.inputs:
-            block.forget()
+        self._set_blocks.forget()
         restored = ctypes.c_void_p()
         self.call(
             f"{self.deserialise_word}{self.state_word}",
@@ -239,19 +253,19 @@ class Instance(ABC):
             if self._worst >= _FATAL:
                 return  # no function of the FMU may be called any more (fmi2Fatal, fmi3Fatal)
             if self._state:
-                self._function(f"Free{self.state_word}")(self._component, ctypes.byref(self._state))
+                self._function(f"Free{self.state_word}")(self.component, ctypes.byref(self._state))
             if (
                 self._initialised
                 and self._worst < _ERROR
                 and self.library.has(f"{self.prefix}Terminate")
-                and self._function("Terminate")(self._component) > WARNING
+                and self._function("Terminate")(self.component) > WARNING
             ):
                 _log.warning("%s: %sTerminate failed%s", self._name, self.prefix, self._reason())
-            self._function("FreeInstance")(self._component)
+            self._function("FreeInstance")(self.component)
 
     def call(self, function: str, *arguments: Any) -> None:
         """Call an FMI function, named without prefix."""
-        self._check(function, self._function(function)(self._component, *arguments))
+        self._check(function, self._function(function)(self.component, *arguments))
 
     def _check(self, function: str, status: int) -> None:
         if status > WARNING:
@@ -275,6 +289,11 @@ class Instance(ABC):
             self._functions[name] = getattr(self.library, self.prefix + name)
         return self._functions[name]
 
+    def address(self, name: str) -> int:
+        """Return the address of an FMI function, named without prefix."""
+        function: Any = self._function(name)
+        return ctypes.cast(function, ctypes.c_void_p).value or 0
+
     def _end(self, time_s: float, how: str) -> None:
         """Note the FMU's request to end the simulation."""
         self.ended = f"the FMU asks to end the simulation at {time_s:.9g} s ({how}){self._reason()}"
@@ -282,7 +301,7 @@ class Instance(ABC):
     def _prepare_access(
         self, function: str, references: Sequence[int], raw: NDArray[Any]
     ) -> Callable[[], int]:
-        return prepared(self._function(function), self._component, references, raw, counted=self.counted)
+        return prepared(self._function(function), self.component, references, raw, counted=self.counted)
 
     def set_changed(self, block: Block) -> None:
         """Set a block of whole numbers or truth values if one has changed, any other in any case."""
@@ -293,9 +312,12 @@ class Instance(ABC):
         """Set or get a block."""
         status = block.call()
         if status > WARNING:
-            raise self.failure(
-                block.function, status, f" for '{block.refused() if status == DISCARD else block.names}'"
-            )
+            raise self.refusal(block, status)
+
+    def refusal(self, block: Block, status: int) -> SessionError:
+        """Return the error for a block that the FMU refused with `status`."""
+        names = block.refused() if status == DISCARD else block.names
+        return self.failure(block.function, status, f" for '{names}'")
 
     def _set_structure(self, starts: Sequence[Start]) -> None:
         """Set structural parameters, in the configuration mode of FMI 3."""

@@ -20,6 +20,7 @@ from engines.fmu.description import Description
 from engines.fmu.instance import DISCARD, Instance
 from engines.fmu.log import fmi2_callbacks, log_everything, log_message
 from engines.fmu.start import Start
+from engines.fmu.transfers import Transfers
 from hub.participant import Inputs
 from schemas.errors import SessionError
 
@@ -56,7 +57,7 @@ class ModelExchange(Instance):
         """Load and instantiate the FMU."""
         super().__init__(slave, description, name, [options])
         self._event_blocks = [block for block in self.inputs if block.discrete]
-        self._step_blocks = [block for block in self.inputs if not block.discrete]
+        self._set_blocks = Transfers(self, [block for block in self.inputs if not block.discrete])
         # time of the next event, discrete inputs
         self.memory = np.full(1 + sum(block.values.size for block in self._event_blocks), math.inf)
         self._completes = description.completes_steps
@@ -104,7 +105,7 @@ class ModelExchange(Instance):
 
     def _equation(self, name: str) -> Callable[..., None]:
         """Return a function of the FMU for the solver: a discard lets the solver try a shorter step."""
-        function, component = self._function(name), self._component
+        function, component = self._function(name), self.component
 
         def equation(*arguments: Any) -> None:
             status = function(component, *arguments)
@@ -117,9 +118,7 @@ class ModelExchange(Instance):
 
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
         """Set continuous inputs to their mean over `dt` seconds, changed discrete inputs in event mode."""
-        for block in self._step_blocks:
-            block.store(inputs, tau + dt / 2)
-            self.transfer(block)
+        self._set_blocks.set(inputs, tau + dt / 2)
         if not self._event_blocks:
             return
         for block in self._event_blocks:

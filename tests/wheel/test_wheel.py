@@ -81,7 +81,7 @@ def test_it_holds_the_packages_and_the_scenarios_and_nothing_else(wheel):
 
 def test_what_is_in_c_is_compiled_where_there_is_a_compiler(wheel, tmp_path):
     held = [Path(name) for name in zipfile.ZipFile(wheel).namelist()]
-    for compiled in ("robots/_kinematics.*.so", "schemas/_cdr.*.so"):
+    for compiled in ("robots/_kinematics.*.so", "schemas/_cdr.*.so", "engines/fmu/_calls.*.so"):
         assert any(path.match(compiled) for path in held), compiled
     build = [sys.executable, "-m", "build", "--wheel", "--outdir", tmp_path / "dist", "sources"]
     with tarfile.open(next(wheel.parent.glob("*.tar.gz"))) as sources:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from engines.fmu import transfers
 from engines.fmu.engine import FmuEngine, FmuParams
 from hub.participant import Setup
 from schemas.errors import SessionError
@@ -133,6 +134,7 @@ class TestReadings:
 
     @pytest.mark.parametrize("period", [MS, 2 * MS, 100 * MS, 200 * MS])
     def test_steps_meet_in_every_bit(self, make: Make, monkeypatch: pytest.MonkeyPatch, period: int) -> None:
+        monkeypatch.setattr(transfers, "compiled", None)
         engine = make(STAIR, period=period, start={"last": 10**6})
         calls: list[tuple[float, float]] = []
         instance = engine._instance
@@ -145,11 +147,13 @@ class TestReadings:
 
         monkeypatch.setattr(instance, "_do_step", watched)
         run(engine, 3000, period=period)
+        assert len(calls) == 3000
         assert all(t + h == after for (t, h), (after, _) in pairwise(calls))
 
     def test_steps_of_one_size_for_an_fmu_that_takes_no_others(
         self, make: Make, monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        monkeypatch.setattr(transfers, "compiled", None)
         engine = make(STAIR, edits={' canHandleVariableCommunicationStepSize="true"': ""})
         sizes: set[float] = set()
         monkeypatch.setattr(engine._instance, "_do_step", lambda c, t, h, flag: sizes.add(h) or 0)
