@@ -8,6 +8,7 @@ from controllers.cholecystectomy.params import ClipAndCutParams
 from controllers.cholecystectomy.ports import PROGRESS, routine_ports
 from controllers.cholecystectomy.procedure import SurgeonHands
 from controllers.cholecystectomy.sight import Sight
+from controllers.cholecystectomy.sub_task import SubTask, instruction
 from controllers.cholecystectomy.surgeon import Surgeon
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.expert.ports import EVENTS
@@ -63,12 +64,12 @@ class ClipAndCut(Controller):
         for hand in self._hands:
             hand.period = setup.period_ns * 1e-9
             self._outputs |= {f"{hand.arm}/servo_cp": (), f"{hand.arm}/jaw/move_jp": ()}
-        self._outputs |= {"status": (), f"{self.params.applier}/clip": ()}
+        self._outputs |= {"instruction": (), "status": (), f"{self.params.applier}/clip": ()}
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Read the measurements, advance the routine, and send the commands."""
-        surgeon = self._surgeon
+        surgeon, before = self._surgeon, self._surgeon.state.sub_task
         self._sense(inputs)
         if t == 0:
             surgeon.begin()
@@ -78,8 +79,16 @@ class ClipAndCut(Controller):
             self._outputs[f"{hand.arm}/servo_cp"] = (hand.advance(settle=settles),)
             self._outputs[f"{hand.arm}/jaw/move_jp"] = hand.jaw_commands()
         self._outputs[f"{self.params.applier}/clip"] = (EmptyMessage(),) if surgeon.fires else ()
+        self._outputs["instruction"] = self._instruct(before)
         self._outputs["status"] = tuple(StringMessage(data=text) for text in surgeon.statuses())
         return self._outputs
+
+    def _instruct(self, before: SubTask) -> tuple[StringMessage, ...]:
+        """Return the instruction if the sub-task is another than before the step."""
+        state = self._surgeon.state
+        organ = self.params.tubes[max(state.tube, 0)]
+        text = "" if state.sub_task is before else instruction(state.sub_task, organ)
+        return (StringMessage(data=text),) if text else ()
 
     def _sense(self, inputs: Inputs) -> None:
         for hand in self._hands:

@@ -40,6 +40,7 @@ def routine_ports(params: ClipAndCutParams, hands: Iterable[SurgeonHand]) -> tup
         signal_in(f"{params.grasper}/pull", size=3, unit="N", frame="world"),
         event_out(f"{params.applier}/clip", EmptyMessage, "closes a clip on what is between the jaws"),
         *(signal_out(name, Float64Message, meaning) for name, meaning in PROGRESS.items()),
+        event_out("instruction", StringMessage, "the sub-task that begins, as a request to a policy"),
         event_out("status", StringMessage, "what begins, what is tried again, and why it has given up"),
     )
 

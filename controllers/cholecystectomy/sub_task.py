@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["CLIPS", "CUT", "FAILURES", "Failure", "Step", "SubTask", "sub_task_of"]
+__all__ = ["CLIPS", "CUT", "FAILURES", "Failure", "Step", "SubTask", "instruction", "sub_task_of"]
 
 CLIPS = 3
 """Clips on each tube: two on the patient's side of the cut, one on the gallbladder's side."""
@@ -44,6 +44,20 @@ class SubTask(IntEnum):
 def sub_task_of(tube: int, job: int) -> SubTask:
     """Return the sub-task of a job on a tube; the next number is the way back from there."""
     return SubTask(SubTask.CLIP_1_LEFT + 2 * (CLIPS + 1) * tube + 2 * job)
+
+
+def instruction(task: SubTask, tube: str) -> str:
+    """Return a sub-task as a request to a policy; `tube` is the organ. Empty before and after the work."""
+    if task is SubTask.GRASP_GALLBLADDER:
+        return "grasp the gallbladder"
+    if not SubTask.CLIP_1_LEFT <= task <= SubTask.BACK_FROM_CUT_RIGHT:
+        return ""
+    job, is_way_back = divmod((task - SubTask.CLIP_1_LEFT) % (2 * (CLIPS + 1)), 2)
+    organ = tube.replace("_", " ")
+    if job == CUT:
+        return f"go back from the cut in the {organ}" if is_way_back else f"cut the {organ}"
+    clip = f"the {('first', 'second', 'third')[job]} clip"
+    return f"go back from {clip} on the {organ}" if is_way_back else f"put {clip} on the {organ}"
 
 
 class Step(IntEnum):

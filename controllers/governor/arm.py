@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from controllers.clip_trigger import ClipTrigger
 from controllers.governor.params import GovernorParams
 from controllers.motion.params import PsmParams
 from controllers.ports import NO_WRENCH, measured_joints
@@ -18,7 +19,17 @@ from robots.policies.states import ArmReading
 from robots.transform import inverse_transform, matrix_to_pose, pose_to_matrix
 from schemas.crtk import OperatingState
 from schemas.ports import Port
-from schemas.ros import Header, JointState, Point, Pose, PoseStamped, Quaternion, Time, WrenchStamped
+from schemas.ros import (
+    EmptyMessage,
+    Header,
+    JointState,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    Time,
+    WrenchStamped,
+)
 from schemas.vectors import Vector
 
 __all__ = ["GovernedArm"]
@@ -53,13 +64,22 @@ class GovernedArm:
         corners = np.array(params.workspace[arm]) if arm in params.workspace else None
         self._box = None if corners is None else (corners.min(axis=0), corners.max(axis=0))
         self.size = 8 if self._in_tip_space else len(self.chain.joints) + 1
-        self.state = _ArmState(size=self.size)
+        self._now = _ArmState(size=self.size)
+        self._trigger = None if held.tool.clip is None else ClipTrigger()
+        self._fires = False
         self.reading = ArmReading(np.zeros(len(self.chain.joints)), 0.0, np.zeros(7))
         self._force = 0.0
 
     @property
+    def states(self) -> Iterator[Record]:
+        """Records that are part of a saved state."""
+        yield self._now
+        if self._trigger is not None:
+            yield self._trigger.state
+
+    @property
     def ports(self) -> Iterator[Port]:
-        """CRTK's states in, servo commands out."""
+        """CRTK's states in, servo commands out; of a clip applier its clips too."""
         arm, age = self.name, self._params.max_age
         names = tuple(joint.name for joint in self.chain.joints)
         yield signal_in(f"{arm}/measured_cp", PoseStamped, frame=self.frame, max_age_ns=age)
@@ -72,10 +92,12 @@ class GovernedArm:
         else:
             yield event_out(f"{arm}/servo_jp", JointState, "the goal within the limits", names=names)
         yield event_out(f"{arm}/jaw/servo_jp", JointState, "the goal within the limits", names=("jaw",))
+        if self._trigger is not None:
+            yield event_out(f"{arm}/clip", EmptyMessage, "the jaw is shut, and was wide open before")
 
     def read(self, inputs: Inputs) -> None:
         """Note the measured values."""
-        arm, now = self.name, self.state
+        arm, now = self.name, self._now
         for state in cast("tuple[OperatingState, ...]", inputs.events(f"{arm}/operating_state")):
             now.ready = crtk.is_ready(state)
         joints = inputs[f"{arm}/measured_js"]
@@ -88,22 +110,23 @@ class GovernedArm:
 
     def reason_to_hold(self, inputs: Inputs) -> str:
         """Return why the arm cannot follow now; empty: it can."""
-        if not self.state.ready:
+        if not self._now.ready:
             return f"{self.name} is not enabled and homed"
         silent = [p for p in ("measured_cp", "measured_js") if inputs.stale(f"{self.name}/{p}")]
         if silent:
             return f"{self.name}/{silent[0]} is silent for more than {self._params.max_age / 1e6:g} ms"
-        if self.state.pressed:
+        if self._now.pressed:
             return f"{self.name} meets {self._force:.3g} N, allowed are {self._params.force:g} N (force)"
         return ""
 
     def hold(self) -> None:
         """Command nothing: the arm stays at its last set-point."""
-        self.state.moves = False
+        self._now.moves = False
+        self._fires = False
 
     def follow(self, goal: Vector, h: float) -> bool:
         """Bring the command nearer to a goal in a step of `h` seconds; return whether a limit acted."""
-        now = self.state
+        now = self._now
         if not now.moves:
             now.moves = True
             pose = self.reading.tip if self._in_tip_space else self.reading.joints
@@ -112,11 +135,12 @@ class GovernedArm:
         jaw = float(np.clip(goal[-1], *self._jaw_range))
         most = self._params.jaw_speed * h
         now.command[-1] += np.clip(jaw - now.command[-1], -most, most)
+        self._fires = self._trigger is not None and self._trigger.fires(float(now.command[-1]), h)
         limited = self._follow_tip(goal, h) if self._in_tip_space else self._follow_joints(goal[:-1], h)
         return limited or jaw != goal[-1] or abs(jaw - before[-1]) > most
 
     def _follow_tip(self, goal: Vector, h: float) -> bool:
-        now, params = self.state, self._params
+        now, params = self._now, self._params
         position = goal[:3] if self._box is None else np.clip(goal[:3], *self._box)
         way = position - now.command[:3]
         turn = rotation.log(rotation.product(goal[3:7], rotation.conjugate(now.command[3:7])))
@@ -129,7 +153,7 @@ class GovernedArm:
 
     def _follow_joints(self, goal: Vector, h: float) -> bool:
         """Go towards joint positions, all joints by the same share of their way."""
-        now, params, chain = self.state, self._params, self.chain
+        now, params, chain = self._now, self._params, self.chain
         before = now.command[:-1].copy()
         within = np.clip(goal, chain.lower, chain.upper)
         way = within - before
@@ -164,11 +188,14 @@ class GovernedArm:
 
     def commands(self, stamp_ns: int) -> dict[str, Value]:
         """Return the commands of this step, by port."""
-        now, arm = self.state, self.name
+        now, arm = self._now, self.name
         motion = f"{arm}/servo_cp" if self._in_tip_space else f"{arm}/servo_jp"
         jaw = f"{arm}/jaw/servo_jp"
+        clip: dict[str, Value] = {}
+        if self._trigger is not None:
+            clip[f"{arm}/clip"] = (EmptyMessage(),) if self._fires else ()
         if not now.moves:
-            return {motion: (), jaw: ()}
+            return {motion: (), jaw: (), **clip}
         header = Header(stamp=Time.from_ns(stamp_ns), frame_id=self.frame)
         if self._in_tip_space:
             x, y, z, qx, qy, qz, qw = now.command[:7].tolist()
@@ -179,6 +206,7 @@ class GovernedArm:
         return {
             motion: (message,),
             jaw: (JointState(header=header, position=now.command[-1:].copy()),),
+            **clip,
         }
 
 

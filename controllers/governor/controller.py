@@ -98,7 +98,7 @@ class Governor(Controller):
             params.execution,
             params.execute,
         )
-        self.keep(self._state, *(arm.state for arm in self._arms), *self._answers.state)
+        self.keep(self._state, *(state for arm in self._arms for state in arm.states), *self._answers.state)
         self._counts = {
             name: np.zeros(1) for name in ("condition", "answers", "faults", "holds", "limited", "late")
         }
@@ -107,7 +107,7 @@ class Governor(Controller):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Answers in, observations and counts out; per arm CRTK's states in and servo commands out."""
+        """Answers in, observations and counts out; per arm CRTK's states in, servo commands and clips out."""
         meaning = "number of the condition: 0 waiting, 1 following, 2 silent, 3 fault, 4 disagreement, 5 arm"
         return (
             event_in("actions", ActionChunk, "answers of the policy"),

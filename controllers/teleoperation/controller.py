@@ -6,7 +6,7 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from controllers.teleoperation.clip_trigger import ClipTrigger
+from controllers.clip_trigger import ClipTrigger
 from controllers.teleoperation.contact_model import ContactModelBuilder
 from controllers.teleoperation.engagement import Engagement, EngagementPhase
 from controllers.teleoperation.jaw import JawGhost

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from engines.mujoco.truth.modality import Modality
 from learning.datasets import open_h
 from learning.datasets.columns import Columns, choose_columns, commanded_columns, measured_columns
+from learning.datasets.instructions import instructions
 from learning.datasets.tips import Tips
 from schemas.errors import RecordingError
 from schemas.scenario import Scenario
@@ -60,6 +61,8 @@ class Episode:
     action_names: tuple[str, ...]
     action: NDArray[np.float32]
     """Commands at the time of the next frame, shape (n, len(action_names))."""
+    instructions: NDArray[np.str_]
+    """What is to be done in each frame, in words, shape (n,)."""
     meta: Mapping[str, tuple[tuple[str, ...], NDArray[np.float32]]] = field(
         default_factory=dict[str, "tuple[tuple[str, ...], NDArray[np.float32]]"]
     )
@@ -97,16 +100,17 @@ class Episode:
                 f" {wanted.fps} frames a second"
             )
         times_ns = first + np.arange(count + 1) * 1_000_000_000 // wanted.fps
-        scenario = recording.scenario()
+        task = _task(recording.scenario(), wanted.tasks)
         return cls(
             recording=recording,
-            task=_task(scenario, wanted.tasks),
+            task=task,
             times_ns=times_ns[:-1],
             state_names=_names(state),
             state=np.hstack([one.at(times_ns[:-1]) for one in state]),
             action_names=_names(action),
             # an action leads from one frame to the next: it comes after the picture that it answers
             action=np.hstack([one.at(times_ns[1:]) for one in action]),
+            instructions=instructions(recording, times_ns[:-1], task),
             meta={name: (one.names, one.at(times_ns[:-1])) for name, one in truths.items()},
             texts={} if tips is None else open_h.tools(tips),
             frame="" if tips is None else tips.frame,

@@ -1,4 +1,4 @@
-"""Numbers of an Open-H episode: poses and set-points of two instruments, and truths of the scene.
+"""Numbers of an Open-H episode: poses and set-points of the instruments, and truths of the scene.
 
 Names are those of Open-H-Embodiment's dVRK data (JHU; open-h-embodiment/data-collection at 6af6fab,
 scripts/conversion/dvrk_zarr_to_lerobot.py), of which the layouts `open-h-dvrk` of `robots.policies` consist.
@@ -6,7 +6,7 @@ scripts/conversion/dvrk_zarr_to_lerobot.py), of which the layouts `open-h-dvrk` 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from learning.datasets.columns import Columns
 from robots.policies.actions import ACTIONS
+from robots.policies.fields import Group
 from robots.policies.states import state_groups
 from schemas.codec import decode
 from schemas.errors import MessageError, RecordingError
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["ARMS", "META", "action_columns", "meta_columns", "state_columns", "tools"]
 
 ARMS = ("PSM1", "PSM2")
-"""Arms of a row, in order: eight numbers each."""
+"""Arms of a row, in order: eight numbers each; PSM3 follows where a scene has it, which Open-H has not."""
 META = "observation.meta."
 _ABSENT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 """Numbers of an arm that the scene does not have."""
@@ -38,35 +39,40 @@ _MOST = 4
 
 
 def state_columns(tips: Tips) -> list[Columns]:
-    """Return measured pose and jaw of both arms, 16 numbers a row."""
-    names = {
-        arm: [
-            field.name for group in state_groups("open-h-dvrk", arm, tips.frame, ()) for field in group.fields
-        ]
-        for arm in ARMS
-    }
-    return [_named(tips.measured(arm), names[arm]) for arm in ARMS if arm in tips.instruments] + [
-        _absent(names[arm]) for arm in ARMS if arm not in tips.instruments
+    """Return measured pose and jaw of each arm, eight numbers each."""
+    return [
+        _arm_columns(tips, arm, tips.measured, state_groups("open-h-dvrk", arm, tips.frame, ()))
+        for arm in _arms_of(tips)
     ]
 
 
 def action_columns(tips: Tips) -> list[Columns]:
-    """Return set-points of pose and jaw of both arms, 16 numbers a row."""
+    """Return set-points of pose and jaw of each arm, eight numbers each."""
     layout = ACTIONS["open-h-dvrk"]
-    names = {
-        arm: [field.name for group in layout.groups(arm, tips.frame, ()) for field in group.fields]
-        for arm in ARMS
-    }
-    return [_named(tips.commanded(arm), names[arm]) for arm in ARMS if arm in tips.instruments] + [
-        _absent(names[arm]) for arm in ARMS if arm not in tips.instruments
+    return [
+        _arm_columns(tips, arm, tips.commanded, layout.groups(arm, tips.frame, ())) for arm in _arms_of(tips)
     ]
+
+
+def _arms_of(tips: Tips) -> list[str]:
+    """Return Open-H's two arms, then a third of the scene."""
+    return [*ARMS, *(arm for arm in tips.instruments if arm not in ARMS)]
+
+
+def _arm_columns(
+    tips: Tips, arm: str, columns_of: Callable[[str], Columns], groups: Iterable[Group]
+) -> Columns:
+    """Return the numbers of an arm by their names in the data set; constant ones without the arm."""
+    names = tuple(field.name for group in groups for field in group.fields)
+    if arm in tips.instruments:
+        columns = columns_of(arm)
+        return Columns(columns.port, names, columns.times_ns, columns.values)
+    return Columns("", names, np.array([0, 2**62], np.int64), np.repeat(_ABSENT[None], 2, axis=0))
 
 
 def tools(tips: Tips) -> dict[str, str]:
     """Return the instrument of each arm, by feature."""
-    return {
-        f"{META}tool.{arm.lower()}": str(tips.arms[arm].instrument) for arm in ARMS if arm in tips.instruments
-    }
+    return {f"{META}tool.{arm.lower()}": str(tips.arms[arm].instrument) for arm in tips.instruments}
 
 
 def meta_columns(recording: Recording, tips: Tips) -> dict[str, Columns]:
@@ -149,16 +155,6 @@ def _nodes(recording: Recording, tips: Tips, port: str) -> Columns:
     seen = np.stack([tips.from_world(poses[:, i], times_ns)[:, :3] for i in range(nodes.shape[1])], axis=1)
     names = tuple(f"node{i}.{axis}" for i in range(nodes.shape[1]) for axis in "xyz")
     return Columns(port, names, times_ns, seen.reshape(len(seen), -1))
-
-
-def _named(columns: Columns, names: list[str]) -> Columns:
-    return Columns(columns.port, tuple(names), columns.times_ns, columns.values)
-
-
-def _absent(names: list[str]) -> Columns:
-    """Return constant numbers for an arm that is not there."""
-    times_ns = np.array([0, 2**62], np.int64)
-    return Columns("", tuple(names), times_ns, np.repeat(_ABSENT[None], 2, axis=0))
 
 
 def _times_ns(times: Vector) -> NDArray[np.int64]:

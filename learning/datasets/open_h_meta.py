@@ -71,7 +71,7 @@ def info(
                 for name, names in numbers.items()
             },
             **dict.fromkeys(first.texts, text),
-            "instruction.text": text | {"description": "the task in words"},
+            "instruction.text": text | {"description": "the task in words, or the present sub-task"},
             "timestamp": {"dtype": "float32", **one},
             **{
                 key: {"dtype": "int64", **one}
@@ -103,11 +103,14 @@ def _splits(episodes: int) -> dict[str, str]:
     return {name: f"{cuts[begin]}:{cuts[end]}" for name, begin, end in _SPLITS}
 
 
-def modality() -> dict[str, Any]:
-    """Return the groups of state and action as GR00T-H names them, with the left camera of the endoscope."""
+def modality(info: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the groups of state and action as GR00T-H names them, with the left camera of the endoscope.
+
+    `info` is the content of `info.json`.
+    """
     groups: dict[str, dict[str, int]] = {}
     at = 0
-    for arm in ARMS:
+    for arm in _arms(info):
         for group in state_groups("open-h-dvrk", arm, "", ()):
             groups[group.name] = {"start": at, "end": at + len(group.fields)}
             at += len(group.fields)
@@ -119,9 +122,15 @@ def modality() -> dict[str, Any]:
     }
 
 
+def _arms(info: Mapping[str, Any]) -> list[str]:
+    """Return the arms of a row, in order."""
+    names = info["features"]["observation.state"]["names"]
+    return list(dict.fromkeys(name.partition("_")[0].upper() for name in names))
+
+
 def readme(info: Mapping[str, Any], tasks: Sequence[str]) -> str:
     """Return the README in the sections that Open-H asks for; `info` is the content of `info.json`."""
-    features, fps = info["features"], info["fps"]
+    features, fps, arms = info["features"], info["fps"], _arms(info)
     absent = [arm for arm in ARMS if f"{META}tool.{arm.lower()}" not in features]
     truths = "".join(
         f"- `{name}`: {feature['shape'][0]} numbers\n"
@@ -148,7 +157,7 @@ simulates again to the same bits. No episode shows a recovery unless its task sa
 
 ## Robot Platform
 
-Simulated da Vinci Research Kit: patient-side manipulators PSM1 and PSM2, endoscope.{missing}
+Simulated da Vinci Research Kit: patient-side manipulators {" and ".join(arms)}, endoscope.{missing}
 
 ## Sensors & Cameras
 
@@ -157,7 +166,7 @@ Stereo endoscope, {width} x {height} pixels, {fps} frames a second. Truths of th
 {truths}
 ## Action & State Space Representation
 
-Absolute Cartesian set-points (action) and measured poses (state) of PSM1, then PSM2: x, y, z in m,
+Absolute Cartesian set-points (action) and measured poses (state) of {", then ".join(arms)}: x, y, z in m,
 quaternion x, y, z, w, jaw in rad. Reference frame: {frame}.
 The action of a frame is the set-point at the time of the next frame.
 

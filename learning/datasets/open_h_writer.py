@@ -94,12 +94,12 @@ class OpenHWriter:
 
     def _columns(self, episode: Episode, count: int, number: int, task: int) -> dict[str, NDArray[Any]]:
         frame = np.arange(count)
-        texts = {**episode.texts, "instruction.text": episode.task}
         return {
             "observation.state": episode.state[:count],
             "action": episode.action[:count],
             **{name: values[:count] for name, (_, values) in episode.meta.items()},
-            **{name: np.full(count, text) for name, text in texts.items()},
+            **{name: np.full(count, text) for name, text in episode.texts.items()},
+            "instruction.text": episode.instructions[:count],
             "timestamp": (frame / self._fps).astype(np.float32),
             "frame_index": frame.astype(np.int64),
             "episode_index": np.full(count, number, np.int64),
@@ -138,9 +138,10 @@ class OpenHWriter:
             text = "".join(json.dumps(line) + "\n" for line in lines)
             (meta / f"{name}.jsonl").write_text(text, encoding="utf-8")
         counts = open_h_meta.Counts(self.episodes, self.frames, len(self._tasks))
+        info = open_h_meta.info(self._first, self._fps, self._size, _VIDEOS, counts)
         contents: dict[str, Any] = {
-            "info": open_h_meta.info(self._first, self._fps, self._size, _VIDEOS, counts),
-            "modality": open_h_meta.modality(),
+            "info": info,
+            "modality": open_h_meta.modality(info),
             "recordings": self._sources,
         }
         for name, content in contents.items():

@@ -152,7 +152,7 @@ class Collection:
         """Write `info.json`, `modality.json` and README for the episodes so far."""
         counts = open_h_meta.Counts(len(self._episodes), self._frames, len(self._tasks))
         whole = open_h_meta.with_counts(info, counts)
-        for name, content in (("info", whole), ("modality", open_h_meta.modality())):
+        for name, content in (("info", whole), ("modality", open_h_meta.modality(whole))):
             with whole_file(self._meta / f"{name}.json") as part:
                 part.write_text(json.dumps(content, indent=2) + "\n", "utf-8")
         (self._meta / "README.md").write_text(open_h_meta.readme(whole, list(self._tasks)), "utf-8")

@@ -21,6 +21,8 @@ app = typer.Typer()
 
 _LARGEST_CONTRACT = 100_000
 """Bytes of a file with a contract."""
+_SEEDS = 50
+"""Episodes of each exercise and difficulty if no other number is asked for."""
 _PACKAGES = ("gymnasium", "joblib", "pyarrow", "scipy")
 
 
@@ -45,7 +47,7 @@ def judge(
         int, typer.Option(min=1, help="Rows of a backend's answer before the next question.")
     ] = 5,
     suite: Annotated[
-        str, typer.Option(help="training, suturing, tissue, all, or exercises, with commas.")
+        str, typer.Option(help="training, suturing, tissue, all, operation, or exercises, with commas.")
     ] = "suturing",
     difficulty: Annotated[
         str,
@@ -53,7 +55,14 @@ def judge(
             help="nominal, joint-errors, camera-offset, looks, latency-100, -200, -300, with commas; or all."
         ),
     ] = "nominal",
-    seeds: Annotated[int, typer.Option(min=1, help="Episodes of each exercise and difficulty.")] = 50,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Episodes of each exercise and difficulty; default: 50, with an operation 5.",
+            show_default=False,
+        ),
+    ] = None,
     first_seed: Annotated[
         int, typer.Option(min=0, help="Seed of the first episode, where a policy has seen the first seeds.")
     ] = 0,
@@ -93,17 +102,17 @@ def judge(
     if policy is None or output is None:
         raise ScenarioError("a verdict needs --policy and --output; or compare two with --compare DIR DIR")
     from learning.judge.difficulties import difficulties_of
-    from learning.judge.policies import PolicyAddress, open_policy
+    from learning.judge.policies import PolicyAddress
     from learning.judge.suites import exercises_of
     from learning.judge.verdict import Verdict
     from learning.own_directory import claim_directory
 
     sys.path.insert(0, str(Path.cwd()))  # a policy of one's own lies where the command is typed
     address = PolicyAddress(policy, _stated(contract), execute)
-    open_policy(address)
-    verdict = Verdict(
-        address, exercises_of(suite), difficulties_of(difficulty), seeds, output, first_seed, recorded=record
-    )
+    exercises, difficulties = exercises_of(suite), difficulties_of(difficulty)
+    count = _seeds_of(exercises) if seeds is None else seeds
+    verdict = Verdict(address, exercises, difficulties, count, output, first_seed, recorded=record)
+    _check(verdict)
     with claim_directory(output, "verdict"):
         verdict.open()
         _run(verdict, jobs or os.cpu_count() or 1, ray)
@@ -118,6 +127,25 @@ def _stated(file: Path | None) -> dict[str, Any] | None:
         return None
     read = load_yaml_model(Contract, file, largest=_LARGEST_CONTRACT, writer="you", error=ScenarioError)
     return read.model_dump(mode="json", exclude_unset=True)
+
+
+def _seeds_of(exercises: tuple[str, ...]) -> int:
+    """Return the number of seeds where none is asked for."""
+    from learning.judge.operations import OPERATIONS
+
+    return min([_SEEDS, *(OPERATIONS[name].seeds for name in exercises if name in OPERATIONS)])
+
+
+def _check(verdict: Verdict) -> None:
+    """Raise ScenarioError if the policy cannot be tried in one of the exercises."""
+    from learning.judge.operations import OPERATIONS
+    from learning.judge.policies import open_policy
+
+    if any(name not in OPERATIONS for name in verdict.exercises):
+        open_policy(verdict.policy)
+    for name in verdict.exercises:
+        for difficulty in verdict.difficulties if name in OPERATIONS else ():
+            OPERATIONS[name].order(verdict.policy, difficulty, verdict.first_seed).check()
 
 
 def _compare(first: Path, second: Path) -> None:

@@ -14,6 +14,7 @@ from learning.judge.difficulties import DIFFICULTIES
 from learning.judge.episode import Row, Trial
 from learning.judge.failures import FAILURES
 from learning.judge.intervals import Rate, success_rate
+from learning.judge.operations import OPERATION_FAILURES, OPERATIONS
 from learning.judge.summary import Result, results_of
 from learning.own_directory import whole_file
 
@@ -35,7 +36,7 @@ def write_page(described: Mapping[str, Any], rows: Sequence[Row], file: Path) ->
             (name, DIFFICULTIES[name].description) for name in described["difficulties"]
         ),
         failures=_failures(results),
-        classes=_definitions(FAILURES.items()),
+        classes=_definitions(_classes(row["exercise"] for row in rows)),
         trials="".join(_trial_row(row, recorded=bool(described["recorded"])) for row in rows),
     )
     with whole_file(file) as part:
@@ -86,6 +87,15 @@ def _failures(results: Sequence[Result]) -> str:
         for result in results
         for kind, count in result.failures.items()
     )
+
+
+def _classes(exercises: Iterable[str]) -> Iterable[tuple[str, str]]:
+    """Return the classes of failure of some exercises, with descriptions."""
+    kinds = {name in OPERATIONS for name in exercises}
+    return [
+        *(FAILURES.items() if False in kinds else ()),
+        *(OPERATION_FAILURES.items() if True in kinds else ()),
+    ]
 
 
 def _trial_row(row: Row, *, recorded: bool) -> str:

@@ -22,6 +22,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from learning.judge.episode import Row, Trial, judge_trial, make_environment
+from learning.judge.operation_trial import judge_operation
+from learning.judge.operations import OPERATIONS
 from learning.judge.policies import PolicyAddress, open_policy
 from learning.own_directory import MARKER, whole_file
 from learning.workers import run_calls
@@ -115,7 +117,10 @@ class Verdict:
 
 
 def judge_trials(policy: PolicyAddress, trials: Sequence[Trial], directory: str | None) -> list[Row]:
-    """Return the rows of some trials; recordings go below `directory`."""
+    """Return the rows of some trials of one exercise; recordings go below `directory`."""
+    if trials[0].exercise in OPERATIONS:
+        places = [Path(directory) / trial.name if directory else None for trial in trials]
+        return [judge_operation(policy, *each) for each in zip(trials, places, strict=True)]
     judged = open_policy(policy)
     rows: list[Row] = []
     with ExitStack() as held, ExitStack() as stack:
@@ -149,10 +154,11 @@ def read_verdict(directory: Path) -> list[Row]:
 
 def _groups(trials: Sequence[Trial]) -> Iterator[list[Trial]]:
     """Yield the trials of each exercise and difficulty, some at a time."""
-    for _, alike in groupby(trials, lambda trial: (trial.exercise, trial.difficulty)):
+    for (exercise, _), alike in groupby(trials, lambda trial: (trial.exercise, trial.difficulty)):
         group = list(alike)
-        for first in range(0, len(group), _AT_ONCE):
-            yield group[first : first + _AT_ONCE]
+        at_once = 1 if exercise in OPERATIONS else _AT_ONCE
+        for first in range(0, len(group), at_once):
+            yield group[first : first + at_once]
 
 
 def _read(file: Path) -> dict[str, Any]:

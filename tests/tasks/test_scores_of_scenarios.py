@@ -15,12 +15,15 @@ LONGER = {"suturing": "12 s", "peg-board-by-hand": "3 s"}
 
 WITHOUT_PICTURES = {"clip-and-cut-by-hand": {"participants.endoscope.images": "none"}}
 """Scenes whose pictures take most of the time, and say nothing to the task."""
+SERVED = {"clip-and-cut-by-policy"}
+"""Scenarios that need the server of a policy: task and scene are those of clip-and-cut."""
 
 
 def task_scenarios():
     for name, file in sorted(installed_scenarios().items()):
         participants = YAML(typ="safe", pure=True).load(file)["participants"]
-        if any(spec["kind"].endswith("-task") for spec in participants.values()):
+        watched = any(spec["kind"].endswith("-task") for spec in participants.values())
+        if watched and name not in SERVED:
             yield name
 
 

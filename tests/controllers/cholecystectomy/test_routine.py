@@ -18,6 +18,10 @@ def test_the_17_sub_tasks_follow_each_other_and_clips_and_cuts_are_where_they_sh
     assert world.run() is SubTask.DONE
     assert world.tasks == [SubTask(number) for number in range(1, 19)]
     assert world.state.recoveries == 0
+    assert len(world.instructions) == len(set(world.instructions)) == 17
+    assert world.instructions[0] == "grasp the gallbladder"
+    assert world.instructions[3] == "put the second clip on the cystic duct"
+    assert world.instructions[-2:] == ["cut the cystic artery", "go back from the cut in the cystic artery"]
     assert world.routine.ended == "both tubes are clipped and cut, after 0 recoveries"
     for tube, length in enumerate(lengths()):
         first, second, third = world.clips[tube]

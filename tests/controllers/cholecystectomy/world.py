@@ -48,7 +48,7 @@ class World:
         self.events, self.refused, self.t = ([], []), [], 0
         self.spared = np.full((1, 3), 0.2)
         """Nodes of an organ `wall` to be spared, m."""
-        self.tasks, self.said, self.held = [], [], False
+        self.tasks, self.said, self.instructions, self.held = [], [], [], False
 
     @property
     def state(self):
@@ -104,6 +104,7 @@ class World:
         out = self.routine.step(self.t, PERIOD, Inputs(values, events={k: v for k, v in events.items() if v}))
         self.t += PERIOD
         self.said += [message.data for message in out["status"]]
+        self.instructions += [message.data for message in out["instruction"]]
         if not self.tasks or self.tasks[-1] is not self.state.sub_task:
             self.tasks.append(self.state.sub_task)
         for arm in self.hands:

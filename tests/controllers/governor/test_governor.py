@@ -216,3 +216,21 @@ def test_joint_goals_stay_in_the_range_and_in_the_workspace():
 def test_parameters_that_do_not_fit_are_refused(change, said):
     with pytest.raises(ValueError, match=said):
         GovernorParams.model_validate({"arms": ARM, "contract": CONTRACT, **change})
+
+
+def test_a_clip_applier_closes_a_clip_when_its_jaw_is_shut_after_it_was_wide_open():
+    given = {"arms": {"PSM1": {"instrument": "420327"}}, "contract": CONTRACT, "execute": 5}
+    arm = Arm()
+    arm.driver = Driver(Governor("governor", GovernorParams.model_validate(given)), period_ns=H)
+    arm.driver.set("PSM1/measured_js", [0.0, 0.0, 0.12, 0, 0, 0, *np.zeros(12)])
+    clips = []
+    for opening in (0.0, 0.6, 0.0):
+        rows = np.tile([*START, opening], (10, 1)).ravel()
+        clips.append(0)
+        for _ in range(600):
+            asked = arm.step().driver.outputs["observation"]
+            clips[-1] += len(arm.driver.outputs["PSM1/clip"])
+            if asked:
+                arm.answer(START[:3], actions=rows)
+    assert clips == [0, 0, 1]
+    assert "PSM1/clip" not in Arm().step().driver.outputs

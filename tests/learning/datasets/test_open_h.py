@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import cast
 
 import av
 import numpy as np
@@ -14,6 +15,9 @@ from typer.testing import CliRunner
 import trocar
 from engines.mujoco.pictures import opengl
 from learning.datasets.command_line import app
+from learning.datasets.instructions import instructions
+from learning.datasets.open_h_meta import modality
+from schemas.ros import StringMessage
 
 pytestmark = pytest.mark.xdist_group("data sets")
 META = ("info.json", "episodes.jsonl", "episodes_stats.jsonl", "tasks.jsonl", "README.md", "modality.json")
@@ -127,6 +131,34 @@ def test_truths_are_beside_the_pictures(made: Path, recording: Path) -> None:
     )  # the same in every frame
     world = [source[f"robot.{name}/pose"].values[0, :3] for name in ("piece1", "piece3")]
     assert distance == pytest.approx(np.linalg.norm(world[0] - world[1]), abs=1e-5)
+
+
+class _Told:
+    """A recording of a routine that gives two instructions."""
+
+    ports = {"task.events": "trocar_msgs/msg/TaskEvent", "routine.instruction": "std_msgs/msg/String"}  # noqa: RUF012
+
+    def __getitem__(self, port: str) -> _Told:
+        assert port == "routine.instruction"
+        return self
+
+    def messages(self) -> list[tuple[float, StringMessage]]:
+        return [(0.5, StringMessage(data="grasp")), (1.0, StringMessage(data="clip"))]
+
+
+def test_each_frame_has_the_instruction_of_its_sub_task(recording: Path) -> None:
+    times_ns = np.array([0, 500_000_000, 999_999_999, 1_000_000_000, 3_000_000_000], np.int64)
+    told = instructions(cast("trocar.Recording", _Told()), times_ns, "operate")
+    assert told.tolist() == ["grasp", "grasp", "grasp", "clip", "clip"]
+    without = instructions(trocar.Recording(recording), times_ns, "sort")
+    assert without.tolist() == ["sort"] * 5
+
+
+def test_a_third_arm_follows_the_two_of_open_h() -> None:
+    names = [f"{arm}_pose.position.x" for arm in ("psm1", "psm2", "psm3")]
+    groups = modality({"features": {"observation.state": {"names": names}}})["action"]
+    assert groups["psm3_pose"] == {"start": 16, "end": 23}
+    assert groups["psm3_gripper"] == {"start": 23, "end": 24}
 
 
 def test_ports_of_ones_own_are_not_for_open_h(recording: Path, tmp_path: Path) -> None:
