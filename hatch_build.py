@@ -58,6 +58,14 @@ _EXTENSIONS = (
         include_dirs=[np.get_include()],
         extra_compile_args=_FLAGS,
     ),
+    Extension(
+        "engines.mujoco.pictures.filament._exposure",
+        ["engines/mujoco/pictures/filament/_exposure.c"],
+        # a square root that may set errno is taken one by one
+        extra_compile_args=[*_FLAGS, "/O2"]
+        if sys.platform == "win32"
+        else [*_FLAGS, "-O3", "-fno-math-errno"],
+    ),
     Extension("schemas._cdr", ["schemas/_cdr.c"], include_dirs=[np.get_include()], extra_compile_args=_FLAGS),
 )
 

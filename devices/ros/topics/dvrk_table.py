@@ -54,7 +54,7 @@ _SERVICES = {
 }
 _CARTESIAN_STATES = {name: type_ for name, type_ in crtk.CARTESIAN_STATES.items() if name not in NOT_SERVED}
 _PICTURES = {"image_raw": Image.ros_type, "image_raw/compressed": CompressedImage.ros_type}
-_TRUTH = ("depth", "segmentation", "instances")
+_TRUTH = ("depth", "segmentation", "instances", "normals", "flow", "scene_flow")
 """Names of pictures of truth, where a camera publishes them; no real camera does."""
 _REAL_MAX_AGE_NS = 100_000_000
 """Age of a stale state of a real arm: ten periods of 10 ms."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -23,8 +24,18 @@ __all__ = ["EndoscopeParams", "ViewParams"]
 
 _MOST_PIXELS = 2048
 """Most pixels of a side: an uncompressed picture of 2048 x 2048 is the largest in a message."""
-_MOST_DEPTHS = 3 * _MOST_PIXELS**2 // 4
-"""Most pixels of a depth, four bytes each, in a message."""
+_MOST_BYTES = 3 * _MOST_PIXELS**2
+"""Most bytes of pixels in a message."""
+Truth = Literal["depth", "segmentation", "instances", "normals", "flow", "scene_flow"]
+_TRUTH_BYTES: Mapping[Truth, int] = {
+    "depth": 4,
+    "segmentation": 2,
+    "instances": 2,
+    "normals": 12,
+    "flow": 8,
+    "scene_flow": 12,
+}
+"""Bytes of a pixel."""
 
 
 class ViewParams(Params):
@@ -89,11 +100,12 @@ class EndoscopeParams(SceneParams):
     images: Literal["raw", "compressed", "both", "none"] = Field(
         default="raw", description="what is published of each picture; none: the camera is off"
     )
-    truth: tuple[Literal["depth", "segmentation", "instances"], ...] = Field(
+    truth: tuple[Truth, ...] = Field(
         default=(),
         description=(
             "published beside the pictures, from the geometry and free of noise: depth (m, 32FC1),"
-            " segmentation by class and instances (mono16)"
+            " segmentation by class and instances (mono16), normals (32FC3); flow (px, 32FC2) and scene flow"
+            " (m, 32FC3) from the picture before to this one, with the stamp of the picture before"
         ),
     )
     format: Literal["jpeg", "png"] = Field(default="jpeg", description="of the compressed picture")
@@ -162,9 +174,11 @@ class EndoscopeParams(SceneParams):
     def _truth_fits_a_message(self) -> Self:
         if len(set(self.truth)) < len(self.truth):
             raise ValueError("truth names something twice")
-        if "depth" in self.truth and self.width * self.height > _MOST_DEPTHS:
-            raise ValueError(
-                f"a depth of {self.width} x {self.height} pixels is larger than a message: at most"
-                f" {_MOST_DEPTHS} pixels; `trocar render --modalities` draws larger ones from a recording"
-            )
+        for name in self.truth:
+            if self.width * self.height * _TRUTH_BYTES[name] > _MOST_BYTES:
+                raise ValueError(
+                    f"{name} of {self.width} x {self.height} pixels is larger than a message: at most"
+                    f" {_MOST_BYTES // _TRUTH_BYTES[name]} pixels; `trocar render --modalities` draws larger"
+                    " ones from a recording"
+                )
         return self

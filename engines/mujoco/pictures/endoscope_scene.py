@@ -92,10 +92,18 @@ class EndoscopeScene:
         self._sensor = Sensor(params.sensor, params.width, params.height)
         place_arms(self._model, self._data, params.arms)
         mujoco.mj_kinematics(self._model, self._data)
-        lens = self._mount.pose(self._data)[:3, 3]
-        place = make_place(params, self._model, bodies, lens, self._variation.place_seed)
+        pose = self._mount.pose(self._data)
+        place = make_place(params, self._model, bodies, pose[:3, 3], self._variation.place_seed)
         return FilamentRenderer(
-            self._model, params, self._variation, self._lens.drawn, clip, backend, bodies, place
+            self._model,
+            params,
+            self._variation,
+            self._lens.drawn,
+            clip,
+            backend,
+            bodies,
+            place,
+            pose[:3, 2],
         )
 
     def draw(

@@ -70,7 +70,7 @@ def _bed(centre: Vector, footprint: float, radius: float, seed: int) -> PlacePar
         x, y = (u - 0.5) * side, (v - 0.5) * side
         return centre + np.stack([x, y, _bed_height(x, y, footprint, radius, seed)], axis=1)
 
-    return sheet(place, (side, side), (44, 44), TISSUES["fat"], 0.09)
+    return sheet(place, (side, side), (44, 44), TISSUES["fat"], 0.09)._replace(layer=1)
 
 
 def make_wall(centre: Vector, radius: float, height: float, seed: int) -> PlacePart:
@@ -87,7 +87,7 @@ def make_wall(centre: Vector, radius: float, height: float, seed: int) -> PlaceP
     part = sheet(
         place, (round(2.0 * np.pi * radius / 0.12) * 0.12, 0.24), (32, 12), TISSUES["peritoneum"], 0.12
     )
-    return part._replace(faces=part.faces[:, ::-1], is_shaded=False)
+    return part._replace(faces=part.faces[:, ::-1], layer=2, is_shaded=False)
 
 
 def _loops(centre: Vector, footprint: float, radius: float, towards: float, seed: int) -> Iterator[PlacePart]:

@@ -26,6 +26,8 @@ class PlacePart(NamedTuple):
     recipe: Recipe
     tile: float
     """Side of a tile, m."""
+    layer: int = 0
+    """How many other parts hide it, about, from 0 for the nearest."""
     is_shaded: bool = True
     """Whether shadows fall on it: a third of the cost of a picture, hardly seen far from instruments."""
 

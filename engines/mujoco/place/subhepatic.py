@@ -88,7 +88,7 @@ def _omentum(seed: int) -> PlacePart:
         lobes = 0.004 * ripple(x, y, 0.03, 15 + seed) + 0.0018 * ripple(x, y, 0.011, 16 + seed)
         return np.stack([x, y, _DEEP + share * (-0.016 + lobes - _DEEP)], axis=1)
 
-    return sheet(place, (0.40, 0.16), (110, 44), TISSUES["fat"], 0.09)
+    return sheet(place, (0.40, 0.16), (110, 44), TISSUES["fat"], 0.09)._replace(layer=1)
 
 
 def _duodenum(seed: int) -> PlacePart:

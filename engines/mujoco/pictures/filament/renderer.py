@@ -31,7 +31,7 @@ from schemas.vectors import Vector
 
 __all__ = ["FilamentRenderer"]
 
-_SHADOW_PIXELS = 1024
+_SHADOW_PIXELS = 512
 _SAMPLES = 4
 _BACKGROUND = (0.42, 0.45, 0.48)
 """Colour where nothing is: an even room."""
@@ -59,6 +59,7 @@ class FilamentRenderer:
         backend: Backend,
         bodies: Mapping[str, SoftBody],
         place: Sequence[PlacePart],
+        ahead: Vector,
     ) -> None:
         """Prepare to draw.
 
@@ -71,6 +72,7 @@ class FilamentRenderer:
             backend: the graphics interface to use.
             bodies: soft bodies, drawn beside the model.
             place: surroundings.
+            ahead: direction of the camera at the start, shape (3,).
         """
         self._camera = camera
         exposure = params.sensor.exposure + variation.exposure
@@ -112,7 +114,14 @@ class FilamentRenderer:
             )
             for name, body in bodies.items()
         ]
-        self._place = DrawnPlace(self._context, self._scene, place, noise, variation)
+        self._place = DrawnPlace(
+            self._context,
+            self._scene,
+            place,
+            noise,
+            variation,
+            None if is_room else ahead,  # a lamp far away has one shadow map over the bounds of all
+        )
         self._solids = DrawnSolids(self._context, self._scene)
         # with a fourth byte: without it the driver's pixels are packed one by one, 7 ms for 2 x 640 x 480
         self._pixels = np.zeros((camera.height, 2 * camera.width, 4), np.uint8)

@@ -9,6 +9,7 @@ from mujoco import mjrf
 from numpy.typing import NDArray
 
 from engines.mujoco.textures.surface import Maps, Pixels
+from schemas.vectors import Vector
 
 __all__ = ["Textures", "make_texture", "vertex_layout", "write_mesh"]
 
@@ -84,11 +85,28 @@ def vertex_layout(vertices: int, indices: int) -> mjrf.MeshConfig:
 
 
 def write_mesh(
-    mesh: mjrf.Mesh, layout: mjrf.MeshConfig, vertices: NDArray[np.float32], faces: NDArray[np.uint32]
+    mesh: mjrf.Mesh,
+    layout: mjrf.MeshConfig,
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.uint32],
+    behind: Vector | None = None,
 ) -> None:
-    """Upload vertices, shape (n, 9): position, quaternion of the tangent frame, uv; faces, shape (m, 3)."""
+    """Upload a mesh.
+
+    Args:
+        mesh: to be written.
+        layout: of the mesh.
+        vertices: position, quaternion of the tangent frame, uv, shape (n, 9).
+        faces: vertex indices, shape (m, 3).
+        behind: vector by which the bounds reach farther than the vertices, m. The renderer draws meshes in
+            the order of the middles of their bounds, so the mesh is drawn after those before it.
+    """
     low, high = vertices[:, :3].min(axis=0), vertices[:, :3].max(axis=0)
-    data = mjrf.MeshData(compute_bounds=False, bounds_min=low, bounds_max=high)
+    if behind is not None:
+        low, high = low + np.minimum(behind, 0.0), high + np.maximum(behind, 0.0)
+    data = mjrf.MeshData(
+        compute_bounds=False, bounds_min=low.astype(np.float32), bounds_max=high.astype(np.float32)
+    )
     data.set_vertices(layout, vertices.tobytes())
     data.set_indices(layout, faces.tobytes())
     mesh.upload(data)

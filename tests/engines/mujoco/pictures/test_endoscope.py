@@ -20,7 +20,7 @@ from hub.participant import Inputs, Outputs, Setup
 from hub.testing import check_engine
 from robots.dvrk.endoscope import EYES, optical_in_roll
 from schemas.errors import StateError
-from schemas.ros import CameraInfo, CompressedImage, Image
+from schemas.ros import CameraInfo, CompressedImage, Image, Time
 from schemas.vectors import Vector
 
 PERIOD_NS = 16_000_000
@@ -329,6 +329,34 @@ def test_truth_is_published_beside_the_pictures_and_agrees_with_them(gl: str) ->
         assert info.header == depth.header
 
 
-def test_truth_larger_than_a_message_is_refused() -> None:
-    with pytest.raises(ValueError, match="larger than a message"):
-        make(truth=["depth"], width=2048, height=2048)
+def test_flow_comes_with_the_next_picture_and_leads_to_it(gl: str) -> None:
+    pose = camera_pose()
+    points = np.array([(pose @ [x, y, AHEAD, 1.0])[:3] for x, y in SPREAD])
+    with make(points, truth=["flow", "scene_flow", "normals"]) as endoscope:
+        endoscope.configure(Setup(PERIOD_NS, Path.cwd()))
+        start = state(endoscope)
+        first = endoscope.step(0, PERIOD_NS, Inputs({"qpos": start}))
+        turned = start.copy()
+        turned[3] += 0.01  # roll of the endoscope, rad: pixels turn about the middle of the picture
+        later = endoscope.step(PERIOD_NS, PERIOD_NS, Inputs({"qpos": turned}))
+    assert first["left/flow"] == first["left/scene_flow"] == ()
+    for eye in EYES:
+        (flow,), (moved,), (normals,) = (later[f"{eye}/{name}"] for name in ("flow", "scene_flow", "normals"))
+        assert isinstance(flow, Image)
+        assert isinstance(moved, Image)
+        assert isinstance(normals, Image)
+        assert (flow.encoding, moved.encoding, normals.encoding) == ("32FC2", "32FC3", "32FC3")
+        assert (flow.header.stamp, normals.header.stamp) == (Time.from_ns(0), Time.from_ns(PERIOD_NS))
+        pixel = flow.data.view("<f4").reshape(flow.height, flow.width, 2)
+        rows, columns = np.nonzero(np.isfinite(pixel[..., 0]))
+        assert rows.size
+        from_middle = np.hypot(columns - 0.5 * (flow.width - 1), rows - 0.5 * (flow.height - 1))
+        sizes = np.linalg.norm(pixel[rows, columns], axis=1)
+        assert np.allclose(sizes, 0.01 * from_middle, atol=0.15)  # px, for the distance of the eyes
+        assert np.nanmax(np.abs(moved.data.view("<f4"))) < 1e-6  # the things stand still
+
+
+@pytest.mark.parametrize(("name", "side"), [("depth", 2048), ("flow", 1400), ("normals", 1100)])
+def test_truth_larger_than_a_message_is_refused(name: str, side: int) -> None:
+    with pytest.raises(ValueError, match=f"{name} of .* larger than a message"):
+        make(truth=[name], width=side, height=side)

@@ -55,3 +55,8 @@ def test_a_training_set_lies_on_the_drape() -> None:
     assert np.abs(table.vertices[under, 2]).max() < 2e-3
     assert faces_towards(table, LENS) > 0.97
     assert faces_towards(wall, LENS) == pytest.approx(1.0)
+
+
+def test_what_hides_the_rest_is_drawn_first() -> None:
+    bed, wall, *loops = make_abdomen(LOW, HIGH, LENS)
+    assert max(loop.layer for loop in loops) < bed.layer < wall.layer

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from engines.mujoco.pictures.filament import sensor
 from engines.mujoco.pictures.filament.light_control import LightControl
 from engines.mujoco.pictures.filament.sensor import Sensor
 from engines.mujoco.pictures.sensor_params import SensorParams
@@ -13,8 +14,8 @@ GREY = np.full((96, 120, 3), 128, np.uint8)
 
 
 def test_everything_off_is_the_truth() -> None:
-    sensor = Sensor(SensorParams(vignette=0.0, noise=0.0), 120, 96)
-    assert np.array_equal(sensor.expose(GREY, 0, 0), GREY)
+    camera = Sensor(SensorParams(vignette=0.0, noise=0.0), 120, 96)
+    assert np.array_equal(camera.expose(GREY, 0, 0), GREY)
 
 
 def test_corners_are_darker_and_the_middle_is_not() -> None:
@@ -24,13 +25,13 @@ def test_corners_are_darker_and_the_middle_is_not() -> None:
 
 
 def test_noise_has_no_bias_grows_with_light_and_differs_between_pictures() -> None:
-    sensor = Sensor(SensorParams(vignette=0.0, noise=3.0), 120, 96)
-    one, other = sensor.expose(GREY, 0, 0), sensor.expose(GREY, 40_000_000, 0)
+    camera = Sensor(SensorParams(vignette=0.0, noise=3.0), 120, 96)
+    one, other = camera.expose(GREY, 0, 0), camera.expose(GREY, 40_000_000, 0)
     assert abs(float(one.mean()) - 128.0) < 0.5
     assert not np.array_equal(one, other)
-    assert not np.array_equal(one, sensor.expose(GREY, 0, 1))
-    assert np.array_equal(one, sensor.expose(GREY, 0, 0))  # drawn again
-    assert one.std() > 1.3 * sensor.expose(GREY // 4, 0, 0).std()
+    assert not np.array_equal(one, camera.expose(GREY, 0, 1))
+    assert np.array_equal(one, camera.expose(GREY, 0, 0))  # drawn again
+    assert one.std() > 1.3 * camera.expose(GREY // 4, 0, 0).std()
 
 
 def test_a_warm_balance_is_red_and_automatic_balance_removes_most_of_a_cast() -> None:
@@ -55,12 +56,12 @@ def test_fog_takes_contrast_until_it_is_wiped_and_dirt_darkens_places() -> None:
         "fog": 0.9,
         "events": [event | {"fog": 0.0}, event | {"time": "3 s", "dirt": 1.0}],
     }
-    sensor = Sensor(SensorParams.model_validate(params), 120, 96)
-    contrast = [float(sensor.expose(stripes, round(1e9 * t), 0).std()) for t in (0.0, 1.25, 2.0)]
+    camera = Sensor(SensorParams.model_validate(params), 120, 96)
+    contrast = [float(camera.expose(stripes, round(1e9 * t), 0).std()) for t in (0.0, 1.25, 2.0)]
     assert contrast[0] < 0.8 * contrast[1]
     assert contrast[1] < 0.9 * contrast[2]
-    assert np.array_equal(sensor.expose(stripes, 2_000_000_000, 0), stripes)
-    smeared = [sensor.expose(GREY, 4_000_000_000, eye).astype(int) for eye in (0, 1)]
+    assert np.array_equal(camera.expose(stripes, 2_000_000_000, 0), stripes)
+    smeared = [camera.expose(GREY, 4_000_000_000, eye).astype(int) for eye in (0, 1)]
     assert (smeared[0] < 100).any()
     assert (smeared[0] == 128).any()
     assert not np.array_equal(smeared[0], smeared[1])
@@ -72,6 +73,33 @@ def test_a_video_link_loses_fine_colours() -> None:
     sent = Sensor(SensorParams(vignette=0.0, noise=0.0, compression=70), 120, 96).expose(picture, 0, 0)
     assert sent.shape == picture.shape
     assert np.abs(sent[..., 0].astype(int) - sent[..., 2]).mean() < 60
+
+
+@pytest.mark.parametrize("params", [{}, {"noise": 0.0}, {"noise": 8.0, "warmth": 0.6, "vignette": 1.0}])
+def test_compiled_and_arrays_give_the_same_picture(
+    params: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if sensor.compiled is None:
+        pytest.skip("no C compiler")
+    drawn = np.random.default_rng(0).integers(0, 256, (96, 120, 4), np.uint8)[:, :, :3]  # a row has gaps
+    one = Sensor(SensorParams(white_balance="automatic", **params), 120, 96)
+    other = Sensor(SensorParams(white_balance="automatic", **params), 120, 96)
+    for time in (0, 40_000_000):
+        fast = one.expose(drawn, time, 0)
+        with monkeypatch.context() as patched:
+            patched.setattr(sensor, "_expose", sensor.expose_by_arrays)
+            assert np.array_equal(other.expose(drawn, time, 0), fast)
+
+
+def test_arrays_of_another_size_are_refused() -> None:
+    if sensor.compiled is None:
+        pytest.skip("no C compiler")
+    light, gains = np.ones(GREY.shape, np.float32), np.ones(3 * 120, np.float32)
+    for wrong in (GREY[:-1], GREY[:, 1:], GREY[..., :2], GREY[::1, ::1, ::-1]):
+        with pytest.raises(ValueError, match="sizes"):
+            sensor.compiled.expose(wrong, light, gains, None, 0.0, np.empty_like(GREY))
+    with pytest.raises(ValueError, match="sizes"):
+        sensor.compiled.expose(GREY, light, gains, light[1:], 0.0, np.empty_like(GREY))
 
 
 @pytest.mark.parametrize("start", [40, 100, 240])
