@@ -37,6 +37,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(MARKERS[fixture])
 
 
+@pytest.fixture(scope="session")
+def opengl() -> None:
+    """Skip a test of pictures where nothing draws; asked by tests, as the answer takes a process or two."""
+    opengl = pytest.importorskip("engines.mujoco.pictures.opengl", reason="needs trocar[mujoco]")
+    if not (found := opengl.find()).name:
+        pytest.skip(f"no OpenGL: {found.detail}")
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_runtest_teardown() -> None:
     """Fail a test that leaves its process with a real-time priority, which its children inherit."""

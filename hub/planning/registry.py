@@ -6,7 +6,6 @@ A package adds kinds with entry points in the groups `trocar.engines`, `trocar.c
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, PackageNotFoundError, distribution, entry_points
@@ -180,16 +179,20 @@ def installed_packages(dist: Distribution, extra: str) -> list[str]:
     ]
 
 
-def _extra_requirements(dist: Distribution | None, extra: str) -> Iterator[Requirement]:
+@cache
+def _extra_requirements(dist: Distribution | None, extra: str) -> tuple[Requirement, ...]:
+    """Return the requirements of an extra. Markers are slow, and each scenario asks for its kinds anew."""
+    found: list[Requirement] = []
     for requirement in _all_requirements(dist) if dist else ():
         marker = requirement.marker
         if not marker or marker.evaluate({"extra": ""}) or not marker.evaluate({"extra": extra}):
             continue
         if dist and requirement.name == _name(dist):  # an extra that consists of others
             for part in sorted(requirement.extras):
-                yield from _extra_requirements(dist, part)
+                found += _extra_requirements(dist, part)
         else:
-            yield requirement
+            found.append(requirement)
+    return tuple(found)
 
 
 @cache

@@ -5,14 +5,13 @@ import pytest
 
 import trocar
 from controllers.swaying_phantom import SwayingPhantom, SwayingPhantomParams
-from engines.mujoco.pictures import opengl
 from hub.participant import Inputs, Setup
 from hub.recording.report_vision import vision_figures
 from hub.testing import check_engine
 
 pytestmark = [
     pytest.mark.xdist_group("vision"),
-    pytest.mark.skipif(not opengl.find().name, reason="no OpenGL"),
+    pytest.mark.usefixtures("opengl"),
 ]
 
 

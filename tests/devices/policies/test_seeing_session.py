@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import trocar
-from engines.mujoco.pictures import opengl
 from tests.devices.policies.servers import groot_server
 
 pytest.importorskip("ruckig")
@@ -66,7 +65,7 @@ def ahead(endpoint, data):
     return [{"psm1_pose": pose, "psm1_gripper": jaw, "psm2_pose": pose, "psm2_gripper": jaw}, {}]
 
 
-@pytest.mark.skipif(not opengl.find().name, reason="without OpenGL there are no pictures")
+@pytest.mark.usefixtures("opengl")
 def test_two_arms_are_led_by_what_a_policy_sees_in_the_camera_frame(tmp_path):
     with groot_server(ahead) as (address, seen):
         (tmp_path / "two.yaml").write_text(SCENARIO.format(address=address))
