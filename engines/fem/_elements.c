@@ -47,4 +47,3 @@ void elastic_forces(const Body *body, float seconds)
 #endif
     add_forces(body, seconds, paired, body->blocks);
 }
-float scratch_F[2000000] __attribute__((aligned(64)));

@@ -14,7 +14,7 @@ from robots.vector3 import cross
 from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
-__all__ = ["NO_EDGES", "Edges", "Scissors"]
+__all__ = ["NO_EDGES", "Edges", "Scissors", "closing_rates"]
 
 _MOVING = 0.02
 """Least rate at which scissors open or close, rad/s: above the trembling of jaws that are held."""
@@ -67,23 +67,19 @@ class Edges:
         self.swept: Vector = np.zeros(1)
         """Area that has been cut, m^2."""
 
-    def sharpen(self, start: Vector, end: Vector, seconds: float) -> None:
-        """Let scissors cut if they close in a step of `seconds`, press if still, and leave if they open.
+    def sharpen(self, closing: Sequence[float]) -> None:
+        """Let scissors cut if they close, press if still, and leave if they open.
 
-        `start`, `end`: centres of the spheres, m, shapes (k, 3).
+        closing: rate of each pair from `closing_rates`.
         """
-        for pair in self._scissors:
-            closing = (self._opening(pair, start) - self._opening(pair, end)) / seconds
-            now = self._tissue if closing > _MOVING else _ABSENT if closing < -_MOVING else np.inf
+        for pair, rate in zip(self._scissors, closing, strict=False):  # NO_EDGES: none
+            now = self._tissue if rate > _MOVING else _ABSENT if rate < -_MOVING else np.inf
             self.toughness[[pair.left, pair.right]] = now
 
-    def _opening(self, pair: Scissors, centres: Vector) -> float:
-        """Return the sine of the angle between a pair of edges, negative once they have passed each other."""
-        (left, left_end), (right, right_end) = centres[self.ends[[pair.left, pair.right]]]
-        u, v, axis = left_end - left, right_end - right, centres[pair.hinge] - 0.5 * (left + right)
-        normal = cross(v, u)
-        size = sqrt(_dot(u, u) * _dot(v, v))
-        return copysign(sqrt(_dot(normal, normal)) / size, _dot(normal, axis)) if size else 0.0
+    @property
+    def sharp(self) -> NDArray[np.bool_]:
+        """Edges that cut now, shape (n,)."""
+        return np.isfinite(self.toughness) & (self.toughness > 0.0)
 
     @property
     def area(self) -> float:
@@ -94,6 +90,30 @@ class Edges:
     def state(self) -> tuple[NDArray[np.generic], ...]:
         """Arrays that change."""
         return self.element, self.front, self.ahead, self.swept
+
+
+def closing_rates(
+    scissors: Sequence[Scissors],
+    ends: Sequence[tuple[int, int]],
+    start: Vector,
+    end: Vector,
+    seconds: float,
+) -> list[float]:
+    """Return the rate at which the sine of the angle between the edges of each pair falls, 1/s.
+
+    ends: the spheres at the ends of each edge. start, end: centres of the spheres, m, shapes (k, 3),
+    `seconds` apart.
+    """
+    return [(_opening(pair, ends, start) - _opening(pair, ends, end)) / seconds for pair in scissors]
+
+
+def _opening(pair: Scissors, ends: Sequence[tuple[int, int]], centres: Vector) -> float:
+    """Return the sine of the angle between a pair of edges, negative once they have passed each other."""
+    (left, left_end), (right, right_end) = centres[[ends[pair.left], ends[pair.right]]]
+    u, v, axis = left_end - left, right_end - right, centres[pair.hinge] - 0.5 * (left + right)
+    normal = cross(v, u)
+    size = sqrt(_dot(u, u) * _dot(v, v))
+    return copysign(sqrt(_dot(normal, normal)) / size, _dot(normal, axis)) if size else 0.0
 
 
 def _dot(a: Vector, b: Vector) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from engines.fem.attachments.attachments import Attachments, attachment_ports
 from engines.fem.blood.blood import Blood, bleeds, blood_ports
 from engines.fem.boxes import box_rows
-from engines.fem.edges import Scissors
+from engines.fem.edges import Scissors, closing_rates
 from engines.fem.heat.heating import Heating, heat_ports
 from engines.fem.layer_outputs import LayerOutputs, layer_ports
 from engines.fem.organ import Organ, relaxation
@@ -57,8 +57,9 @@ class FemEngine(Stepped):
         self._heating: Heating | None = None
         self._layers: list[LayerOutputs | None] = []
         """Outputs of each organ with layers."""
-        self._sharpened: list[Organ] = []
-        """Organs that scissors may cut."""
+        self._blades: list[tuple[int, int]] = []
+        """Spheres at the ends of all edges."""
+        self._scissors: list[Scissors] = []
         self._together: Together | None = None
         self._blood: Blood | None = None
         self._attachments: Attachments | None = None
@@ -134,10 +135,12 @@ class FemEngine(Stepped):
                 grasp.take_away(t)
         for probe in self._probes:
             probe.begin(inputs, seconds)
-        for organ in self._sharpened:
-            organ.sharpen(seconds)
+        path = self._spheres.path
+        closing = closing_rates(self._scissors, self._blades, path[0], path[-1], seconds)
+        for organ in self._organs:
+            organ.sharpen(closing)
         if self._attachments is not None:
-            self._attachments.begin(seconds)
+            self._attachments.begin(closing)
         if self._together is None:
             for organ in self._organs:
                 organ.advance(seconds, self.params.gravity)
@@ -263,7 +266,6 @@ class FemEngine(Stepped):
     def close(self) -> None:
         """Forget the organs."""
         self._heating = self._together = self._blood = self._attachments = None
-        self._sharpened = []
         for kept in (self._organs, self._probes, self._grasps, self._surfaces, self._layers):
             kept.clear()
 
@@ -286,7 +288,7 @@ class FemEngine(Stepped):
         names = [bond.name for bond, own in zip(bonds, radii, strict=True) for _ in own]
         self._spheres = Spheres(np.concatenate([np.zeros(0), *radii]), self._sub_steps, names)
         series = [relaxation(organ) for organ in self.params.organs.values()]
-        first, blades, scissors = 0, list[tuple[int, int]](), list[Scissors]()
+        first, blades, scissors = 0, self._blades, self._scissors
         for bond in bonds:
             name, params = bond.name, self.params.probes[bond.name]
             surfaces = self._surfaces if self.params.has_sub_grid(name) else None
@@ -302,7 +304,6 @@ class FemEngine(Stepped):
                 outputs.update(nothing_held(name))
         for organ in self._organs:
             organ.meet(self._spheres, blades, scissors)
-        self._sharpened = self._organs if scissors else []
         if self._attachments is not None:
             self._attachments.meet(self._spheres, blades, scissors)
         for organ in self._changing:

@@ -184,9 +184,9 @@ class Organ:
         """Return the arguments of `_solid.c` for a step of `seconds`, the same objects for every step."""
         return self.solid.arguments(seconds, self.way, self.forces, self.friction, gravity, 0.0, self.every)
 
-    def sharpen(self, seconds: float) -> None:
-        """Let scissors cut that close in a step of `seconds`."""
-        self._edges.sharpen(self.way.path[0], self.way.path[-1], seconds)
+    def sharpen(self, closing: Sequence[float]) -> None:
+        """Let scissors cut that close. `closing`: rates as for `Edges.sharpen`."""
+        self._edges.sharpen(closing)
 
     def follow_surface(self) -> None:
         """Note faces that have been cut open."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,20 +122,22 @@ class Attachments:
         self._spheres = spheres
         self._edges = Edges(blades, 0, 1.0, scissors) if blades else None
 
-    def begin(self, seconds: float) -> None:
-        """Note where the ties are before a step of `seconds`, if blades may cut them."""
+    def begin(self, closing: Sequence[float]) -> None:
+        """Note where the ties are before a step, if blades cut in it. `closing`: as for `Edges.sharpen`."""
         if self._edges is not None:
-            self._edges.sharpen(self._spheres.path[0], self._spheres.path[-1], seconds)
-            self._before = self._middles()
+            self._edges.sharpen(closing)
+            if self._edges.sharp.any():
+                self._before = self._middles()
 
     def follow(self, heats: Sequence[Heat]) -> None:
         """Part what was cut or burnt in a step, and note what has parted. `heats`: of all organs, or none."""
         whole = ~np.isinf(self.widest)
-        self._note(~whole & ~self._known, "pulled", np.unique(self._holders()))
-        if self._edges is not None:
-            self._note(whole & self._crossed(), "cut", np.unique(self._edges.ends))
+        self._note(~whole & ~self._known, "pulled", self._holders)
+        edges = self._edges
+        if edges is not None and edges.sharp.any():
+            self._note(whole & self._crossed(edges), "cut", lambda: edges.ends)
         if any(not heat.is_cold for heat in heats):
-            self._note(whole & self._is_burnt(heats), "burnt", np.arange(len(self._spheres.radii)))
+            self._note(whole & self._is_burnt(heats), "burnt", lambda: np.arange(len(self._spheres.radii)))
 
     def conduct(self, heats: Sequence[Heat], seconds: float) -> None:
         """Let heat go through whole ties for `seconds`. `heats`: of all organs."""
@@ -172,20 +174,21 @@ class Attachments:
         self.widest[:] = widest
         self._known[:] = np.isinf(widest)
 
-    def _note(self, parted: NDArray[np.bool_], why: str, spheres: NDArray[np.integer]) -> None:
+    def _note(self, parted: NDArray[np.bool_], why: str, spheres: Callable[[], NDArray[np.integer]]) -> None:
         """Part these ties, if they are whole; say so for each pair of organs, by the nearest of the spheres.
 
         Torn and cut surfaces are raw, and bleed.
         """
         if not parted.any():
             return
+        causes = np.unique(spheres())
         self.widest[parted], self._known[parted] = np.inf, True
         kind = FaceKind.COAGULATED if why == "burnt" else FaceKind.CUT
         for i, organ in enumerate(self._organs):
             own = parted & (self._one == i)
             if own.any():
                 places = organ.solid.nodes[organ.solid.tetrahedra[self._element[own], self._corner[own]]]
-                instruments = self._spheres.nearest(places, spheres)
+                instruments = self._spheres.nearest(places, causes)
                 organ.events.add("detached", self._area[own], places, instruments)
             organ.expose(np.union1d(self._own_slot[own], self._slot[parted & (self._other == i)]), kind)
 
@@ -204,14 +207,12 @@ class Attachments:
             found[its, 1] = nodes[organ.solid.tetrahedra[elements]].mean(axis=1)
         return found
 
-    def _crossed(self) -> NDArray[np.bool_]:
+    def _crossed(self, edges: Edges) -> NDArray[np.bool_]:
         """Return which ties, between the middles of their elements, an edge has swept across, shape (t,)."""
-        assert self._edges is not None
         now = self._middles()
         moved = (now - self._before).mean(axis=1)
         found = np.zeros(len(now), np.bool_)
-        sharp = np.isfinite(self._edges.toughness) & (self._edges.toughness > 0.0)
-        for first, last in self._edges.ends[sharp]:
+        for first, last in edges.ends[edges.sharp]:
             begun, ended = (self._spheres.path[k][[first, last]] for k in (0, -1))
             low, high = np.minimum(begun.min(axis=0), ended.min(axis=0)), np.maximum(begun, ended).max(axis=0)
             near = ((now.max(axis=1) >= low) & (now.min(axis=1) <= high)).all(axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engines.bullet.params import BulletParams
-from engines.fem.edges import Edges, Scissors
+from engines.fem.edges import Edges, Scissors, closing_rates
 from tests.engines.fem.rig import FemRig, params
 
 STRIP = {
@@ -99,11 +99,12 @@ def test_wild_scissors_leave_no_nan():
 
 
 def test_the_side_of_the_hinge_says_where_closing_goes():
-    edges = Edges([(0, 1), (2, 3)], 40, 200.0, [Scissors(0, 1, 4)])
+    ends, scissors = [(0, 1), (2, 3)], [Scissors(0, 1, 4)]
+    edges = Edges(ends, 40, 200.0, scissors)
     for start, end, sharp in ((0.2, 0.1, True), (0.1, 0.2, False), (0.0, -0.1, True), (-0.1, 0.0, False)):
-        edges.sharpen(spheres(start), spheres(end), 1.0)
+        edges.sharpen(closing_rates(scissors, ends, spheres(start), spheres(end), 1.0))
         assert edges.toughness.tolist() == [200.0 if sharp else -1.0] * 2
-    edges.sharpen(spheres(0.2), spheres(0.2 - 1e-3), 1.0)
+    edges.sharpen(closing_rates(scissors, ends, spheres(0.2), spheres(0.2 - 1e-3), 1.0))
     assert np.isinf(edges.toughness).all(), "a held jaw trembles"
 
 
