@@ -25,6 +25,7 @@ import statistics
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter, process_time
@@ -219,13 +220,17 @@ class Meter:
 
 
 def _tree_s() -> float:
-    """Return the processor time of this process and of its children that run."""
-    children = [
-        int(child)
-        for task in Path("/proc/self/task").iterdir()
-        for child in (task / "children").read_text().split()
-    ]
-    return process_time() + sum(map(cpu_s, children))
+    """Return the processor time of this process, of its children that run, and of those that have ended."""
+    children: set[str] = set()
+    for task in Path("/proc/self/task").iterdir():
+        with suppress(FileNotFoundError):  # the thread has just ended
+            children.update((task / "children").read_text().split())
+    ended = os.times()
+    running = 0.0
+    for child in children:
+        with suppress(FileNotFoundError):  # has just ended, and is not yet among the ended ones
+            running += cpu_s(int(child))
+    return process_time() + ended.children_user + ended.children_system + running
 
 
 def run_session(case: Case, seconds: float) -> Cost:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, cast
 import trocar
 from devices.policies.policy import BACKENDS
 from learning.judge.difficulties import DIFFICULTIES
+from learning.judge.failures import FAILURES
 from learning.judge.policies import PolicyAddress
 from robots.policies.contract import Contract
 from schemas.errors import ScenarioError
@@ -129,7 +130,7 @@ OPERATIONS: Mapping[str, Operation] = MappingProxyType(
 OPERATION_FAILURES: Mapping[str, str] = MappingProxyType(
     {
         "session failed": "the session ended with an error: see the column error",
-        "policy failed": "the arms held at the end because the policy gave no valid answer",
+        "policy failed": FAILURES["policy failed"],
         "common duct injured": "the common bile duct was clipped, cut or burnt",
         "hepatic artery injured": "the hepatic artery was clipped, cut or burnt",
         "bowel injured": "the bowel was burnt",

@@ -91,11 +91,8 @@ def _failures(results: Sequence[Result]) -> str:
 
 def _classes(exercises: Iterable[str]) -> Iterable[tuple[str, str]]:
     """Return the classes of failure of some exercises, with descriptions."""
-    kinds = {name in OPERATIONS for name in exercises}
-    return [
-        *(FAILURES.items() if False in kinds else ()),
-        *(OPERATION_FAILURES.items() if True in kinds else ()),
-    ]
+    kinds = [OPERATION_FAILURES if name in OPERATIONS else FAILURES for name in exercises]
+    return {kind: text for one in kinds for kind, text in one.items()}.items()
 
 
 def _trial_row(row: Row, *, recorded: bool) -> str:

@@ -28,7 +28,7 @@ class Stay:
     def act(self, observation):
         self.asked += 1
         row = observation["state"].astype(float)
-        row[7::8] = 0.6 if self.asked < 4 else 0.0
+        row[7::8] = 0.6 if self.asked < 3 else 0.0
         return [row] * 10
 '''
 
@@ -157,14 +157,14 @@ def test_a_contract_that_does_not_fit_is_a_row():
 def test_a_policy_in_a_short_operation_verifies_without_the_policy(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("clip-and-cut", "clip-and-cut-by-policy"):
-        text = installed_scenarios()[name].read_text().replace("duration: 150 s", "duration: 1.5 s")
+        text = installed_scenarios()[name].read_text().replace("duration: 150 s", "duration: 1 s")
         (tmp_path / f"{name}.yaml").write_text(text)
     short = Operation(str(tmp_path / "clip-and-cut.yaml"), str(tmp_path / "clip-and-cut-by-policy.yaml"))
     monkeypatch.setattr(operation_trial, "OPERATIONS", {"ClipAndCut": short})
     (tmp_path / "stay.py").write_text(STAYING)
     address = PolicyAddress("python:stay.py:Stay", {"cameras": {}})
     (row,) = judge_trials(address, [TRIAL], str(tmp_path))
-    assert (row["failure"], row["error"], row["steps"]) == ("not finished", None, 750)
+    assert (row["failure"], row["error"], row["steps"]) == ("not finished", None, 500)
     recording = tmp_path / TRIAL.name
     assert len(trocar.Recording(recording)["governor.PSM1/clip"]) == 1
     (tmp_path / "stay.py").unlink()
