@@ -55,6 +55,7 @@ __all__ = [
     "SurfaceChange",
     "SurfaceFilm",
     "TaskEvent",
+    "TiedPlaces",
     "TissueEvent",
     "TissueGrasp",
     "TubeClips",
@@ -199,6 +200,18 @@ class SurfaceFilm(Message):
     """Wet nodes, ascending."""
     thickness: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
     """Thickness of the film at each of these nodes, in steps of 10 um; 255: 2.55 mm or more."""
+
+
+class TiedPlaces(Message):
+    """Where an attachment still ties its two organs together."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/TiedPlaces"
+    header: Header
+    attachment: String
+    points_m: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Middle between the two organs at each whole tie in `header.frame_id`: x, y, z, one after the other."""
+    areas_m2: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Area that each of these ties stands for."""
 
 
 class TubeLine(Message):

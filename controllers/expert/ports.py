@@ -11,7 +11,7 @@ from robots.dvrk import crtk
 from schemas.ports import Port
 from schemas.ros import Float64Message, JointState, PoseStamped, StringMessage
 
-__all__ = ["EVENTS", "PROGRESS", "expert_ports", "hand_ports"]
+__all__ = ["EVENTS", "PROGRESS", "arm_ports", "expert_ports", "hand_ports"]
 
 EVENTS = ("error", "warning")
 """Refusals of the motion controller."""
@@ -50,12 +50,17 @@ def expert_ports(arms: Iterable[str], things: Iterable[str]) -> tuple[Port, ...]
 
 def hand_ports(arm: str) -> Iterator[Port]:
     """Yield the ports of one hand of any expert."""
-    yield signal_in(f"{arm}/local/measured_cp", PoseStamped, frame=crtk.base_frame(arm))
+    yield from arm_ports(arm)
     yield measured_joints(f"{arm}/jaw/measured_js", ("jaw",))
+    yield event_out(f"{arm}/jaw/move_jp", JointState)
+
+
+def arm_ports(arm: str) -> Iterator[Port]:
+    """Yield the ports of one hand whose instrument has no jaw."""
+    yield signal_in(f"{arm}/local/measured_cp", PoseStamped, frame=crtk.base_frame(arm))
     for event in EVENTS:
         yield event_in(f"{arm}/{event}", StringMessage)
     yield event_out(f"{arm}/servo_cp", PoseStamped)
-    yield event_out(f"{arm}/jaw/move_jp", JointState)
 
 
 def _phase_port(arm: str) -> Port:

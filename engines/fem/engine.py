@@ -187,7 +187,7 @@ class FemEngine(Stepped):
         for i, layers in enumerate(self._layers):
             if layers is not None:
                 outputs |= layers.outputs(None if self._heating is None else self._heating.heats[i].dead)
-        return outputs if self._attachments is None else outputs | self._attachments.outputs()
+        return outputs if self._attachments is None else outputs | self._attachments.outputs(t)
 
     def state_hash(self) -> int:
         """Return 64 bits of the displacements, and of the probes and grasps."""

@@ -17,10 +17,12 @@ from engines.fem.organ import Organ
 from engines.fem.spheres import Spheres
 from engines.tissue.organs.anchors import AnchorParams
 from engines.tissue.organs.params import OrganParams
-from hub.participant import signal_out
+from hub.participant import Value, signal_out
 from schemas.errors import ScenarioError
 from schemas.ports import Port
+from schemas.ros import Header, Time
 from schemas.soft_surface import FaceKind
+from schemas.trocar_msgs import TiedPlaces
 from schemas.vectors import Vector
 
 __all__ = ["Attachments", "attachment_ports"]
@@ -51,6 +53,13 @@ def attachment_ports(attachments: Mapping[str, AttachmentParams], period_ns: int
                 description=f"force on '{params.organs[0]}', mean of a step",
                 size=3,
                 unit="N",
+                frame="world",
+                period_ns=period_ns,
+            ),
+            signal_out(
+                f"{name}/ties",
+                TiedPlaces,
+                "where the organs still hang together",
                 frame="world",
                 period_ns=period_ns,
             ),
@@ -154,17 +163,25 @@ class Attachments:
             shares, gaps = self.rest[ties, :3], self.rest[ties, 3]
             conduct(heats[i], heats[j], nodes, faces, shares, self._area[ties], gaps, seconds)
 
-    def outputs(self) -> dict[str, Vector]:
-        """Return freed areas and forces."""
+    def outputs(self, t: int) -> dict[str, Value]:
+        """Return freed and tied areas, forces, and the places that are tied, at `t` ns."""
         count, parted = len(self._names), np.isinf(self.widest)
         lost: Vector = np.where(parted, self._area, 0.0)
         freed = np.bincount(self._number, lost, count).astype(np.float64)
         tied = np.bincount(self._number, self._area - lost, count).astype(np.float64)
         forces = [np.bincount(self._number, self.force[:, i], count) for i in range(3)]
-        found: dict[str, Vector] = {}
+        found: dict[str, Value] = {}
+        places = self._places()
         for k, name in enumerate(self._names):
             found[f"{name}/freed"], found[f"{name}/tied"] = freed[k : k + 1], tied[k : k + 1]
             found[f"{name}/force"] = np.array([one[k] for one in forces])
+            whole = ~parted & (self._number == k)
+            found[f"{name}/ties"] = TiedPlaces(
+                header=Header(stamp=Time.from_ns(t), frame_id="world"),
+                attachment=name,
+                points_m=places[whole].ravel(),
+                areas_m2=self._area[whole],
+            )
         for name, ties in self._lower.items():
             found[f"{name}/lower_third"] = lost[ties].sum(keepdims=True) / self._area[ties].sum()
         return found
@@ -191,6 +208,17 @@ class Attachments:
                 instruments = self._spheres.nearest(places, causes)
                 organ.events.add("detached", self._area[own], places, instruments)
             organ.expose(np.union1d(self._own_slot[own], self._slot[parted & (self._other == i)]), kind)
+
+    def _places(self) -> Vector:
+        """Return the middle between the two organs at each tie, m, shape (t, 3)."""
+        found = np.zeros((len(self.widest), 3))
+        for i, organ in enumerate(self._organs):
+            nodes = organ.solid.nodes
+            own, its = self._one == i, self._other == i
+            found[own] += 0.5 * nodes[organ.solid.tetrahedra[self._element[own], self._corner[own]]]
+            faces = organ.solid.faces[self._slot[its]]  # -1 of a face that has gone: its tie has parted
+            found[its] += 0.5 * (self.rest[its, :3, None] * nodes[faces]).sum(axis=1)
+        return found
 
     def _holders(self) -> NDArray[np.int32]:
         """Return the spheres that hold tissue."""

@@ -206,6 +206,22 @@ def test_organs_that_are_far_apart_cannot_be_attached():
         PlateRig(flap={"position": ["1 mm", "0.7 mm", "14.3 mm"]})
 
 
+def test_an_output_says_where_organs_still_hang_together():
+    plate = PLATE | {"lower_end": ["-5 mm", 0.0, 0.0], "opened": 0.5}
+    with PlateRig(plate=plate) as rig:
+        rig.hold(0.02)
+        ties = rig.outputs["plate/ties"]
+        points = ties.points_m.reshape(-1, 3)
+        assert ties.areas_m2.sum() == pytest.approx(float(rig.outputs["plate/tied"][0]), rel=1e-9)
+        assert len(points) == len(ties.areas_m2) == int((~np.isinf(rig.ties.widest)).sum())
+        assert points[:, 0].min() > -0.002  # the half of the flap that is not opened
+        nodes, bed = rig.flap.nodes, rig.engine._organs[0].nodes
+        assert bed[:, 2].max() < points[:, 2].mean() < nodes[:, 2].min() + 0.3e-3
+        rig.ties.widest[:] = np.inf
+        rig.hold(0.02)
+        assert not rig.outputs["plate/ties"].points_m.size
+
+
 def test_attachments_need_contact_of_organs():
     with pytest.raises(ValueError, match="leave organ_contact on"):
         given(organ_contact=False)

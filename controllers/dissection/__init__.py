@@ -1,0 +1,1 @@
+"""Hands that free the gallbladder from the liver with the hook."""

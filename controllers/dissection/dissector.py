@@ -1,0 +1,210 @@
+"""Frees the gallbladder from its bed: the hook burns tied places, the nearest to the free end first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from controllers.cholecystectomy.approach import withdraw
+from controllers.cholecystectomy.surgeon_hand import SurgeonHand
+from controllers.dissection.hook_hand import HookHand
+from controllers.dissection.lifting import Lifting
+from controllers.dissection.params import DissectionParams
+from controllers.dissection.sight import Sight
+from controllers.dissection.step import Failure, Step
+from schemas.errors import MotionError
+from schemas.vectors import Vector
+
+__all__ = ["Dissector"]
+
+_BEFORE = 20.0e-3
+"""Length of the straight way to a tied place, m."""
+_BESIDE = 12.0e-3
+"""Distance of the next place up to which the hook stays in the gap, m."""
+_GENTLE, _FINE = 0.3, 0.15
+"""Shares of the speed before tissue, and in the gap."""
+_EDGE = 7.0e-3
+"""Depth along the bed of the edge of what is tied: its places may be next, m."""
+_AWAY = 0.1
+"""Time with power without heat after which the hook goes deeper, s."""
+_DEEPER, _DEEPEST = 0.8e-3, 5.0e-3
+"""Length of a way deeper, and of all of them, m."""
+_PAST = 2.5e-3
+"""Distance beyond which a tied place is another one, m."""
+
+
+class Dissector(Lifting):
+    """Grasps and lifts the gallbladder, and burns what ties it to the liver."""
+
+    def __init__(self, params: DissectionParams, hook: HookHand, grasper: SurgeonHand) -> None:
+        super().__init__(params, hook, grasper)
+        self.power = 0.0
+        """Power of the generator in this step, W."""
+        self._steps: dict[Step, Callable[[], None]] = {
+            Step.AIM_GRASP: self._aim_grasp,
+            Step.HOVER_GRASP: self.hover_grasp,
+            Step.REACH_GRASP: self.reach_grasp,
+            Step.CLOSE: self.close,
+            Step.LIFT: self._lift,
+            Step.PLAN: self._plan,
+            Step.HOVER: self._hover,
+            Step.REACH: self._reach,
+            Step.BURN: self._burn,
+            Step.LEAVE: self._leave,
+        }
+
+    def settles(self, hand: SurgeonHand) -> bool:
+        """Whether the measured error of a hand is corrected at the end of its line."""
+        grasps = self.state.step in (Step.HOVER_GRASP, Step.REACH_GRASP)
+        return grasps if hand is self.grasper else self.state.step in (Step.HOVER, Step.REACH, Step.BURN)
+
+    def begin(self) -> None:
+        """Take the present poses as the resting ones."""
+        for index, hand in enumerate((self.hook, self.grasper)):
+            hand.stay()
+            self.state.rests[index] = hand.measured
+
+    def refuse(self, text: str) -> None:
+        """Give up after the refusal of a command."""
+        if not (self.state.failed or self.state.done):
+            self.fail(Failure.REFUSED, text)
+
+    def step(self, sight: Sight) -> None:
+        """Advance the routine by a period."""
+        self.sight, self.power = sight, 0.0
+        state = self.state
+        if state.done or state.failed or not sight.is_complete:
+            return
+        state.ties = len(sight.ties)
+        self._watch()
+        before = state.step
+        try:
+            self._steps[before]()
+        except MotionError as error:
+            self.fail(Failure.OUT_OF_REACH, str(error))
+        if before > Step.LIFT:
+            self.pull()
+        if state.step is before:
+            state.elapsed += self.hook.period
+
+    def _watch(self) -> None:
+        """Note a grasp that has been lost, and the end of the work."""
+        state, seen = self.state, self.seen
+        if state.grasped and not seen.is_held:
+            state.grasped = False
+            state.recoveries += 1
+            if state.grasps >= self.params.attempts:
+                self.fail(Failure.GRASP_SLIPPED, f"the gallbladder has slipped away, grasp {state.grasps}")
+                return
+            self.say("the gallbladder has slipped out of the grasper; it is grasped again")
+            self.grasper.move_jaw(self.opening)
+            self._leave_tissue(Step.AIM_GRASP)
+        if seen.is_free and Step.LIFT <= state.step < Step.LEAVE:
+            self.say("all is free")
+            self._leave_tissue(Step.LEAVE)
+
+    def _leave_tissue(self, step: Step) -> None:
+        """Draw the hook back out of the gap."""
+        self.hook.state.correction[:] = 0.0
+        self.hook.go(withdraw(self.hook.line(), _BEFORE), 2.0 * _GENTLE)
+        self.enter(step)
+
+    def _aim_grasp(self) -> None:
+        if not self.hook.has_arrived:
+            return
+        if not self.state.ahead.any():
+            self._find_bed()
+        self.aim_grasp()
+
+    def _find_bed(self) -> None:
+        """Take direction and normal of the bed from what is tied, from the free end on."""
+        state, ties, nodes = self.state, self.seen.ties, self.seen.gallbladder
+        middle, body = ties.mean(axis=0), nodes.mean(axis=0)
+        _, _, axes = np.linalg.svd(ties - middle)
+        free = nodes[np.linalg.norm(nodes[:, None] - ties, axis=2).min(axis=1).argmax()]
+        state.ahead[:] = axes[0] * np.sign(axes[0] @ (middle - free))
+        state.normal[:] = axes[2] * np.sign(axes[2] @ (body - middle))
+
+    def _lift(self) -> None:
+        if self.pull():
+            self.say(f"the gallbladder is lifted by {1e3 * self.state.pulled:.0f} mm, {self.seen.pull:.2f} N")
+            self.enter(Step.PLAN)
+
+    def _plan(self) -> None:
+        """Choose the next place, and go there: within the gap, or from before it."""
+        state, hook = self.state, self.hook
+        place = self._next_place()
+        if state.skipped > self.params.attempts * max(1, state.ties):
+            self.fail(Failure.NOT_PARTED, f"{state.ties} places hang together")
+            return
+        is_near = bool(np.linalg.norm(hook.bare_end - place) < _BESIDE)
+        way = 0.0 if is_near else _BEFORE
+        state.goal[:] = hook.choose(place, state.ahead, state.normal, way, self.seen.obstacles)
+        state.place[:], state.deeper, state.idle = place, 0.0, 0.0
+        hook.state.correction[:] = 0.0
+        if is_near:
+            hook.go(state.goal, _FINE)
+            self.enter(Step.REACH)
+        else:
+            hook.go(withdraw(state.goal, _BEFORE))
+            self.enter(Step.HOVER)
+
+    def _next_place(self) -> Vector:
+        """Return a place at the edge of what is tied, the nearest that has not been tried in vain."""
+        state, ties = self.state, self.seen.ties
+        along = ties @ state.ahead
+        edge = ties[along < along.min() + _EDGE]
+        order = np.linalg.norm(edge - self.hook.bare_end, axis=1).argsort(kind="stable")
+        place: Vector = edge[order[state.skipped % len(order)]]
+        return place
+
+    def _hover(self) -> None:
+        if self.hook.has_arrived:
+            self.hook.go(self.state.goal, _GENTLE)
+            self.enter(Step.REACH)
+
+    def _reach(self) -> None:
+        if self.hook.has_arrived:
+            self.state.heat = self.seen.delivered
+            self.enter(Step.BURN)
+
+    def _burn(self) -> None:
+        """Burn until the place has parted; where nothing is touched go deeper, power off."""
+        state, hook = self.state, self.hook
+        ties = self.seen.ties
+        if not len(ties) or np.linalg.norm(ties - state.place, axis=1).min() > _PAST:
+            state.skipped = 0
+            self.enter(Step.PLAN)
+            return
+        state.place[:] = ties[np.linalg.norm(ties - state.place, axis=1).argmin()]
+        if state.elapsed > 1e-9 * self.params.patience:
+            state.skipped += 1
+            state.recoveries += 1
+            self.enter(Step.PLAN)
+            return
+        if not hook.has_arrived:
+            return
+        heats = self.seen.delivered > state.heat
+        state.heat = self.seen.delivered
+        state.idle = 0.0 if heats else state.idle + hook.period
+        if state.idle <= _AWAY:
+            self.power = self.params.power
+            return
+        state.idle = 0.0
+        if state.deeper < _DEEPEST:
+            state.deeper += _DEEPER
+            hook.go(withdraw(state.goal, -state.deeper), _FINE)
+        else:
+            state.elapsed = 1e-9 * self.params.patience
+
+    def _leave(self) -> None:
+        """Bring the hook to its resting place."""
+        state, hook = self.state, self.hook
+        if not hook.has_arrived:
+            return
+        if np.linalg.norm(hook.state.goal - state.rests[0]) > 0.0:
+            hook.go(state.rests[0])
+        else:
+            state.done = True
+            self.enter(Step.DONE)

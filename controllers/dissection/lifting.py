@@ -1,0 +1,203 @@
+"""State of the dissection routine, and the work of the grasper: it takes the gallbladder and lifts it."""
+
+from __future__ import annotations
+
+from math import radians
+
+import numpy as np
+
+from controllers.cholecystectomy.approach import choose_pose, withdraw
+from controllers.cholecystectomy.grasp_place import grasp_poses
+from controllers.cholecystectomy.reach import path_margins
+from controllers.cholecystectomy.surgeon_hand import SurgeonHand
+from controllers.dissection.hook_hand import HookHand
+from controllers.dissection.params import DissectionParams
+from controllers.dissection.sight import Sight
+from controllers.dissection.step import FAILURES, Failure, Step
+from hub.participant import Record, array, choice, flag, integer, number
+from robots.transform import matrix_to_pose, pose_to_matrix
+from schemas.vectors import Vector
+
+__all__ = ["Lifting"]
+
+_BEFORE = 25.0e-3
+"""Length of the straight way to the gallbladder, m."""
+_GENTLE, _SLOW = 0.3, 0.08
+"""Shares of the speed near tissue, and of a pull."""
+_SHUT, _PRESSED = 0.0, 0.6
+"""Angle of the jaw on tissue (rad), and time to close, s."""
+_STRIDE, _CALM = 1.0e-3, 0.3
+"""Length of a stride of the pull (m), and time between strides, s."""
+_TAUT = 0.3
+"""Share of the pull that leads away from the edge of what is tied; the rest turns the flap over it."""
+_TURNED = radians(115.0)
+"""Angle between bed and flap beyond which it is not turned over farther."""
+_MARGIN = 0.08
+"""Least share of the joints' ranges that a stride leaves."""
+_NECK = 5.0e-3
+"""Depth of the end of the gallbladder that counts as its neck, m."""
+
+
+class DissectionState(Record):
+    """State of the routine."""
+
+    step = choice(Step.AIM_GRASP)
+    failure = choice(Failure.NONE)
+    ahead = array(3)
+    """Direction along the bed, from where it is free to where it is tied."""
+    normal = array(3)
+    """Normal of the bed, towards the gallbladder."""
+    goal = array(7)
+    """Pose of the tip at the tissue, of the hand at work."""
+    begun = array(3)
+    """Place of the grasper at its grasp, m."""
+    place = array(3)
+    """Tied place at which the hook works, m."""
+    ties = integer()
+    heat = number()
+    """Heat given before the last step, J."""
+    idle = number()
+    """Time with power that heats nothing, s."""
+    deeper = number()
+    """Way of the hook beyond its place, m."""
+    skipped = integer()
+    """Places given up since the last one that parted."""
+    elapsed = number()
+    """Time in the step, s."""
+    since_stride = number()
+    pulled = number()
+    grasped = flag()
+    grasps = integer()
+    recoveries = integer()
+    rests = array(2, 7)
+    """Resting poses of hook and grasper."""
+    done = flag()
+    failed = flag()
+
+
+class Lifting:
+    """The grasper."""
+
+    def __init__(self, params: DissectionParams, hook: HookHand, grasper: SurgeonHand) -> None:
+        self.params, self.hook, self.grasper = params, hook, grasper
+        self.state = DissectionState()
+        self.sight: Sight | None = None
+        self.failure = ""
+        """Sentence after giving up."""
+        self._status: list[str] = []
+
+    @property
+    def seen(self) -> Sight:
+        """The sight of this step."""
+        assert self.sight is not None
+        return self.sight
+
+    def statuses(self) -> tuple[str, ...]:
+        """Return and clear the statuses of this step."""
+        said = tuple(self._status)
+        self._status.clear()
+        return said
+
+    def say(self, text: str) -> None:
+        """Add a status."""
+        self._status.append(text)
+
+    def enter(self, step: Step) -> None:
+        """Begin a step."""
+        self.state.step, self.state.elapsed = step, 0.0
+
+    def fail(self, failure: Failure, why: str) -> None:
+        """Give up: both hands stay."""
+        self.failure = f"given up: {FAILURES[failure]}: {why}"
+        self.say(self.failure)
+        self.state.failure, self.state.failed = failure, True
+        for hand in (self.hook, self.grasper):
+            hand.stay()
+        self.enter(Step.FAILED)
+
+    def aim_grasp(self) -> None:
+        """Choose the pose of the next grasp, and send the grasper there."""
+        state, hand, nodes = self.state, self.grasper, self.seen.gallbladder
+        along = nodes @ state.ahead
+        neck = nodes[along < along.min() + _NECK].mean(axis=0)
+        poses = grasp_poses(hand, nodes, neck, state.grasps)
+        obstacles = self.seen.obstacles.near(poses[0, :3, 3])
+        pose = choose_pose(hand, poses, _BEFORE, self.opening, obstacles, "the gallbladder")
+        state.goal[:] = matrix_to_pose(pose)
+        hand.move_jaw(self.opening)
+        hand.go(withdraw(state.goal, _BEFORE))
+        self.enter(Step.HOVER_GRASP)
+
+    def hover_grasp(self) -> None:
+        """Wait before the gallbladder, then go ahead."""
+        if self.grasper.has_arrived:
+            self.grasper.go(self.state.goal, _GENTLE)
+            self.enter(Step.REACH_GRASP)
+
+    def reach_grasp(self) -> None:
+        """Wait for the end of the way, then close."""
+        if self.grasper.has_arrived and self.grasper.state.waited > _CALM:
+            self.grasper.move_jaw(_SHUT)
+            self.enter(Step.CLOSE)
+
+    def close(self) -> None:
+        """Wait for a hold; without one try again."""
+        state, hand = self.state, self.grasper
+        if state.elapsed < _PRESSED:
+            return
+        state.grasps += 1
+        if self.seen.is_held:
+            state.grasped, state.pulled, state.since_stride = True, 0.0, 0.0
+            hand.stay()
+            state.begun[:] = hand.measured[:3]
+            self.enter(Step.LIFT)
+        elif state.grasps >= self.params.attempts:
+            self.fail(Failure.GRASP_MISSED, f"nothing is held, {state.grasps} attempts")
+        else:
+            state.recoveries += 1
+            self.say("grasp missed; it is tried again")
+            hand.move_jaw(self.opening)
+            hand.go(withdraw(state.goal, _BEFORE), _GENTLE)
+            self.enter(Step.AIM_GRASP)
+
+    def pull(self) -> bool:
+        """Make a stride if the pull is too small or too large; return whether there was none to make."""
+        state, hand, (least, most) = self.state, self.grasper, self.params.pull
+        state.since_stride += hand.period
+        if not state.grasped or not hand.has_arrived or state.since_stride < _CALM:
+            return False
+        pull, way = self.seen.pull, self._way()
+        if pull > most:
+            stride = -_STRIDE
+        elif pull < least and state.pulled < self.params.farthest:
+            stride = _STRIDE
+        else:
+            return True
+        goal = hand.line()
+        goal[:3] += stride * way
+        if path_margins(hand, pose_to_matrix(goal)[None, None])[0][0] < _MARGIN:
+            return True
+        hand.go(goal, _SLOW)
+        state.since_stride = 0.0
+        state.pulled = float(np.linalg.norm(goal[:3] - state.begun))
+        return False
+
+    @property
+    def opening(self) -> float:
+        """Angle of the open jaw, rad."""
+        return min(self.grasper.jaw.upper - 0.02, radians(50.0))
+
+    def _way(self) -> Vector:
+        """Return the direction of the pull, shape (3,): it turns the flap over the edge of what is tied."""
+        state, ties = self.state, self.seen.ties
+        edge = ties[(ties @ state.ahead).argsort()[:3]].mean(axis=0) if len(ties) else state.place
+        flap = self.grasper.line()[:3] - edge
+        x, y = float(flap @ state.ahead), float(flap @ state.normal)
+        length = max(float(np.hypot(x, y)), 1e-6)
+        out = (x * state.ahead + y * state.normal) / length
+        turned = np.arctan2(y, -x)
+        over = (y * state.ahead - x * state.normal) / length
+        share = _TAUT if turned < _TURNED else 1.0
+        way = share * out + (1.0 - share) * over
+        unit: Vector = way / max(float(np.linalg.norm(way)), 1e-9)
+        return unit

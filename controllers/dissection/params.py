@@ -1,0 +1,63 @@
+"""Parameters of the dissection routine. SI units."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from controllers.motion.params import Arms, SetupJoints
+from hub.participant import Params
+from robots.dvrk.crtk import Mounting
+from robots.dvrk.end_effectors.electrode import Electrode
+from robots.dvrk.parameters import ArmName
+from schemas.quantity import Duration, Force, Length, Power
+from schemas.scenario import Name
+
+__all__ = ["DissectionParams"]
+
+
+class DissectionParams(Params):
+    """Arms and their instruments, names in the tissue, and the limits of the routine."""
+
+    open_to_pages: ClassVar[bool] = True
+
+    arms: Arms
+    mounting: Mounting = "free"
+    setup_joints: SetupJoints = SetupJoints()
+    hook: ArmName = Field(default="PSM1", description="the arm with the cautery hook")
+    grasper: ArmName = Field(default="PSM2", description="the arm that lifts the gallbladder")
+    gallbladder: Name = Field(default="gallbladder", description="name of the organ that is lifted")
+    plate: Name = Field(default="cystic_plate", description="name of the attachment that is divided")
+    avoid: tuple[Name, ...] = Field(
+        default=("liver",), max_length=16, description="organs that the shaft of the hook keeps away from"
+    )
+    part: Literal["all", "lower third"] = Field(
+        default="all",
+        description="what is freed: the whole attachment, or its third nearest to its `lower_end`",
+    )
+    power: Power = Field(default=40.0, gt=0, le=400, description="power of the generator at the tissue")
+    pull: tuple[Force, Force] = Field(
+        default=(0.3, 1.0), description="least and largest pull at the gallbladder while the hook works"
+    )
+    farthest: Length = Field(
+        default=60e-3, gt=0, le=0.2, description="longest way of the grasper from the place of its grasp"
+    )
+    attempts: int = Field(default=4, ge=1, le=20, description="most grasps, and most rounds without progress")
+    patience: Duration = Field(
+        default=6_000_000_000, gt=0, description="longest time with the hook at a place that does not part"
+    )
+    end: bool = Field(default=True, description="whether the session ends with the routine")
+
+    @model_validator(mode="after")
+    def _is_a_pair(self) -> Self:
+        roles = (self.hook, self.grasper)
+        if missing := [arm for arm in roles if arm not in self.arms.present_arms]:
+            raise ValueError(f"{', '.join(missing)} is no arm of the scene")
+        if self.hook == self.grasper:
+            raise ValueError(f"{self.hook}: hook and grasper are two arms")
+        if not isinstance(self.arms.present_arms[self.hook].end_effector, Electrode):
+            raise ValueError(f"{self.hook} holds no cautery hook or spatula")
+        if not 0.0 <= self.pull[0] < self.pull[1]:
+            raise ValueError(f"pull {list(self.pull)}: state the least, then the largest")
+        return self

@@ -1,0 +1,75 @@
+"""What the dissection routine sees and feels in a step."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from controllers.cholecystectomy.approach import Obstacles
+from controllers.dissection.params import DissectionParams
+from hub.participant import Inputs
+from schemas.trocar_msgs import SoftBodyState, TiedPlaces
+from schemas.vectors import Vector
+
+__all__ = ["Sight"]
+
+_FREE = 0.95
+"""Share of a lower third that counts as all."""
+
+
+class Sight:
+    """Places that are still tied, nodes of the organs, state of the grasp, and heat given."""
+
+    def __init__(self, params: DissectionParams, inputs: Inputs) -> None:
+        self._params, self._inputs = params, inputs
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all organs have been seen."""
+        organs = (self._params.gallbladder, *self._params.avoid)
+        ports = (f"{self._params.plate}/ties", *(f"{organ}/nodes" for organ in organs))
+        return all(self._inputs.message(port) is not None for port in ports)
+
+    @property
+    def ties(self) -> Vector:
+        """Places that are still tied, m, shape (n, 3)."""
+        message = cast("TiedPlaces", self._inputs.message(f"{self._params.plate}/ties"))
+        return message.points_m.reshape(-1, 3)
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the part of the plate that is to be divided has parted."""
+        if self._params.part == "all":
+            return not len(self.ties)
+        return float(self._inputs[f"{self._params.plate}/lower_third"][0]) >= _FREE
+
+    @property
+    def gallbladder(self) -> Vector:
+        """Nodes of the gallbladder, m, shape (n, 3)."""
+        return self._nodes(self._params.gallbladder)
+
+    @property
+    def obstacles(self) -> Obstacles:
+        """Organs that the shaft of the hook keeps away from."""
+        nodes = [self._nodes(organ) for organ in self._params.avoid]
+        return Obstacles.join([Obstacles(own, np.zeros(len(own))) for own in nodes])
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the grasper holds tissue."""
+        return float(self._inputs[f"{self._params.grasper}/held"][0]) > 0.0
+
+    @property
+    def pull(self) -> float:
+        """Force of the grasper on the tissue, N."""
+        return float(np.linalg.norm(self._inputs[f"{self._params.grasper}/pull"]))
+
+    @property
+    def delivered(self) -> float:
+        """Heat that the hook has given to tissue, J."""
+        return float(self._inputs[f"{self._params.hook}/delivered"][0])
+
+    def _nodes(self, organ: str) -> Vector:
+        state = cast("SoftBodyState", self._inputs.message(f"{organ}/nodes"))
+        return state.nodes_m.astype(np.float64).reshape(-1, 3)

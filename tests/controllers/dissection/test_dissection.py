@@ -1,0 +1,101 @@
+"""The dissection routine without physics: to the end, and after everything that goes wrong."""
+
+import numpy as np
+import pytest
+
+from controllers.dissection.step import Failure, Step
+from hub.planning.scenario_file import load
+from schemas.errors import ScenarioError
+from tests.controllers.dissection.world import PERIOD, World
+
+
+def test_the_whole_plate_is_freed_from_the_free_end_on_and_power_is_on_at_tissue_alone():
+    world = World().run(80.0)
+    assert world.state.done
+    assert not len(world.ties)
+    assert world.tip("PSM2")[2, 3] - world.state.begun[2] > 0.01  # lifted off the bed
+    assert world.routine.ended == "cystic_plate is free (all), after 0 recoveries"
+    assert world.state.ahead @ [0.0, 1.0, 0.0] > 0.95
+    assert world.state.normal @ [0.0, 0.0, 1.0] > 0.95
+    on = sum(power > 0.0 for power in world.powers) * PERIOD * 1e-9
+    assert 0.5 * 40.0 * on == pytest.approx(world.delivered, rel=0.02)  # no power in the air
+    assert world.powers[-1] == 0.0
+    at_rest = world.tip("PSM1")[:3, 3] - world.state.rests[0, :3]
+    assert np.linalg.norm(at_rest) < 1e-3
+
+
+def test_a_lower_third_is_enough_where_it_is_all_that_is_wanted():
+    world = World("part=lower third").run(60.0)
+    assert world.state.done
+    assert len(world.ties) == 6
+    assert (world.ties[:, 1] > 0.035).all()
+
+
+def test_a_missed_grasp_is_tried_again_and_then_given_up():
+    world = World()
+    world.misses = 1
+    world.run(80.0)
+    assert world.state.done
+    assert world.state.recoveries == 1
+    world = World("attempts=2")
+    world.misses = 9
+    world.run(30.0)
+    assert world.state.failure is Failure.GRASP_MISSED
+    assert world.routine.ended == "given up: grasp missed: nothing is held, 2 attempts"
+
+
+def test_a_gallbladder_that_slips_away_is_grasped_again_with_the_hook_out_of_the_gap():
+    world = World()
+    while world.state.step is not Step.BURN:
+        world.step()
+    world.held = False
+    world.step()
+    assert world.state.step is Step.AIM_GRASP
+    assert world.powers[-1] == 0.0
+    world.run(90.0)
+    assert world.state.done
+    assert world.state.recoveries == 1
+
+
+def test_a_place_that_does_not_part_is_left_for_the_next_and_given_up_when_all_are_tried():
+    world = World("attempts=1", "patience=1 s")
+    world.stubborn[:] = world.ties[:, 1] > 0.06
+    world.run(120.0)
+    assert world.state.failure is Failure.NOT_PARTED
+    assert world.routine.ended == "given up: not parted: 2 places hang together"
+
+
+def test_a_refused_command_ends_with_its_reason():
+    world = World()
+    world.refused.append(("PSM1", "the arm is not homed"))
+    world.step()
+    assert world.routine.ended == "given up: command refused: PSM1: the arm is not homed"
+
+
+@pytest.mark.parametrize(
+    ("setting", "why"),
+    [
+        ("grasper=PSM1", "hook and grasper are two arms"),
+        ("hook=PSM3", "PSM3 holds no cautery hook or spatula"),
+        ("pull=[1.0, 0.5]", "state the least, then the largest"),
+    ],
+)
+def test_roles_that_do_not_fit_are_refused(setting, why):
+    with pytest.raises(ScenarioError, match=why):
+        load("gallbladder-bed", [f"participants.routine.{setting}"])
+
+
+def test_a_saved_routine_goes_on_with_the_same_commands():
+    world = World()
+    while world.state.step is not Step.BURN:
+        world.step()
+    again = World()
+    again.routine.restore(world.routine.save())
+    again.joints, again.held, again.grip = dict(world.joints), world.held, world.grip
+    again.jaw, again.t, again.delivered = world.jaw, world.t, world.delivered
+    again.heats = world.heats.copy()
+    for _ in range(200):
+        one, other = world.step(), again.step()
+        assert one["PSM1/servo_cp"] == other["PSM1/servo_cp"]
+        assert world.powers[-1] == again.powers[-1]
+    assert world.routine.state_hash() == again.routine.state_hash()
