@@ -140,7 +140,8 @@ class Hand(Controller):
         self._now = HandState()
         self._now.pose[6] = 1.0
         self.keep(self._now)
-        self._to_viewer = rotation.product(rotation.from_matrix(_DESK_IN_VIEW), np.array(params.registration))
+        registered = rotation.product(rotation.from_matrix(_DESK_IN_VIEW), np.array(params.registration))
+        self._to_viewer = rotation.matrix(registered)
         rest = Waypoint(at=0)
         path = params.path if params.path and not params.path[0].at else (rest, *params.path)
         self._times = [one.at * 1e-9 for one in path]
@@ -225,9 +226,9 @@ class Hand(Controller):
         """Set the pose of the hand by the device, or by the path."""
         now = self._now
         if self._has_device:
-            way = rotation.matrix(self._to_viewer) @ (inputs["pose"][:3] - now.device[:3])
+            way = self._to_viewer @ (inputs["pose"][:3] - now.device[:3])
             turned = rotation.product(inputs["pose"][3:], rotation.conjugate(now.device[3:]))
-            turn = rotation.matrix(self._to_viewer) @ rotation.log(turned)
+            turn = self._to_viewer @ rotation.log(turned)
             way *= self.params.scale
         else:
             way, turn, _ = np.split(self._on_path(), [3, 6])

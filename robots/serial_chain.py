@@ -326,7 +326,7 @@ class SerialChains:
 
     def __init__(self, chains: Sequence[SerialChain]) -> None:
         """`chains`: k chains."""
-        self.prismatic = chains[0].prismatic
+        self._chains, self.prismatic = tuple(chains), chains[0].prismatic
         self.basis = np.stack([chain.basis for chain in chains])[:, None]  # (k, 1, n, 3, 16)
         self._tips = np.stack([chain.tip for chain in chains])[:, None]  # (k, 1, 4, 4)
 
@@ -335,7 +335,13 @@ class SerialChains:
 
         Positions `q` have shape (k, m, n): m configurations of each chain.
         """
-        return _frames(q, self.basis, self._tips, self.prismatic)
+        if compiled is None:
+            return _frames(q, self.basis, self._tips, self.prismatic)
+        poses = np.empty((*q.shape[:2], q.shape[2] + 1, 4, 4))
+        for chain, positions, found in zip(self._chains, q, poses, strict=True):
+            for i, one in enumerate(positions):
+                found[i] = chain.frames(one)
+        return poses
 
 
 def check() -> tuple[bool, str, str]:

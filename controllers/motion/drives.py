@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from controllers.motion.axes import Axes, Mode
+from controllers.motion.following import clip
 from controllers.motion.frames import rotate_twist
 from controllers.motion.impedance import Impedance
 from controllers.motion.master import PLATFORM, platform_effort
@@ -189,9 +190,11 @@ class Drives:
 
     def _balance(self) -> None:
         """Apply the joint efforts J^T w, within the limits of the drives."""
-        chain = self.joints.chain
+        chain, frame = self.joints.chain, self.control.frame
+        if frame is not WrenchFrame.IMPEDANCE and not self.control.wrench.any():
+            self._float()
+            return
         frames = chain.frames(self.joints.position)
-        frame = self.control.frame
         if frame in (WrenchFrame.REFERENCE, WrenchFrame.IMPEDANCE) or (
             frame is WrenchFrame.BODY and self.control.absolute
         ):
@@ -201,11 +204,18 @@ class Drives:
             jacobian, wrench = chain.jacobian(frames, frame="tip"), self.control.wrench
             if frame is WrenchFrame.SPATIAL:
                 jacobian = body_to_spatial(frames[-1]) @ jacobian
-        effort = jacobian.T @ wrench
-        if self._is_master and frame is not WrenchFrame.SPATIAL:
-            n = len(effort)
+        self._apply(jacobian.T @ wrench)
+
+    def _float(self) -> None:
+        """Apply no wrench: as a master does while its instrument follows."""
+        self._apply(np.zeros(len(self.joints.chain.joints)))
+
+    def _apply(self, effort: Vector) -> None:
+        """Apply joint efforts, shape (n,), and of a master the platform's own, within the drives' limits."""
+        chain, n = self.joints.chain, len(effort)
+        if self._is_master and self.control.frame is not WrenchFrame.SPATIAL:
             effort[PLATFORM] += platform_effort(chain, self.joints.position, self.joints.measured[n : 2 * n])
-        self.joints.apply(np.clip(effort, -chain.effort, chain.effort))
+        self.joints.apply(clip(effort, -chain.effort, chain.effort))
 
     def _in_base(self, tip: Vector, jacobian: Vector) -> Vector:
         """Return the wrench at the tip, shape (6,), along the axes of the base frame, not the reference's."""

@@ -158,6 +158,30 @@ def test_commands_while_not_homed_and_of_wrong_size_are_refused():
     assert "finite" in masters.said("MTML/error")[0]
 
 
+def test_a_master_led_by_a_program_that_dies_stays_at_its_last_goal():
+    masters = Masters().step(10)
+    goal = masters.pose("MTML")
+    for _ in range(20):
+        goal[0] += 5e-4
+        masters.step(5, MTML__servo_cp=cp(goal))
+    masters.step(300)
+    assert np.linalg.norm(masters.pose("MTML")[:3] - goal[:3]) < 5e-4
+    assert masters.outputs["drive/MTML/control_mode"].tolist() == [1.0, 1.0]
+    assert masters.said("MTML/error") == masters.said("MTML/warning") == []
+
+
+def test_a_wrench_of_a_program_that_dies_stays_until_hold():
+    masters = Masters().step(1, MTML__body__servo_cf=WrenchStamped())
+    masters.step(500, MTML__body__servo_cf=push(z=0.5))
+    effort = masters.outputs["drive/MTML/servo_jf"].copy()
+    assert np.abs(effort[:3]).max() > 0.02
+    masters.step(400, MTML__hold=EmptyMessage())
+    assert masters.outputs["drive/MTML/control_mode"].tolist() == [1.0, 1.0]
+    before = masters.pose("MTML")
+    masters.step(100)
+    assert np.linalg.norm(masters.pose("MTML")[:3] - before[:3]) < 1e-4
+
+
 def test_home_goes_to_zero():
     masters = Masters("disabled").step(1, MTMR__state_command=StringStamped(string="home"))
     masters.step(3000)

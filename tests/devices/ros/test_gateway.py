@@ -36,6 +36,7 @@ from schemas.ros import (
     StringMessage,
     TFMessage,
     Time,
+    WrenchStamped,
 )
 from schemas.trocar_msgs import GatewayStatus
 from schemas.visualization import Marker, MarkerArray
@@ -459,6 +460,19 @@ def test_one_program_at_a_time_commands_an_arm(
     gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True, is_busy=False))
     gateway.transport.send("/PSM1/servo_jp", joints(*[0.1] * 6), "/one")
     assert [port for port, _ in commands(gateway)] == ["PSM1/servo_jp"]
+
+
+def test_one_program_at_a_time_commands_a_master(tmp_path: Path) -> None:
+    push = WrenchStamped(header=Header(frame_id="MTML_tip"))
+    with make({"arms": {"MTML": {}}, "mounting": "cart"}) as gateway:
+        gateway.open(tmp_path)
+        gateway.transport.send("/MTML/body/servo_cf", push, "/one")
+        gateway.transport.send("/MTML/servo_jp", joints(*[0.1] * 7), "/other")
+        gateway.transport.send("/MTML/servo_jp", joints(*[0.1] * 6), "/one")
+        assert [port for port, _ in commands(gateway)] == ["MTML/body/servo_cf"]
+        (told,) = words(gateway, "/MTML/warning")
+        assert "/other may not move the arm while /one commands it" in told
+        assert "6 values in position, expected 7" in words(gateway, "/MTML/error")[0]
 
 
 def test_a_flood_is_thinned_out_and_told_once(gateway: MemoryGateway) -> None:
