@@ -1,4 +1,4 @@
-"""A sphere on faces of which some nodes are held."""
+"""A sphere on the faces of a block: dragged over them, and beside held nodes."""
 
 import numpy as np
 
@@ -23,3 +23,16 @@ def test_the_force_stays_bounded_where_a_sphere_comes_to_the_held_nodes():
             rig.move((x, 1e-3, depth), 0.01)
             forces.extend(np.linalg.norm(np.array(rig.wrenches[-10:])[:, :3], axis=1))
     assert 1.0 < max(forces) < 5.0
+
+
+def test_the_force_of_a_dragged_sphere_changes_smoothly_from_face_to_face():
+    block, radius, depth = {**BLOCK, "nodes": 800}, 3e-3, 1.5e-3
+    with FemRig(params(block, {"radius": radius}), start=(-3e-3, 1e-3, radius)) as rig:
+        rig.move((-3e-3, 1e-3, radius - depth), 0.3)
+        rig.hold(0.05)
+        pressed = rig.wrenches[-1][2]
+        rig.move((3e-3, 1e-3, radius - depth), 6e-3 / 25e-3)
+        dragged = np.array(rig.wrenches[-240:])[:, 2]
+    assert pressed > 0.03
+    np.testing.assert_allclose(dragged, pressed, rtol=0.2)  # the mesh is uneven
+    assert np.abs(np.diff(dragged)).max() < 0.02 * pressed
