@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' truth
 from bench.tissue_force import places
 from bench.tissue_truth import BLOCK, STANDARD_GRAVITY, axisymmetric, graded
 from engines.tissue.elasticity.compliance import SurfaceCompliance
-from engines.tissue.probes.held_patch import missing_compliance
+from engines.tissue.probes.held_patch import patch_at
 from schemas.vectors import Vector
 from tests.engines.bullet import rig
 from tests.engines.bullet.finite_elements import Body, equilibrium
@@ -62,7 +62,7 @@ def of_mesh(nodes: int, place: str, pad: float) -> tuple[int, float, float]:
     force = -(body.elements.forces(lifted) + body.load)[held, 2].sum()
     stiffness = float(force) / LIFT_M
     surface = SurfaceCompliance(organ.rest, body.fixed, faces, organ.elastic)
-    missing = missing_compliance(surface, organ.elastic, np.flatnonzero(held), 2.0 * pad)
+    missing = patch_at(surface, organ.elastic, np.flatnonzero(held), 2.0 * pad).missing
     return int(held.sum()), stiffness, 1.0 / (1.0 / stiffness + max(float(missing[2, 2]), 0.0))
 
 

@@ -13,7 +13,6 @@ precision.
 #include "_near.h"
 
 #define FOLLOW_S 6e-3 /* time constant of the yield: less than a hand feels, more than a node swings */
-#define HELD_LOOP 0.2 /* share of the rate for held tissue: its mesh is up to five times as stiff as the patch */
 
 enum { HOLD, VELOCITY, SLOPE };
 
@@ -33,7 +32,8 @@ typedef struct {
     double *law;        /* (3, points): forces, yields of the spring, yields of the mesh */
     double *series;     /* (terms, 2): relaxing moduli over the long-term modulus, and their times; 0: none */
     double *relaxing;   /* (terms + 1,): forces of the terms, elastic force */
-    double *compliance; /* (3, 3): of the spring in series with the held spheres; zeros: none */
+    double *compliance; /* (2, 3, 3): of the spring in series with the held spheres, zeros: none; share of the mesh in
+                           all yield */
     const uint8_t *held;   /* (spheres,) */
     double *path;          /* (sub_steps + 1, all, 3): of all probes */
     const double *tissue;  /* (sub_steps, all, 3): force of the tissue on the spheres of all probes */
@@ -92,21 +92,23 @@ static void follow(Probe *self, double rate)
         self->offset[i] = *yielded * self->spring[i];
 }
 
-/* Let the held spheres yield to their common pull, and the others come back. */
+/* Let the held spheres yield to their common pull, at the rate of the closed loop, and the others come back.
+
+The pull is that at the end of the last step: its mean has the inertia of the held nodes in it, which yields anew. */
 static void yield_to_pull(Probe *self, double rate)
 {
+    const double *force = self->motion + 3 * self->spheres + 2 * self->size;
     double pull[3] = {0.0, 0.0, 0.0};
     for (int s = 0; s < self->spheres; s++)
         for (int i = 0; i < 3; i++)
-            pull[i] += self->held[s] ? self->force[3 * s + i] : 0.0;
-    for (int s = 0; s < self->spheres; s++)
-        for (int i = 0; i < 3; i++) {
-            double *offset = self->offset + 3 * s + i;
-            if (self->held[s])
-                *offset += HELD_LOOP * rate * (dot3(self->compliance + 3 * i, pull) - *offset);
-            else
-                *offset *= 1.0 - rate;
-        }
+            pull[i] += self->held[s] ? force[3 * s + i] : 0.0;
+    for (int s = 0; s < self->spheres; s++) {
+        double *offset = self->offset + 3 * s, lacking[3];
+        for (int i = 0; i < 3; i++)
+            lacking[i] = dot3(self->compliance + 3 * i, pull) - offset[i];
+        for (int i = 0; i < 3; i++)
+            offset[i] += rate * (self->held[s] ? dot3(self->compliance + 9 + 3 * i, lacking) : -offset[i]);
+    }
 }
 
 /* Position of a coordinate of the instrument, `tau` seconds into the step. */

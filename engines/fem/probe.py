@@ -12,6 +12,7 @@ from xxhash import xxh3_128_digest
 from engines.fem.place import find_place
 from engines.fem.solid import Branch
 from engines.fem.spheres import Spheres
+from engines.tissue.probes.held_patch import PatchCompliance
 from engines.tissue.probes.near_faces import NearFaces
 from engines.tissue.probes.params import Coupling, ProbeParams
 from engines.tissue.probes.place import Surface
@@ -66,7 +67,7 @@ class Probe:
             np.array([[one.share, one.seconds] for one in branches]).reshape(-1, 2) for branches in series
         ]
         most = max((len(terms) for terms in self._terms), default=0)
-        sizes = (6 * n + 2 * size, 3, 3 * n, 3 * n, 3 * n, 3 * n, 4, 3 * points, 9, 2 * most, most + 1)
+        sizes = (6 * n + 2 * size, 3, 3 * n, 3 * n, 3 * n, 3 * n, 4, 3 * points, 18, 2 * most, most + 1)
         self._state: Vector = np.zeros(sum(sizes))
         ends = list(accumulate(sizes))
         motion, clock, offsets, forces, targets, positions, spring, law, compliance, terms, relaxing = (
@@ -77,7 +78,8 @@ class Probe:
         )
         self.targets[:] = self.positions[:] = _FAR_M
         self._spring, self._law = spring, law.reshape(3, points)
-        self._compliance = compliance.reshape(3, 3)
+        self._compliance = compliance.reshape(2, 3, 3)
+        """Of the spring in series with the held spheres, m/N, and the share of the mesh in all yield."""
         self._series, self._elastic_force = terms.reshape(most, 2), relaxing[most:]
         self._velocity = motion[3 * n : 3 * n + 3]
         self.held: NDArray[np.bool_] = np.zeros(n, dtype=np.bool_)
@@ -120,10 +122,14 @@ class Probe:
         if not held:
             self._compliance[:] = 0.0
 
-    def soften(self, spheres: NDArray[np.int64], compliance: Vector) -> None:  # noqa: ARG002
-        """Put a spring of `compliance` (m/N, shape (3, 3)) in series with the pull of the held spheres."""
-        values, axes = np.linalg.eigh(compliance)
-        self._compliance[:] = (axes * np.maximum(values, 0.0)) @ axes.T
+    def soften(self, spheres: NDArray[np.int64], patch: PatchCompliance) -> None:  # noqa: ARG002
+        """Put a spring of the compliance that is missing in series with the pull of the held spheres.
+
+        Rigid in directions of negative compliance, as no spring in series stiffens.
+        """
+        values, axes = np.linalg.eigh(patch.missing)
+        missing = (axes * np.maximum(values, 0.0)) @ axes.T
+        self._compliance[:] = missing, patch.mesh @ np.linalg.inv(patch.mesh + missing)
 
     def leaves(self, inputs: Inputs) -> bool:
         """Return whether the instrument is taken out of the arm, away from the tissue that it holds."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.bullet.world import COLLISION_MARGIN_M
-from engines.tissue.probes.held_patch import HeldPatch
+from engines.tissue.probes.held_patch import HeldPatch, PatchCompliance
 from engines.tissue.probes.near_faces import NearFaces
 from engines.tissue.probes.params import Coupling, ProbeParams
 from engines.tissue.probes.sub_grid import SubGrid
@@ -121,9 +121,9 @@ class Probe:
         if not held:
             self.held_patch = None
 
-    def soften(self, spheres: NDArray[np.int64], compliance: Vector) -> None:
-        """Put a spring of `compliance` (m/N, shape (3, 3)) in series with the pull of these spheres."""
-        self.held_patch = HeldPatch(spheres, self.coupling, compliance)
+    def soften(self, spheres: NDArray[np.int64], patch: PatchCompliance) -> None:
+        """Put a spring of the compliance that is missing in series with the pull of these spheres."""
+        self.held_patch = HeldPatch(spheres, self.coupling, patch.missing)
 
     def begin(self, inputs: Inputs, h: float) -> None:
         """Store the motion of the motion side at the start of a step of `h` seconds."""

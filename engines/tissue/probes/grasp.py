@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.tissue.organs.body import Body
-from engines.tissue.probes.held_patch import missing_compliance
+from engines.tissue.probes.held_patch import PatchCompliance, patch_at
 from engines.tissue.probes.params import GraspParams
 from engines.tissue.probes.place import Surface
 from engines.tissue.warn_once import warn_once
@@ -119,7 +119,7 @@ class GraspingProbe(Protocol):
         """Mark spheres as holding tissue or not."""
         ...
 
-    def soften(self, spheres: NDArray[np.int64], compliance: Vector) -> None:
+    def soften(self, spheres: NDArray[np.int64], patch: PatchCompliance) -> None:
         """Let spheres with a common pull yield by `compliance`, m/N, shape (3, 3)."""
         ...
 
@@ -301,9 +301,7 @@ class Grasp:
             return
         hold = self._holds[0]
         surface = self._surfaces[hold.organ.name]
-        self._probe.soften(
-            spheres, missing_compliance(surface.compliance, surface.material, hold.nodes, width)
-        )
+        self._probe.soften(spheres, patch_at(surface.compliance, surface.material, hold.nodes, width))
 
     def _reach(self, organ: GraspedOrgan) -> float:
         return organ.mean_edge / sqrt(3.0) if self._params.reach is None else self._params.reach

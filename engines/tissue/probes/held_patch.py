@@ -8,6 +8,8 @@ docs/decisions/0099-rims-and-held-patches.md.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from engines.tissue.elasticity.compliance import SurfaceCompliance
@@ -17,7 +19,7 @@ from engines.tissue.meshing.tet_mesh import Indices
 from engines.tissue.probes.params import Coupling
 from schemas.vectors import Vector
 
-__all__ = ["HeldPatch", "missing_compliance"]
+__all__ = ["HeldPatch", "PatchCompliance", "patch_at"]
 
 _ZETA = 0.3
 """Damping ratio of the proxies on the spring alone. A pull is delayed by some 10 ms; at a ratio of 1 by 40
@@ -25,12 +27,17 @@ ms, and a lift in 0.1 s then costs more than the tissue gives back.
 """
 
 
-def missing_compliance(
-    surface: SurfaceCompliance, material: Material, nodes: Indices, width: float
-) -> Vector:
-    """Return the compliance (m/N) of a patch of tissue in excess of the mesh at held nodes, shape (3, 3).
+class PatchCompliance(NamedTuple):
+    """Compliance of a patch of tissue around held nodes, in `world`."""
 
-    Symmetric, in `world`; negative in directions of too soft a mesh.
+    missing: Vector
+    """Compliance in excess of the mesh, m/N, shape (3, 3), symmetric; negative where the mesh is too soft."""
+    mesh: Vector
+    """Compliance of the mesh, m/N, shape (3, 3), symmetric."""
+
+
+def patch_at(surface: SurfaceCompliance, material: Material, nodes: Indices, width: float) -> PatchCompliance:
+    """Return the compliance of a patch at held nodes.
 
     Args:
         surface: surface of the organ.
@@ -46,8 +53,9 @@ def missing_compliance(
         tissue += (along + beyond - across) / len(held) * np.outer(normal, normal)
     between = surface.between(held)
     alike = np.tile(np.eye(3), (len(held), 1))
-    mesh = np.asarray(np.linalg.inv(alike.T @ np.linalg.solve(between, alike)), np.float64)
-    return tissue - 0.5 * (mesh + mesh.T)
+    found = np.asarray(np.linalg.inv(alike.T @ np.linalg.solve(between, alike)), np.float64)
+    mesh: Vector = 0.5 * (found + found.T)
+    return PatchCompliance(tissue - mesh, mesh)
 
 
 class HeldPatch:

@@ -14,6 +14,7 @@ from engines.fem.engine import FemEngine
 from engines.fem.organ import relaxation
 from engines.fem.params import FemParams
 from engines.fem.solid import Branch
+from engines.tissue.probes.held_patch import patch_at
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from schemas.errors import ScenarioError, SessionError, StateError
@@ -197,6 +198,22 @@ def test_fingers_take_tissue_lift_it_and_let_go():
     assert jaw.events == ["grasped", "released"]
     jaw.go((8e-3, 6e-3), (8e-3, 6e-3), 0.3)
     assert np.abs(jaw.engine._organs[0].solid.displacement[:, :3]).max() < 5e-4
+
+
+def test_with_a_width_the_held_spheres_yield_by_what_the_mesh_lacks():
+    raised, pulls = (1.5e-3, 2e-3), []
+    for width in ({}, {"width": "4 mm"}):
+        jaw = Jaw(**width).take().go(CLOSED, CLOSED, 0.1)
+        before = jaw.outputs["probe/pull"][2]
+        jaw.go(CLOSED, raised).go(raised, raised)
+        pulls.append(jaw.outputs["probe/pull"][2] - before)
+        jaw.go(raised, raised, 0.05)
+        assert jaw.outputs["probe/pull"][2] - before == pytest.approx(pulls[-1], rel=0.01)
+    grasp = jaw.engine._grasps[0][0]
+    (hold,), surface, lift = grasp._holds, grasp._surfaces["block"], 1e-3
+    missing = patch_at(surface.compliance, surface.material, hold.nodes, 4e-3).missing[2, 2]
+    assert missing * pulls[1] > 0.5 * lift
+    assert lift / pulls[1] - lift / pulls[0] == pytest.approx(missing, rel=0.1)
 
 
 def test_a_state_with_held_tissue_goes_on_as_it_would_have():

@@ -10,7 +10,7 @@ from engines.bullet.engine import BulletEngine
 from engines.bullet.params import BulletParams
 from engines.tissue.elasticity.compliance import SurfaceCompliance
 from engines.tissue.organs.params import OrganParams
-from engines.tissue.probes.held_patch import missing_compliance
+from engines.tissue.probes.held_patch import patch_at
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from tests.engines.bullet.finite_elements import Body, equilibrium
@@ -150,7 +150,7 @@ def test_a_patch_is_as_stiff_as_converged_elements_say(width, converged):
     surface = SurfaceCompliance(organ.rest, body.fixed, faces[~body.fixed[faces].all(axis=1)], organ.elastic)
     top = faces[(np.abs(rest[faces][..., 2]) < 1e-9).all(axis=1)]
     nodes = top[np.linalg.norm(rest[top].mean(axis=1), axis=1).argmin()]
-    missing = missing_compliance(surface, organ.elastic, nodes, width)
+    missing = patch_at(surface, organ.elastic, nodes, width).missing
     alike = np.tile(np.eye(3), (3, 1))
     mesh = np.linalg.inv(alike.T @ np.linalg.solve(surface.between(nodes), alike))
     assert 1.0 / mesh[2, 2] > 2.0 * converged
