@@ -17,7 +17,8 @@ from schemas.trocar_msgs import SoftBodyState, TissueEvent, TubeLine
 __all__ = ["SCENE", "World"]
 
 SCENE = Path(__file__).with_name("two-tubes.yaml")
-PERIOD = 10_000_000
+PERIOD = 40_000_000
+"""Four periods of the scenario, ns: the routine does the same in a quarter of the steps."""
 HEADER = Header(frame_id="world")
 STIFFNESS = 60.0
 """Pull of the gallbladder over its way, N/m."""

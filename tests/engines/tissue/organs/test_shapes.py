@@ -24,6 +24,7 @@ from engines.tissue.organs.catalogue import SHAPES
 from engines.tissue.organs.materials import presets
 from engines.tissue.organs.params import OrganParams
 from hub.recording.file_hashes import file_hashes
+from tests.costly import costly
 
 BLOCK = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa"}
 EXTENTS = {
@@ -72,6 +73,7 @@ def test_the_same_mesh_comes_every_time_in_whole_micrometres(name):
     np.testing.assert_array_equal(mesh.nodes, np.round(mesh.nodes, 6))
 
 
+@costly
 @given(st.floats(6e-3, 18e-3))
 def test_a_ball_is_filled_to_its_surface_by_tetrahedra_without_slivers(spacing):
     corner = np.full(3, 0.03)
