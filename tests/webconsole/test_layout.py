@@ -64,6 +64,31 @@ def test_everything_is_within_the_window_and_has_a_name(opened, width, height, t
     assert one.errors == []
 
 
+@pytest.mark.parametrize("width", [1280, 960, 400])
+def test_warnings_cover_no_button(opened, width):
+    one = opened(width, 700, "light")
+    covered = one.page.evaluate(
+        """async () => {
+          const { Alerts } = await import("/web/alerts.js")
+          const text = "no page leads: choose 'Lead right' on the page of `trocar view`"
+          new Alerts(document.getElementById("alerts")).add(
+            ["right", "left", "third"].map((source) => ({ time: 0, level: "warn", source, text })))
+          return [...document.querySelectorAll(".tools button, .tools input, .tools select, .lead button")]
+            .filter((one) => one.checkVisibility() && inView(one) && !one.contains(at(one)))
+            .map((one) => one.outerHTML)
+          function inView(one) {
+            const box = one.getBoundingClientRect(), row = one.parentElement.getBoundingClientRect()
+            return box.right <= row.right + 1 && box.left >= row.left - 1 // the row of cameras may scroll
+          }
+          function at(one) {
+            const { x, y, width, height } = one.getBoundingClientRect()
+            return document.elementFromPoint(x + width / 2, y + height / 2)
+          }
+        }"""
+    )
+    assert covered == []
+
+
 def test_keys_alone_reach_what_is_needed(opened):
     one = opened(1280, 800, "light")
     one.page.locator("body").click(position={"x": 5, "y": 790})

@@ -22,20 +22,25 @@ export class Alerts {
       if (known) {
         known.count++
         known.said.textContent = `${source}: ${text} (${known.count} times, last at ${time.toFixed(2)} s)`
-      } else this.put(what, level, `${source}: ${text} (at ${time.toFixed(2)} s)`)
+      } else this.put(what, level, source, `${source}: ${text} (at ${time.toFixed(2)} s)`)
     }
   }
 
-  put(what, level, text) {
+  // Whatever these say is said elsewhere.
+  leave(sources) {
+    for (const [what, { source }] of this.shown) if (sources.has(source)) this.drop(what)
+  }
+
+  put(what, level, source, text) {
     const element = document.createElement("div"), said = document.createElement("span")
     element.className = `alert ${level}`
     said.textContent = text
     const button = document.createElement("button")
     button.textContent = "✕"
-    button.setAttribute("aria-label", `Dismiss the warning of ${what.split(":")[0]}`)
+    button.setAttribute("aria-label", `Dismiss the warning of ${source}`)
     button.onclick = () => this.drop(what)
     element.append(said, button)
-    this.shown.set(what, { element, said, count: 1 })
+    this.shown.set(what, { element, said, source, count: 1 })
     this.list.append(element)
     if (this.shown.size > MOST) this.drop(this.shown.keys().next().value)
   }
