@@ -13,7 +13,6 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field
 
-from controllers.motion.equipment import tool_type
 from hub.participant import (
     Controller,
     Inputs,
@@ -32,6 +31,7 @@ from robots.dvrk.end_effectors.musha import HAND
 from robots.dvrk.instruments import instrument
 from robots.dvrk.parameters import InstrumentName, UnitQuaternion
 from robots.dvrk.setup_joints import CartArm
+from robots.dvrk.tool_type import tool_type
 from schemas.crtk import OperatingState, StringStamped
 from schemas.errors import SessionError
 from schemas.message import Message

@@ -13,6 +13,7 @@ __all__ = [
     "Command",
     "Control",
     "End",
+    "Exchange",
     "Fork",
     "Hand",
     "Invite",
@@ -163,6 +164,15 @@ class Lead(_Command):
     """Go on leading this page's other devices: a head, and two hands."""
 
 
+class Exchange(_Command):
+    """Ask for an instrument, for the arm of a device led by this page."""
+
+    do: Literal["exchange"]
+    device: Name
+    instrument: Name
+    """Name in the dVRK's words, as in the session's description."""
+
+
 class Leave(_Command):
     """Lead no more."""
 
@@ -228,6 +238,7 @@ Command = Annotated[
     | Fork
     | End
     | Lead
+    | Exchange
     | Leave
     | Hand
     | Pick

@@ -17,7 +17,7 @@ from hub.transport.control_messages import JoinRequest
 from schemas.errors import MessageError, TrocarError
 from schemas.keys import Keys
 from webconsole.commands import Hand
-from webconsole.pilot import Pilots
+from webconsole.pilot import Offer, Pilots
 
 __all__ = ["HostedDevices"]
 
@@ -63,9 +63,9 @@ class HostedDevices:
         hand_of(name).served = True
         request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
         host = DeviceHost(name, lambda: reach(self._endpoints[name], name), Keys("*"), request, None)
-        host.joined = partial(
-            self._pilots.offer, name, partial(_give_hand, name), lambda: hand_of(name).obedience
-        )
+        hand = hand_of(name)
+        offer = Offer(partial(_give_hand, name), lambda: hand.obedience, hand.ask_for)
+        host.joined = partial(self._pilots.offer, name, offer)
         try:
             host.serve(self._check)
         except TrocarError as error:

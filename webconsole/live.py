@@ -43,7 +43,7 @@ from schemas.trocar_msgs import ScoreCard, SessionStatus
 from webconsole.commands import Tune
 from webconsole.gauges import HUB, hub_outlets
 from webconsole.guide import guided_participant
-from webconsole.log import LOGGED, Entries, Entry
+from webconsole.log import Entries, Entry, is_logged
 from webconsole.past import Past
 from webconsole.source import Outlet, Value
 from webconsole.tunables import TunableParameters
@@ -319,7 +319,7 @@ class Live:
         if session is None:
             return
         logged = {
-            one.name for one in self.outlets if one.port.type in LOGGED or one.port.type == ScoreCard.ros_type
+            one.name for one in self.outlets if is_logged(one.port) or one.port.type == ScoreCard.ros_type
         }
         names = {name for name in self._wanted | logged if name in self._by_name and self._by_name[name].live}
         for name in self._subscribers.keys() - names:
@@ -364,7 +364,7 @@ class Live:
                 if outlet.name in self._values:
                     return
         self._values[outlet.name] = value
-        if outlet.port.type in LOGGED:
+        if is_logged(outlet.port):
             try:
                 for entry in self._lines.lines_of(outlet, value):
                     self._note_entry(entry)

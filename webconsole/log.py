@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple
 
 from schemas.codec import decode, message_type
 from schemas.crtk import OperatingState
+from schemas.ports import Port
 from schemas.readable import readable
-from schemas.ros import DiagnosticStatus
+from schemas.ros import DiagnosticStatus, StringMessage
 from schemas.trocar_msgs import ScoreCard, TaskEvent, TissueEvent, TissueGrasp
 from webconsole.source import Outlet, Value
 
-__all__ = ["LOGGED", "Entries", "Entry", "card_of"]
+__all__ = ["Entries", "Entry", "card_of", "is_logged"]
 
 Level = Literal["info", "warn", "error"]
 
-LOGGED = frozenset(
+_LOGGED = frozenset(
     one.ros_type for one in (TaskEvent, TissueEvent, TissueGrasp, DiagnosticStatus, OperatingState)
 )
 """Types of the logged messages."""
+_SAID: Mapping[str, Level] = {"status": "info", "error": "error"}
+"""Levels of the logged texts of an arm (CRTK)."""
 _LEVELS: tuple[Level, ...] = ("info", "warn", "error", "error")
 """Levels of a DiagnosticStatus: OK, WARN, ERROR, STALE (diagnostic_msgs/msg/DiagnosticStatus)."""
+
+
+def is_logged(port: Port) -> bool:
+    """Return whether messages of a port are lines of the log."""
+    return port.type in _LOGGED or _level_said(port) is not None
+
+
+def _level_said(port: Port) -> Level | None:
+    """Return the level of texts about an arm, `<arm>/status` and `<arm>/error`; None for other ports."""
+    arm, _, word = port.name.rpartition("/")
+    return _SAID.get(word) if arm and port.type == StringMessage.ros_type else None
 
 
 class Entry(NamedTuple):
@@ -56,7 +70,7 @@ class Entries:
 
 
 def _entries(outlet: Outlet, value: Value) -> Iterator[Entry]:
-    if outlet.port.type not in LOGGED:
+    if not is_logged(outlet.port):
         return
     message, at = decode(message_type(outlet.port.type), value.payload), value.time_ns / 1e9
     if isinstance(message, TaskEvent):
@@ -74,6 +88,8 @@ def _entries(outlet: Outlet, value: Value) -> Iterator[Entry]:
     elif isinstance(message, DiagnosticStatus):
         level = _LEVELS[min(int(message.level), len(_LEVELS) - 1)]
         yield Entry(at, level, outlet.participant, message.message)
+    elif isinstance(message, StringMessage) and (level := _level_said(outlet.port)) is not None:
+        yield Entry(at, level, outlet.name.rpartition("/")[0], message.data)
     elif isinstance(message, OperatingState):
         fault = message.state == "FAULT"
         text = f"{message.state}{', homed' if message.is_homed else ''}"

@@ -18,6 +18,7 @@ from webconsole.commands import (
     Command,
     Control,
     End,
+    Exchange,
     Fork,
     Hand,
     Invite,
@@ -158,6 +159,9 @@ class Page:
                 self._console.pilots.lead(self, order.device, beside=order.beside)
                 self._return_to_present()
                 return {"device": order.device}
+            case Exchange():
+                self._console.pilots.exchange(self, order.device, order.instrument)
+                return {}
             case Leave():
                 self._console.pilots.leave(self)
             case Control():

@@ -4,47 +4,49 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from time import monotonic
-from typing import Any
+from typing import Any, NamedTuple
 
 from devices.browser import Obedience
 from schemas.errors import MessageError, did_you_mean
 from webconsole.commands import Hand
 
-__all__ = ["Pilots"]
+__all__ = ["Offer", "Pilots"]
 
 LEASE_S = 3.0
 """Silence of a leading page until the lead ends, s."""
+
+
+class Offer(NamedTuple):
+    """A device for pages to lead."""
+
+    take: Callable[[Hand | None], None]
+    """Gets the wishes of the pages, and None when no page leads."""
+    obedience: Callable[[], Obedience]
+    """Returns how the device follows the page now."""
+    exchange: Callable[[str], None]
+    """Asks for an instrument, for the arm that the device leads."""
 
 
 class Pilots:
     """The devices for pages to lead, and the leading page of each."""
 
     def __init__(self) -> None:
-        self._devices: dict[str, Callable[[Hand | None], None]] = {}
-        self._obediences: dict[str, Callable[[], Obedience]] = {}
+        self._devices: dict[str, Offer] = {}
         self._pages: dict[str, object] = {}
         self._heard_s: dict[str, float] = {}
         self._numbers: dict[str, int] = {}
         self._people: dict[object, int] = {}
 
-    def offer(
-        self, device: str, take: Callable[[Hand | None], None], obedience: Callable[[], Obedience]
-    ) -> None:
-        """Let pages lead a device.
-
-        Args:
-            device: Name of the device.
-            take: Gets the wishes of the pages, and None when no page leads.
-            obedience: Returns how the device follows the page now.
-        """
-        self._devices[device], self._obediences[device] = take, obedience
+    def offer(self, device: str, offer: Offer) -> None:
+        """Let pages lead a device."""
+        self._devices[device] = offer
 
     def keep(self, devices: Collection[str]) -> None:
         """Offer no others than these: another session is shown."""
         for device in self._devices.keys() - set(devices):
             if device in self._pages:
                 self._release(device)
-            del self._devices[device], self._obediences[device]
+            del self._devices[device]
 
     def lead(self, page: object, device: str, *, beside: bool = False) -> None:
         """Make `page` the pilot of `device`, and of no further device unless `beside` is true.
@@ -78,8 +80,14 @@ class Pilots:
             raise MessageError(f"this page does not lead '{device:.80}'; it leads {', '.join(led)}")
         if hand.number <= self._numbers[device]:
             raise MessageError(f"input {hand.number} is old: {self._numbers[device]} was here")
-        self._devices[device](hand)
+        self._devices[device].take(hand)
         self._numbers[device], self._heard_s[device] = hand.number, monotonic()
+
+    def exchange(self, page: object, device: str, instrument: str) -> None:
+        """Ask for an instrument for the arm of a device that `page` leads; raises MessageError otherwise."""
+        if self._pages.get(device) is not page:
+            raise MessageError(f"this page does not lead '{device:.80}': lead it to exchange its instrument")
+        self._devices[device].exchange(instrument)
 
     def leads(self, page: object) -> bool:
         """Return whether `page` leads a device."""
@@ -87,7 +95,9 @@ class Pilots:
 
     def obediences(self, page: object) -> dict[str, Obedience]:
         """Return how each device that `page` leads follows it."""
-        return {device: self._obediences[device]() for device, held in self._pages.items() if held is page}
+        return {
+            device: self._devices[device].obedience() for device, held in self._pages.items() if held is page
+        }
 
     def state(self, page: object) -> list[dict[str, Any]]:
         """Return each device and its pilot, as `page` is told, ready for JSON."""
@@ -106,7 +116,7 @@ class Pilots:
 
     def _release(self, device: str) -> None:
         del self._pages[device]
-        self._devices[device](None)
+        self._devices[device].take(None)
 
     def _number_of(self, page: object) -> int:
         return self._people.setdefault(page, len(self._people) + 1)

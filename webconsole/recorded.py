@@ -25,7 +25,7 @@ from schemas.trocar_msgs import SessionStatus
 from schemas.vectors import Vector
 from webconsole.arrows import BondArrows
 from webconsole.gauges import GAUGES, HUB, hub_outlets
-from webconsole.log import LOGGED, Entries, Entry
+from webconsole.log import Entries, Entry, is_logged
 from webconsole.pyramid import Pyramid
 from webconsole.source import Outlet, Value
 
@@ -183,7 +183,7 @@ class Recorded:
     def _messages(self) -> Iterator[Entry]:
         lines = Entries()
         for outlet in self.outlets:
-            if outlet.port.type in LOGGED:
+            if is_logged(outlet.port):
                 yield from _readable_entries(self._lines_of(outlet, lines), outlet.name)
 
     def _lines_of(self, outlet: Outlet, lines: Entries) -> Iterator[Entry]:

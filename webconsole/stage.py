@@ -25,6 +25,7 @@ from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
 from webconsole.bond_history import BondHistory
 from webconsole.drag import DraggedTip, dragged_tips
+from webconsole.exchanges import OfferedInstruments, offered_instruments
 from webconsole.felt import felt_wrenches
 from webconsole.followers import find_followers
 from webconsole.frame import Section, SectionKind, change_content, film_content, node_content
@@ -102,6 +103,7 @@ class Stage:
         """Controllers that follow a device led from pages, by device."""
         of_followers = (name for found in self.followers.values() for one in found for name in one.outlets)
         self.dragged, self.undragged = _dragged_tips(scenario, params)
+        self.instruments = _offered_instruments(scenario, params)
         self.room = _room_view(scenario, params)
         of_hands = (name for names in self.felt.values() for name in names)
         of_arrows = (name for bond in self.arrows for name in bond)
@@ -233,6 +235,7 @@ class Stage:
             "felt": list(self.felt),
             "dragged": [tip._asdict() for tip in self.dragged],
             "undragged": self.undragged,
+            "instruments": [one._asdict() for one in self.instruments],
             "room": self.room,
             "numbers": [
                 {
@@ -306,6 +309,14 @@ def _dragged_tips(
         return dragged_tips(scenario, params)
     except TrocarError as error:
         return (), (str(error),)
+
+
+def _offered_instruments(scenario: Scenario, params: Callable[[str], Params]) -> list[OfferedInstruments]:
+    try:
+        return offered_instruments(scenario, params)
+    except TrocarError as error:
+        log.warning("no exchange of instruments is offered: %s", error)
+        return []
 
 
 def _room_view(scenario: Scenario, params: Callable[[str], Params]) -> dict[str, Any] | None:

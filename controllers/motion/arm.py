@@ -128,6 +128,7 @@ class Arm:
         )
         if self._exchange is not None:
             outputs[f"drive/{name}/instrument"] = self._exchange.state.part("held")
+            outputs[f"{name}/instrument"] = self._exchange.state.part("ready")
         prefixes = [name] if arm.gripper is None else [name, f"{name}/{arm.gripper.name}"]
         groups = dict(zip(prefixes, self._drives.groups, strict=True))
         self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in groups.items()]

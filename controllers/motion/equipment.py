@@ -7,34 +7,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from controllers.motion.messages import Messages
 from robots.dvrk.ecm import Endoscope
-from robots.dvrk.instruments import Instrument
 from schemas.errors import MotionError
 from schemas.ros import BoolMessage, StringMessage
 
 if TYPE_CHECKING:
     from controllers.motion.exchange import Exchange
 
-__all__ = ["Equipment", "endoscope_type", "tool_type"]
-
-_GEARED = "_GEARED"
-_VERSIONS = {"420006": ("..11", "12.."), "420093": ("..13", "14..")}
-"""Both ranges of versions of instruments with geared later versions (SAW share/tool/index.json)."""
-
-
-def tool_type(instrument: Instrument) -> str:
-    """Return `NAME:NUMBER[VERSIONS]`, such as `LARGE_NEEDLE_DRIVER:400006[..]` (SAW mtsToolList.cpp, Name).
-
-    An instrument without a number has the name alone.
-    """
-    if not instrument.number:
-        return instrument.name
-    name, geared = instrument.name.removesuffix(_GEARED), instrument.name.endswith(_GEARED)
-    versions = _VERSIONS.get(instrument.number)
-    if versions is None:
-        return (
-            f"{name.removesuffix(f'_{instrument.number}')}:{instrument.number}[..]{_GEARED if geared else ''}"
-        )
-    return f"{name.removesuffix(f'_{instrument.number}')}:{instrument.number}[{versions[geared]}]"
+__all__ = ["Equipment", "endoscope_type"]
 
 
 def endoscope_type(endoscope: Endoscope) -> str:

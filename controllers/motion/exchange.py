@@ -54,6 +54,8 @@ class ExchangeState(Record):
     """Time until the next instrument is in the arm, s."""
     depth = number()
     """Depth of the last tip from the remote centre, m."""
+    ready = integer()
+    """Number of the instrument as in `held`, -1 during an exchange."""
 
 
 class Exchange:
@@ -117,7 +119,8 @@ class Exchange:
         position = self._drives.joints.position
         tip = self.held.chain.forward(position)[:3, 3]
         self.state.depth = float(tip @ _along(self.held, position))
-        self.state.next, self.state.phase = number, Phase.WITHDRAW
+        self.state.next = number
+        self._enter(Phase.WITHDRAW)
         self._withdraw()
         name = self._variants[number].tool.name
         self._messages.status(f"exchange of {self.held.tool.name} for {name}: drawing back")
@@ -125,7 +128,7 @@ class Exchange:
     def stop(self) -> None:
         """Forget an exchange, unless the arm is empty: the arm is off or not homed any more."""
         if self.state.phase in (Phase.WITHDRAW, Phase.ADVANCE):
-            self.state.phase = Phase.NONE
+            self._enter(Phase.NONE)
             self._messages.warning(f"exchange ended on the way: the arm holds {self.held.tool.name}")
 
     def step(self, h: float) -> None:
@@ -142,21 +145,27 @@ class Exchange:
             if np.abs(setpoint.position - self._drawn_back).max() > _ARRIVED:  # after a pause
                 self._withdraw()
             else:
-                self.state.phase, self.state.left = Phase.OUT, self._seconds
+                self._enter(Phase.OUT)
+                self.state.left = self._seconds
                 self._messages.status(f"{self.held.tool.name} taken out")
         elif self.state.phase is Phase.ADVANCE:
             if np.abs(setpoint.position - self._advanced).max() > _ARRIVED:
                 self._advance()
             else:
-                self.state.phase = Phase.NONE
+                self._enter(Phase.NONE)
                 self._messages.status(f"exchange done: the arm holds {self.held.tool.name}")
 
     def _engage(self) -> None:
-        self.state.held, self.state.phase = self.state.next, Phase.ADVANCE
+        self.state.held = self.state.next
+        self._enter(Phase.ADVANCE)
         self._fit()
         if (jaw := self._drives.gripper) is not None:
             jaw.power(on=self._drives.has_gripper)
         self._advance()
+
+    def _enter(self, phase: Phase) -> None:
+        self.state.phase = phase
+        self.state.ready = -1 if self.is_busy else self.state.held
 
     def _check_jaw(self) -> None:
         """Raise MotionError if something keeps the jaw open, as the robot can tell."""

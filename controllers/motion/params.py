@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from controllers.motion.equipment import endoscope_type, tool_type
+from controllers.motion.equipment import endoscope_type
 from controllers.motion.joint_errors import JointErrors
 from hub.participant import Params
 from robots.dvrk import ecm, mtm, psm
@@ -21,6 +21,7 @@ from robots.dvrk.mounted import (
 )
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm, DrivenArm
+from robots.dvrk.tool_type import tool_type
 from robots.serial_chain import Joint
 from schemas.quantity import Duration
 

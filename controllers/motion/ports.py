@@ -182,6 +182,7 @@ def arm_ports(arm: str, params: AnyParams, reference: str, period_ns: int) -> It
     if len(params.variants) > 1:
         held = "in the arm: 0 the mounted instrument, 1 the first spare"
         yield signal_out(f"drive/{arm}/instrument", Float64Message, held)
+        yield signal_out(f"{arm}/instrument", Float64Message, f"{held}; -1 during an exchange")
     if gripper is not None:
         driven = tuple(joint.name for joint in gripper.joints)
         yield from _joint_states(f"{arm}/{gripper.name}", driven, period_ns)

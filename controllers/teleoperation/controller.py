@@ -6,18 +6,15 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from controllers.clip_trigger import ClipTrigger
 from controllers.teleoperation.contact_model import ContactModelBuilder
 from controllers.teleoperation.engagement import Engagement, EngagementPhase
-from controllers.teleoperation.jaw import JawGhost
+from controllers.teleoperation.led_instrument import LedInstrument
 from controllers.teleoperation.params import TeleoperationParams
-from controllers.teleoperation.ports import teleoperation_ports
-from controllers.teleoperation.pose_law import PoseLaw
+from controllers.teleoperation.ports import has_clips, jaw_joints, teleoperation_ports
 from controllers.teleoperation.velocity_law import advance, twist_in_tip
 from controllers.teleoperation.view import View
 from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, flag, integer, number
 from robots import rotation
-from robots.inverse_kinematics import LastFrames
 from robots.limits import TOLERANCE, distinct
 from schemas.crtk import OperatingState
 from schemas.ports import Port
@@ -60,6 +57,13 @@ class TeleoperationState(Record):
     """Command to the jaw's joints."""
 
 
+class HeldState(Record):
+    """The instrument of an arm with spares."""
+
+    number = integer()
+    """0 for the mounted one, 1 for the first spare."""
+
+
 class Teleoperation(Controller):
     """The engaged hand `master` leads the tip by the pose law or the velocity law.
 
@@ -71,33 +75,24 @@ class Teleoperation(Controller):
 
     def __init__(self, name: str, params: TeleoperationParams) -> None:
         super().__init__(name, params)
-        self._chain, n = params.chain, len(params.chain.joints)
-        self._frames = LastFrames(self._chain)
-        self._law = (
-            PoseLaw(self._chain, turns=params.orientation == "follow", frames=self._frames)
-            if params.law == "pose"
-            else None
-        )
+        self._instruments = tuple(LedInstrument(one) for one in params.variants)
+        self._held = HeldState() if len(self._instruments) > 1 else None
+        self._take(0)
         self._view, self._engagement = View(params), Engagement(params)
-        self._ghost = None if params.tool.jaw is None else JawGhost(params.tool.jaw)
-        self._trigger = None if params.tool.clip is None else ClipTrigger()
         self._contact = ContactModelBuilder(params.force, params.planes)
-        self._now = TeleoperationState(n=n, jaw=len(params.tool.jaw_joints))
+        self._now = TeleoperationState(n=len(params.chain.joints), jaw=len(jaw_joints(params)))
         self._command, self._goal, self._tip = self._now.command, self._now.goal, self._now.tip
         self._hand, self._jaw = self._now.hand, self._now.jaw
         self.keep(
             self._now,
             *self._contact.state,
             *self._engagement.state,
-            *(() if self._law is None else (self._law.state,)),
-            *(() if self._ghost is None else (self._ghost.state,)),
-            *(() if self._trigger is None else (self._trigger.state,)),
+            *(state for one in self._instruments for state in one.state),
+            *(() if self._held is None else (self._held,)),
         )
-        self._found = b""
-        """Bits of the command of `tip`."""
         self._outputs: dict[str, Any] = {"servo_jp": self._command, "goal_cp": self._goal}
         self._streams = {f"{params.arm}/servo_jp": self._command}
-        if self._ghost is not None:
+        if self._jaw.size:
             self._outputs["jaw/servo_jp"] = self._streams[f"{params.arm}/jaw/servo_jp"] = self._jaw
 
     @property
@@ -115,13 +110,23 @@ class Teleoperation(Controller):
             "state": (),
             "warning": (),
             **dict.fromkeys(self._streams, ()),
-            **({} if self._trigger is None else {"clip": ()}),
+            **({"clip": ()} if has_clips(self.params) else {}),
         }
         return self._outputs
+
+    def _take(self, number: int) -> None:
+        """Go on with an instrument: 0 for the mounted one, 1 for the first spare."""
+        led = self._instruments[number]
+        self._chain, self._frames, self._law = led.chain, led.frames, led.law
+        self._ghost, self._trigger = led.ghost, led.trigger
+        self._found = b""
+        """Bits of the command of `tip`."""
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Let the command follow the leading hand; otherwise hold the command."""
         self._receive(inputs)
+        if self._held is not None:
+            self._follow_exchange(round(float(inputs["instrument"][0])))
         if not self._holds_command:
             self._stand_at(
                 inputs["measured_js"], inputs["jaw/measured_js"] if self._ghost is not None else self._jaw
@@ -144,6 +149,8 @@ class Teleoperation(Controller):
         if self._trigger is not None:
             fires = follows and self._trigger.fires(float(self._jaw[0]), seconds)
             self._outputs["clip"] = (EmptyMessage(),) if fires else ()
+        elif "clip" in self._outputs:
+            self._outputs["clip"] = ()
         self._publish(phase, warnings + self._engagement.warnings)
         header = Header.model_construct(stamp=Time.from_ns(t + h), frame_id="")
         self._stream(header, follows=follows)
@@ -155,6 +162,8 @@ class Teleoperation(Controller):
     def restore(self, state: bytes) -> None:
         """Return to a saved state, with the tip's pose at the saved command."""
         super().restore(state)
+        if self._held is not None:
+            self._take(self._held.number)
         self._found = self._command.tobytes()
 
     @property
@@ -185,6 +194,14 @@ class Teleoperation(Controller):
             self._engagement.receive_buttons(joy)
             if self._ghost is not None and joy.buttons.size > self.params.buttons.jaw:
                 self._ghost.press(pressed=joy.buttons[self.params.buttons.jaw] != 0)
+
+    def _follow_exchange(self, number: int) -> None:
+        """Take over the instrument that the arm holds; -1: hold until there is one."""
+        self._engagement.exchanging = number < 0
+        if self._held is not None and number >= 0 and number != self._held.number:
+            self._held.number = number
+            self._take(number)
+            self._now.started = False  # the arm stands elsewhere, with another tip
 
     def _stand_at(self, positions: Vector, jaw: Vector) -> None:
         """Set the command to the measured positions of arm and jaw, clipped to their ranges.
@@ -270,7 +287,8 @@ class Teleoperation(Controller):
     def _stream(self, header: Header, *, follows: bool) -> None:
         """Send the commands to the arm's controller while the arm follows."""
         for port, positions in self._streams.items():
-            self._outputs[port] = (_positions(positions, header),) if follows else ()
+            leads = follows and (positions is self._command or self._ghost is not None)
+            self._outputs[port] = (_positions(positions, header),) if leads else ()
 
     def _feel_contact(self, inputs: Inputs, to_base: Vector, header: Header, elapsed: float) -> ContactModel:
         """Return the contact model for the hand, `elapsed` seconds after the last model."""

@@ -57,6 +57,8 @@ class Engagement:
         self._gate = AlignmentGate() if params.align == "gate" else None
         self._now = EngagementState()
         self.state = (self._now,) if self._gate is None else (self._now, self._gate.state)
+        self.exchanging = False
+        """Whether the arm's instrument is exchanged in this step."""
         self.takes_over = False
         """Whether the arm begins to follow in this step and needs a reference."""
         self.warnings: list[str] = []
@@ -69,8 +71,8 @@ class Engagement:
 
     @property
     def arm_is_ready(self) -> bool:
-        """Whether the arm is ENABLED and homed, by the last published state."""
-        return not self._now.not_ready
+        """Whether the arm is ENABLED and homed, by the last published state, and holds an instrument."""
+        return not (self._now.not_ready or self.exchanging)
 
     def receive_state(self, message: OperatingState) -> None:
         """Read the operating state of the arm."""
@@ -117,6 +119,8 @@ class Engagement:
             reason = (
                 f"its master has been silent for more than {self._max_age / 1e6:g} ms"
                 if self.arm_is_ready
+                else "its instrument is exchanged"
+                if self.exchanging
                 else "it is not ENABLED and homed"
             )
             self.warnings.append(f"{self._arm} holds: {reason}")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from controllers.motion.params import Arms
+from controllers.motion.params import Arms, PsmParams
 from controllers.teleoperation.contact_model import ForceParams, PlanesParams
 from hub.participant import Params
 from robots.dvrk import ecm, psm, si
@@ -158,6 +159,20 @@ class TeleoperationParams(PsmTool, _LedArm):
     max_age: Duration = Field(
         default=100_000_000, gt=0, description="the arm holds when the master has been silent for longer"
     )
+
+    @property
+    def variants(self) -> tuple[Self, ...]:
+        """The teleoperation with the mounted instrument, then with each spare of the arm by `arms`."""
+        return self, *self._with_spares
+
+    @cached_property
+    def _with_spares(self) -> tuple[Self, ...]:
+        led = None if self.arms is None else self.arms.present_arms.get(self.arm)
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return tuple(
+            self.model_construct(self.model_fields_set, **(fields | {"instrument": spare}))
+            for spare in (led.spares if isinstance(led, PsmParams) else ())
+        )
 
     @model_validator(mode="after")
     def _holds_what_the_arms_say(self) -> Self:

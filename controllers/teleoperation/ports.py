@@ -21,7 +21,7 @@ from schemas.ros import (
 )
 from schemas.trocar_msgs import ContactModel
 
-__all__ = ["NO_GRIPPER", "teleoperation_ports"]
+__all__ = ["NO_GRIPPER", "has_clips", "jaw_joints", "teleoperation_ports"]
 
 _LEAST_SCALE = 0.05
 """Least scale offered to people while the session runs."""
@@ -71,7 +71,11 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
         " SUJ/<arm>/measured_cp"
     )
     frame, start = (crtk.CAMERA_FRAME, None) if seen else ("", NO_POSE)
+    held = (
+        "of the arm, 0 the mounted one; -1: it is exchanged, and the arm holds; <arm>/instrument of `motion`"
+    )
     return (
+        *((signal_in("instrument", Float64Message, held),) if len(p.variants) > 1 else ()),
         measured_joints("measured_js", names, measured, start=p.start),
         event_in("operating_state", OperatingState, state),
         signal_in("base_in_view", PoseStamped, stand, frame=frame, start=start),
@@ -86,8 +90,14 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
     )
 
 
+def jaw_joints(params: TeleoperationParams) -> tuple[str, ...]:
+    """Return the names of the jaw's joints, of the first instrument with a jaw that the arm may hold."""
+    joints = (tuple(joint.name for joint in one.tool.jaw_joints) for one in params.variants)
+    return next(filter(None, joints), ())
+
+
 def _jaw(p: TeleoperationParams) -> tuple[Port, ...]:
-    names = tuple(joint.name for joint in p.tool.jaw_joints)
+    names = jaw_joints(p)
     if not names:
         return ()
     command = "command to the jaw; its roller stays where it is"
@@ -98,7 +108,7 @@ def _jaw(p: TeleoperationParams) -> tuple[Port, ...]:
 
 
 def _streams(p: TeleoperationParams) -> tuple[Port, ...]:
-    names = [f"{p.arm}/servo_jp", *([f"{p.arm}/jaw/servo_jp"] if p.tool.jaw_joints else [])]
+    names = [f"{p.arm}/servo_jp", *([f"{p.arm}/jaw/servo_jp"] if jaw_joints(p) else [])]
     meaning = (
         "the command to the arm's motion controller, at every step while it follows; otherwise nothing, so"
         " that others may move the arm"
@@ -116,5 +126,10 @@ def _published_ports(p: TeleoperationParams) -> tuple[Port, ...]:
         signal_out("following", BoolMessage, "whether the arm follows the hand"),
         event_out("state", StringMessage, phases),
         event_out("warning", StringMessage, "why the arm holds, and what to do"),
-        *(() if p.tool.clip is None else (event_out("clip", EmptyMessage, "the hand has shut the jaw"),)),
+        *((event_out("clip", EmptyMessage, "the hand has shut the jaw"),) if has_clips(p) else ()),
     )
+
+
+def has_clips(params: TeleoperationParams) -> bool:
+    """Return whether the arm may hold a clip applier."""
+    return any(one.tool.clip is not None for one in params.variants)

@@ -16,10 +16,16 @@ from devices.browser.page_hand import Obedience, PageInput, hand_of
 from devices.diagnosis import Diagnosis, Level
 from devices.keyboard.virtual_hand import VirtualHand, VirtualHandParams
 from devices.keyboard.virtual_stylus import Wish
-from hub.participant import Params, Sample
+from hub.participant import Params, Sample, event_out
+from schemas.ports import Port
 from schemas.quantity import Duration
+from schemas.ros import StringMessage
 
 __all__ = ["Browser", "BrowserParams"]
+
+_EXCHANGE = event_out(
+    "set_tool_type", StringMessage, "instrument that the led arm gets in exchange", clock="wall"
+)
 
 _WAY_NS = 2_000_000
 """Time from a read to the communication point, on the same machine, ns (bench/webconsole_session.py)."""
@@ -37,6 +43,7 @@ class BrowserParams(VirtualHandParams):
 class Browser(VirtualHand):
     """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like a stylus, led from a page.
 
+    `set_tool_type` asks for an instrument in exchange, when the leading page does.
     While no page leads, or the leading page is silent, only the diagnostics: the arm holds. The moved frame
     starts at the origin of `<participant>_base`, pointing level away from the user.
     """
@@ -45,6 +52,11 @@ class Browser(VirtualHand):
     params: BrowserParams
 
     longest_pause_ns = 50_000_000
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Those of a virtual hand, and `set_tool_type`."""
+        return *super().ports, _EXCHANGE
 
     def _reset(self) -> None:
         super()._reset()
@@ -83,6 +95,8 @@ class Browser(VirtualHand):
         if self._spent:
             asked = replace(asked, wish=Wish())
         samples = self._press(t, asked.wish) + self._diagnosis.report(Level.OK, "a page leads")
+        if instrument := self._hand.take_instrument():
+            samples.append(Sample(_EXCHANGE.name, StringMessage(data=instrument)))
         if asked.tracked is None:
             self._stylus.advance(self._with_drag(asked, lead, seconds), seconds)
         elif asked.wish.dead_man:

@@ -55,6 +55,7 @@ class PageHand:
         self._clock = clock
         self._lock = threading.Lock()
         self._newest: tuple[PageInput, int] | None = None
+        self._instrument: str | None = None
         self._leads = 0
         self.served = False
         """Whether a server of pages is in this process."""
@@ -66,10 +67,21 @@ class PageHand:
         with self._lock:
             self._newest = asked, self._clock()
 
+    def ask_for(self, instrument: str) -> None:
+        """Ask for an instrument in exchange, in the dVRK's words."""
+        with self._lock:
+            self._instrument = instrument
+
+    def take_instrument(self) -> str | None:
+        """Return the instrument asked for since the last call; None without one."""
+        with self._lock:
+            asked, self._instrument = self._instrument, None
+            return asked
+
     def release(self) -> None:
         """Forget the input: no page leads any more."""
         with self._lock:
-            self._newest = None
+            self._newest = self._instrument = None
             self._leads += 1
 
     def newest(self) -> tuple[PageInput, int, int] | None:

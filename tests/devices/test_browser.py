@@ -198,3 +198,17 @@ def test_a_tracked_hand_that_leaps_does_not_move_the_stylus_faster_than_allowed(
         page.hand.give(there)
         samples = page.read(100)
     assert np.allclose(position(samples), jump, atol=1e-6), "what was too fast is caught up"
+
+
+def test_an_instrument_is_asked_for_once(page):
+    page.ask(20)
+    page.hand.ask_for("ROUND_TIP_SCISSORS:400007[..]")
+    assert page.ask(20)["set_tool_type"].data == "ROUND_TIP_SCISSORS:400007[..]"
+    assert "set_tool_type" not in page.ask(100)
+
+
+def test_an_instrument_asked_for_is_forgotten_with_the_lead(page):
+    page.ask(20)
+    page.hand.ask_for("ROUND_TIP_SCISSORS:400007[..]")
+    page.hand.release()
+    assert "set_tool_type" not in page.ask(100)

@@ -597,6 +597,8 @@ def test_a_warning_stays_above_the_scene_until_it_is_dismissed(person):
           const alerts = new Alerts(document.getElementById("alerts"))
           const late = (n, time) => ({ time, level: "warn", source: "session", text: `${n} late steps` })
           alerts.add([late(2, 1), { time: 1, level: "info", source: "task", text: "grasped" }, late(5, 9)])
+          alerts.add([{ time: 0, level: "warn", source: "hand", text: "no page leads" }])
+          alerts.leave(new Set(["hand"]))
         }"""
     )
     shown = one.page.locator(".alert")
@@ -604,3 +606,37 @@ def test_a_warning_stays_above_the_scene_until_it_is_dismissed(person):
     assert "5 late steps (2 times, last at 9.00 s)" in shown.inner_text()
     one.page.get_by_role("button", name="Dismiss").click()
     assert shown.count() == 0
+
+
+def test_keys_move_slowly_with_shift_and_are_marked_while_they_are_held(person):
+    one = person()
+    one.sees("Boolean(trocar.session)")
+    one.page.evaluate(
+        """async () => {
+          const { Pilot } = await import("/web/pilot.js"), panel = document.getElementById("lead")
+          window.sent = []
+          const pilot = new Pilot(panel, { send: (one) => sent.push(one) }, { pulse() {} })
+          pilot.show([{ device: "hand", pilot: "you" }], "operator", "running")
+        }"""
+    )
+    held = "[...document.querySelectorAll('.lead kbd.held')].map((one) => one.textContent)"
+    for key in ("Space", "w", "v"):
+        one.page.keyboard.down(key)
+    assert one.page.evaluate("sent.at(-1)") | {"number": 0} == {
+        "do": "hand",
+        "number": 0,
+        "drag": [0, 0, 0],
+        "away": False,
+        "linear": [1, 0, 0],
+        "angular": [0, 0, 0],
+        "turn": [0, 0, 0],
+        "gripper": 1,
+        "dead_man": True,
+        "jaw": False,
+    }
+    assert one.page.evaluate(held) == ["w", "space", "v"]
+    one.page.keyboard.down("Shift")
+    slowly = one.page.evaluate("sent.at(-1)")
+    assert (slowly["linear"], slowly["gripper"], slowly["dead_man"]) == ([0.2, 0, 0], 0.2, True)
+    one.page.keyboard.up("w")
+    assert one.page.evaluate(held) == ["space", "shift", "v"]

@@ -7,7 +7,7 @@ import pytest
 from devices.browser import Obedience
 from schemas.errors import MessageError
 from webconsole.commands import At, Hand, command
-from webconsole.pilot import Pilots
+from webconsole.pilot import Offer, Pilots
 
 
 def test_commands_are_read():
@@ -48,7 +48,7 @@ def test_anything_else_is_refused(text):
 def pilots():
     pilots = Pilots()
     pilots.given = []
-    pilots.offer("hand", pilots.given.append, lambda: Obedience.OPEN)
+    pilots.offer("hand", Offer(pilots.given.append, lambda: Obedience.OPEN, pilots.given.append))
     return pilots
 
 
@@ -108,7 +108,7 @@ def test_an_unknown_device_is_named(pilots):
 
 
 def test_a_headset_leads_several(pilots):
-    pilots.offer("head", pilots.given.append, lambda: Obedience.OPEN)
+    pilots.offer("head", Offer(pilots.given.append, lambda: Obedience.OPEN, pilots.given.append))
     pilots.lead("page", "hand")
     pilots.lead("page", "head", beside=True)
     asked = hand(0, device="head", tracked=(0, 1, 0, 0, 0, 0, 1))
@@ -116,3 +116,14 @@ def test_a_headset_leads_several(pilots):
     assert pilots.given == [asked]
     with pytest.raises(MessageError, match="does not lead 'eyes'"):
         pilots.pass_on("page", hand(1, device="eyes"))
+
+
+def test_who_leads_a_device_asks_for_an_instrument(pilots):
+    asked = command('{"do": "exchange", "device": "hand", "instrument": "ROUND_TIP_SCISSORS:400007[..]"}')
+    pilots.lead("page", "hand")
+    pilots.exchange("page", asked.device, asked.instrument)
+    assert pilots.given == ["ROUND_TIP_SCISSORS:400007[..]"]
+    with pytest.raises(MessageError, match="does not lead 'hand'"):
+        pilots.exchange("other", asked.device, asked.instrument)
+    with pytest.raises(MessageError, match="does not lead 'head'"):
+        pilots.exchange("page", "head", asked.instrument)

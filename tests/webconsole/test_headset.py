@@ -9,7 +9,7 @@ from tests.waiting import until
 from tests.webconsole.conftest import served
 from tests.webconsole.recorded_scene import write_scene
 from tests.webconsole.test_browser import GAMEPAD, Person
-from webconsole.pilot import Pilots
+from webconsole.pilot import Offer, Pilots
 from webconsole.recorded import Recorded
 
 IWER = Path(__file__).parent / "vendor/iwer.min.js"
@@ -37,7 +37,7 @@ class Room:
         self.pilots = Pilots()
         self.given = {name: [] for name in ("head", "left_hand", "right_hand")}
         for name, given in self.given.items():
-            self.pilots.offer(name, given.append, lambda: Obedience.OPEN)
+            self.pilots.offer(name, Offer(given.append, lambda: Obedience.OPEN, given.append))
 
     def newest(self, name):
         given = self.given[name]
@@ -63,7 +63,7 @@ def test_the_force_on_the_instrument_is_felt_while_the_hand_leads(browser, tmp_p
     """The gamepad is a stub. The force grows by 50 N/m of depth, and 2 N are felt with all strength."""
     write_scene(tmp_path / "scene")
     pilots, given = Pilots(), []
-    pilots.offer("hand", given.append, lambda: Obedience.OPEN)
+    pilots.offer("hand", Offer(given.append, lambda: Obedience.OPEN, given.append))
     with served(Recorded(tmp_path / "scene"), pilots) as server:
         link = f"http://127.0.0.1:{server.port}{server.gate.invite('operator')}"
         one = Person(browser, link, GAMEPAD, RUMBLE)

@@ -46,7 +46,7 @@ export class Gizmo {
 
   // `led`: arm, view and turning of the device that this page leads; null: none.
   show(led) {
-    const tip = led && this.scene.tips.find(({ name }) => name === led.arm)
+    const tip = led && this.scene.usedTips.find(({ name }) => name === led.arm)
     if (this.tip === tip?.axes) return
     this.tip = tip?.axes
     this.led = led

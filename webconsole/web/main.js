@@ -47,6 +47,7 @@ const link = new Link({
     warn(state.log, new Set(state.pilots?.map(({ device }) => device)))
     showCard($("card"), state.card)
     headset.show(state.pilots, session?.role)
+    pilot.instruments = session?.instruments ?? []
     pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one),
       session?.role, state.state)
     pilot.gizmo?.show(session?.dragged?.find(({ device }) => device === pilot.device) ?? null)
@@ -107,6 +108,7 @@ $("frames").onchange = () => scene?.frames($("frames").checked)
 // `led`: devices for pages to lead: the panel says how each follows, so their warnings stand in the log alone.
 function warn(entries = [], led = new Set()) {
   log.add(entries)
+  alerts.leave(led) // a device may be offered to pages only after its first warning
   alerts.add(entries.filter(({ source }) => !led.has(source)))
 }
 

@@ -10,7 +10,7 @@ const KEYS = {
   arrowup: ["point up", { angular: [1, 0, 0] }], arrowdown: ["point down", { angular: [-1, 0, 0] }],
   arrowleft: ["point left", { angular: [0, -1, 0] }], arrowright: ["point right", { angular: [0, 1, 0] }],
   q: ["roll left", { angular: [0, 0, -1] }], e: ["roll right", { angular: [0, 0, 1] }],
-  " ": ["hold to move", { dead_man: true }],
+  " ": ["hold to move", { dead_man: true }], shift: ["slowly", {}],
   c: ["close", { gripper: -1, jaw: true }], v: ["open", { gripper: 1 }],
 }
 const CAPS = { " ": "space", arrowup: "↑", arrowdown: "↓", arrowleft: "←", arrowright: "→" }
@@ -22,6 +22,7 @@ const WHY = {
   spent: "this page was silent for too long; let go of space, and press it again",
 }
 const PERIOD_MS = 25
+const SLOWLY = 0.2 // share of the speed of keys while Shift is held
 const PAD_M_PER_PX = 0.0005
 const LATE_MS = 300 // an arm that does not follow for so long is said
 const DEAD_ZONE = 0.24 // of a stick at rest (XINPUT_GAMEPAD_LEFT_THUMB_DEADZONE, 7849 of 32767)
@@ -35,6 +36,7 @@ export class Pilot {
     this.drag = [0, 0, 0]
     this.dragging = false
     this.text = ""
+    this.instruments = [] // of each arm that may get others from this page: device, arm, instruments
     this.led = {} // of each device that this page leads: how it follows, and what keeps an arm from following it
     addEventListener("keydown", (event) => this.key(event, true))
     addEventListener("keyup", (event) => this.key(event, false))
@@ -51,7 +53,7 @@ export class Pilot {
     const mine = devices?.find(({ pilot }) => pilot === "you")?.device ?? null
     if (mine !== this.device) this.become(mine)
     this.panel.hidden = !devices?.length || role === "viewer"
-    const text = JSON.stringify([devices, role])
+    const text = JSON.stringify([devices, role, this.instruments])
     if (text === this.text || this.panel.hidden) return
     this.text = text
     this.build(devices)
@@ -80,9 +82,31 @@ export class Pilot {
       row.append(button, who)
       return row
     })
-    if (this.leading) rows.push(...this.help())
+    if (this.leading) rows.push(...this.exchange(), ...this.help())
     this.panel.replaceChildren(...rows)
     this.mark()
+  }
+
+  // What the led arm may hold, each with its key.
+  get offered() { return this.instruments.find(({ device }) => device === this.device) }
+
+  exchange() {
+    if (!this.offered) return []
+    const row = element("div", "row"), arm = element("span")
+    arm.textContent = `${this.offered.arm} gets`
+    row.append(arm, ...this.offered.instruments.map((instrument, i) => {
+      const button = element("button"), cap = element("kbd")
+      cap.textContent = cap.dataset.key = String(i + 1)
+      button.append(cap, ` ${wordsOf(instrument)}`)
+      button.onclick = () => { button.blur(); this.get(i) }
+      return button
+    }))
+    return [row]
+  }
+
+  get(number) {
+    const instrument = this.offered?.instruments[number]
+    if (instrument) this.link.send({ do: "exchange", device: this.device, instrument })
   }
 
   help() {
@@ -93,6 +117,7 @@ export class Pilot {
     const keys = element("div", "keys")
     for (const [key, [text]] of Object.entries(KEYS)) {
       const one = element("span"), cap = element("kbd")
+      cap.dataset.key = key
       cap.textContent = CAPS[key] ?? key
       one.append(cap, ` ${text}`)
       keys.append(one)
@@ -134,8 +159,10 @@ export class Pilot {
 
   key(event, down) {
     const key = event.key.toLowerCase()
-    if (!this.leading || !(key in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return
+    if (!this.leading || event.ctrlKey || event.metaKey || event.altKey) return
     if (event.target.closest?.("input, select")) return
+    if (down && !event.repeat && /^[1-9]$/.test(key)) this.get(Number(key) - 1)
+    if (!(key in KEYS)) return
     event.preventDefault()
     if (event.repeat) return
     if (down) this.held.add(key)
@@ -161,13 +188,13 @@ export class Pilot {
 
   wish() {
     const wish = { linear: [0, 0, 0], angular: [0, 0, 0], turn: [0, 0, 0], gripper: 0, dead_man: this.dragging, jaw: false }
-    const add = (one) => {
-      for (const name of ["linear", "angular", "turn"]) one[name]?.forEach((share, i) => { wish[name][i] += share })
-      wish.gripper += one.gripper ?? 0
+    const add = (one, speed = 1) => {
+      for (const name of ["linear", "angular", "turn"]) one[name]?.forEach((share, i) => { wish[name][i] += speed * share })
+      wish.gripper += speed * (one.gripper ?? 0)
       wish.dead_man ||= one.dead_man ?? false
       wish.jaw ||= one.jaw ?? false
     }
-    for (const key of this.held) add(KEYS[key][1])
+    for (const key of this.held) add(KEYS[key][1], this.held.has("shift") ? SLOWLY : 1)
     const pad = this.pad()
     if (pad) add(gamepad(pad))
     if (this.gizmo) add(this.gizmo.wish())
@@ -198,6 +225,7 @@ export class Pilot {
     if (dead.textContent !== text) dead.textContent = text
     dead.classList.toggle("held", !why)
     document.getElementById("pad")?.classList.toggle("held", this.dragging)
+    for (const cap of this.panel.querySelectorAll("kbd")) cap.classList.toggle("held", this.held.has(cap.dataset.key))
   }
 
   // Why the arm holds, and what to do about it; null if it moves.
@@ -224,6 +252,12 @@ function gamepad({ axes, buttons }) {
     angular: [-axis(3), axis(2), button(15) - button(14)],
     gripper: button(6) - button(7), dead_man: button(4) > 0.5, jaw: button(7) > 0,
   }
+}
+
+// "ROUND_TIP_SCISSORS:400007[..]" in words.
+function wordsOf(instrument) {
+  const [name] = instrument.split(":")
+  return name.toLowerCase().replaceAll("_", " ")
 }
 
 function element(name, className = "") {

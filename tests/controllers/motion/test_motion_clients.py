@@ -5,12 +5,12 @@ what is told once.
 import numpy as np
 import pytest
 
-from controllers.motion.equipment import tool_type
 from robots.dvrk import arms
 from robots.dvrk.arm_bodies import ENDOSCOPE_MASS
 from robots.dvrk.dynamics import STANDARD_GRAVITY
 from robots.dvrk.instruments import instrument, instruments
 from robots.dvrk.kinematics_queries import KinematicsQueries
+from robots.dvrk.tool_type import tool_type
 from schemas.crtk import StringStamped
 from schemas.ros import BoolMessage, Header, StringMessage, Time
 from tests.controllers.motion.rig import CART, HOME, PSM1, Rig, cp, jp

@@ -140,3 +140,14 @@ def test_spares_that_do_not_fit_are_refused(arm, said):
 def test_an_arm_that_is_not_homed_exchanges_nothing():
     one = Rig(ARM, initial_state="disabled").step(2).step(1, set_tool_type=give(HOOK))
     assert "DISABLED" in one.said("error")[0]
+
+
+def test_the_instrument_in_use_is_published_and_minus_one_during_an_exchange():
+    one = rig()
+    assert one.outputs["PSM1/instrument"][0] == 0.0
+    one.step(1, set_tool_type=give(HOOK))
+    assert one.outputs["PSM1/instrument"][0] == -1.0
+    until(one, "taken out")
+    assert one.outputs["PSM1/instrument"][0] == -1.0
+    until(one, "exchange done")
+    assert one.outputs["PSM1/instrument"][0] == 1.0
