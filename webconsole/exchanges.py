@@ -37,9 +37,11 @@ def offered_instruments(scenario: Scenario, params: Callable[[str], Params]) -> 
         arm, _, command = target.port.partition("/")
         if source.participant not in led or source.port != _COMMAND or command != _COMMAND:
             continue
-        arms: dict[str, Any] = params(target.participant).model_dump(include={"arms"}).get("arms") or {}
-        held = arms.get(arm) or {}
-        names = [held["instrument"], *held.get("spares", ())] if held else []
+        arms: dict[str, dict[str, Any] | None]
+        arms = params(target.participant).model_dump(include={"arms"}).get("arms") or {}
+        if (held := arms.get(arm)) is None:
+            continue
+        names: list[str] = [held["instrument"], *held.get("spares", ())]
         if len(names) > 1:
             types = [tool_type(instrument(name)) for name in names]
             found[source.participant, arm] = OfferedInstruments(source.participant, arm, types)
