@@ -39,6 +39,7 @@ class PageAppearance:
         blob = bytearray()
         described = {
             "place": appearance.place,
+            "vignette": appearance.vignette,
             "surfaces": [
                 self._surface(appearance.skins.get(name), body, blob) for name, body in surfaces.items()
             ],

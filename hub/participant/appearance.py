@@ -82,3 +82,5 @@ class Appearance(NamedTuple):
     surroundings: Sequence[Surrounding]
     place: str
     """Name of the place, which says how it is lit: `abdomen`, `subhepatic`, `dry-lab`, `none`."""
+    vignette: float = 0.0
+    """Share of light that the lens of the endoscope loses in the corners of a picture."""

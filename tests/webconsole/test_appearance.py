@@ -122,13 +122,28 @@ def test_the_browser_draws_textures_blood_and_surroundings(person):
     person.sees(f"{TISSUE}.geometry.groups.length === 3")
     assert person.page.evaluate(f"{uv}.every(Number.isFinite)")
     person.sees("trocar.scene.surfaces[0].film.coat.visible")
+    burns = "trocar.scene.surfaces[0].burns.coats"
+    assert person.page.evaluate(f"{burns}.every(({{ visible }}) => visible)"), "ragged edges of the burn"
     person.picture()
     looks.select_option("simple")
     person.sees("!trocar.scene.surfaces[0].film.coat.visible && !trocar.scene.renderer.shadowMap.enabled")
+    assert not person.page.evaluate(f"{burns}.some(({{ visible }}) => visible)")
     person.picture()
     looks.select_option("plain")
     person.sees("trocar.scene.level === 'plain' && !trocar.scene.looks.surroundings.visible")
     assert person.errors == []
+
+
+def test_the_view_of_the_endoscope_is_darker_in_its_corners(person):
+    person.page.get_by_label("Looks of the scene").select_option("simple")
+    person.sees("trocar.scene.level === 'simple' && trocar.scene.looks.appearance")
+    at = "pose: [0, 0, 0.2, 1, 0, 0, 0], fieldOfView: 1, baseline: 0"
+    camera = f"{{ group: trocar.scene.bodies[0][0], {at} }}"
+    person.page.evaluate(f"trocar.scene.cameras.push({camera})")  # the scene has no endoscope
+    vignette = "getComputedStyle(document.getElementById('view'), '::before').opacity"
+    for view, seen in (("endoscope", "0.35"), ("work", "0")):
+        person.page.evaluate(f"trocar.scene.choose('{view}')")
+        person.sees(f"{vignette} === '{seen}'")
 
 
 def test_smoke_rises_from_where_tissue_was_burnt_last(person):

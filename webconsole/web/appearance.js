@@ -21,6 +21,7 @@ export async function loadAppearance() {
     [name, { ...coat, texture: await texture(coat.texture) }])).then(Object.fromEntries)
   return {
     place: described.place,
+    vignette: described.vignette,
     kinds: await coats(described.kinds),
     coats: await coats(described.coats),
     skins: await Promise.all(described.surfaces.map(async (surface) => surface && {

@@ -1,10 +1,12 @@
 // Bodies and soft surfaces of a session: made from what /scene answers, moved by what frames have.
 
 import * as THREE from "./vendor/three.module.js"
+import { Burns } from "./burns.js"
 import { Film } from "./film.js"
 import { boxSides, creased, gathered, onSide, smooth, splitByChart } from "./mesh.js"
 
 const BURNT = 2 // and above: kinds of burnt faces
+const PAINTED = 2 // added to the kind of burnt faces of the outside: with full looks its skin, below burns.js
 const WET = 1 // the kind of face inside a cut: webconsole/stage.py has the colours by kind
 const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
 const AWAY_M = 500 // bodies farther away are instruments out of use, waiting for an exchange
@@ -36,7 +38,7 @@ export class Contents {
     const scenes = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)))
     for (const scene of scenes) this.add(scene, buffer, 4 + size)
     this.surfaces = surfaces.map(({ colours }) => ({ colours, mesh: null, triangles: null, changed: null, liquid: null,
-      film: null, skin: null, stale: false }))
+      film: null, burns: null, skin: null, stale: false }))
     return scenes
   }
 
@@ -144,12 +146,13 @@ export class Contents {
 
   // Make the geometry of a surface that has changed, if all nodes of its faces are there.
   renew(surface, positions) {
-    const { faces, kinds, slots } = changedFaces(surface), count = faces.reduce((most, node) => Math.max(most, node + 1), 0)
+    const { faces, kinds, slots } = changedFaces(surface), bare = kinds.map((kind) => (kind > BURNT + 1 ? 0 : kind))
+    const count = faces.reduce((most, node) => Math.max(most, node + 1), 0)
     if (positions.length < 3 * count) return
-    const base = creased(positions, faces, SOFT, kinds)
+    const base = creased(positions, faces, SOFT, bare)
     base.position = new Float32Array(3 * base.origin.length)
     base.normal = new Float32Array(3 * base.origin.length)
-    const charts = surface.skin ? chartsOf(surface, faces, kinds, slots) : new Uint32Array(kinds.length)
+    const charts = surface.skin ? chartsOf(surface, faces, bare, slots) : new Uint32Array(kinds.length)
     const { index, from } = splitByChart(base.index, charts), made = new THREE.BufferGeometry()
     made.setAttribute("position", attribute(3 * from.length))
     made.setAttribute("normal", attribute(3 * from.length))
@@ -164,14 +167,33 @@ export class Contents {
       surface.mesh.geometry.dispose()
       surface.mesh.geometry = made
       if (surface.liquid) this.wet(surface)
+      this.burn(surface, { faces, kinds, bare, index })
       return
     }
     const materials = surface.colours.map((colour, kind) => this.material([...colour, 1], THREE.DoubleSide, kind === WET))
+    materials.push(...materials.slice(BURNT))
     surface.mesh = new THREE.Mesh(made, materials)
     surface.mesh.userData.looks = { plain: materials }
     surface.mesh.frustumCulled = false
     this.own(surface.mesh)
     if (surface.liquid) this.wet(surface)
+    this.burn(surface, { faces, kinds, bare, index })
+  }
+
+  // Lay coats over the burnt faces of the outside.
+  burn(surface, { faces, kinds, bare, index }) {
+    if (!surface.burns && !kinds.some((kind) => kind > BURNT + 1)) return // an older instant may have none any more
+    surface.burns ??= new Burns(surface.mesh)
+    const outer = Array.from(bare.keys()).filter((face) => !bare[face])
+    const picked = (source) => Uint32Array.from(outer.flatMap((face) => [...source.subarray(3 * face, 3 * face + 3)]))
+    const rest = new Float32Array(3 * surface.origin.length)
+    surface.origin.forEach((node, vertex) => {
+      const at = 3 * restNode(surface, node)
+      rest.set(surface.skin.rest.subarray(at, at + 3), 3 * vertex)
+    })
+    surface.burns.show({ faces: picked(faces), corners: picked(index), origin: surface.origin, rest, tiles: surface.skin.tiles,
+      kinds: Uint8Array.from(outer, (face) => (kinds[face] ? kinds[face] - PAINTED : 0)) })
+    surface.burns.level(this.level)
   }
 }
 
@@ -205,8 +227,9 @@ function coordinates(surface, faces, slots, charts, index, count) {
   return uv
 }
 
-// The faces of a surface without those that are gone, by kind, and the slot of each.
-function changedFaces({ triangles, changed }) {
+// The faces of a surface without those that are gone, by kind, and the slot of each. Burnt faces of the outside have kinds
+// of their own where it has a skin.
+function changedFaces({ triangles, changed, skin }) {
   if (!changed?.slots.length) {
     const kinds = new Uint8Array(triangles.length / 3)
     return { faces: triangles, kinds, slots: Uint32Array.from(kinds.keys()) }
@@ -216,7 +239,7 @@ function changedFaces({ triangles, changed }) {
   nodes.set(triangles)
   changed.slots.forEach((slot, i) => {
     nodes.set(changed.faces.subarray(3 * i, 3 * i + 3), 3 * slot)
-    every[slot] = changed.kinds[i]
+    every[slot] = changed.kinds[i] + (changed.kinds[i] >= BURNT && slot < (skin?.charts.length ?? 0) ? PAINTED : 0)
   })
   const kept = Array.from(every.keys()).filter((slot) => nodes[3 * slot] >= 0).sort((a, b) => every[a] - every[b])
   const faces = new Uint32Array(3 * kept.length)

@@ -4,6 +4,7 @@ import * as THREE from "./vendor/three.module.js"
 
 const STEPS = 256, STEP_M = 1e-5 // thicknesses of a film
 const ROUGHNESS = 0.08
+const DEEP = 0.3 // reflectance of a deep pool over the number of a screen's colour
 
 export class Film {
   // `mesh`: that of the surface; its materials by level are in `userData.looks`.
@@ -41,8 +42,8 @@ export class Film {
   }
 
   dress(tint) {
-    const pixels = new Uint8Array(4 * STEPS)
-    for (let step = 0; step < STEPS; step++) pixels.set(coatColour(step, tint).map((part) => Math.round(255 * part)), 4 * step)
+    const pixels = new Uint8Array(4 * STEPS), below = this.mesh.userData.looks.plain[0].color
+    for (let step = 0; step < STEPS; step++) pixels.set(coatColour(step, tint, below).map((part) => Math.round(255 * part)), 4 * step)
     this.texture = new THREE.DataTexture(pixels, STEPS, 1)
     Object.assign(this.texture, { colorSpace: THREE.SRGBColorSpace, needsUpdate: true })
     this.coat.material = new THREE.MeshStandardMaterial({ map: this.texture, transparent: true, roughness: ROUGHNESS,
@@ -71,11 +72,12 @@ export class Film {
   }
 }
 
-// Colour and opacity of a film: engines/mujoco/pictures/filament/drawn_film.py, `_coat_colours`.
-function coatColour(step, tint) {
-  const through = [0, 1, 2].map((c) => Math.exp((-STEP_M * step) / tint[3 + c])), most = Math.max(...through, 1e-6)
-  const colour = through.map((part, c) => tint[c] * (0.5 + (0.5 * part) / most))
-  return [...colour, 1 - (through[0] + through[1] + through[2]) / 3]
+// Colour and opacity of a film over tissue of a colour; engines/mujoco/pictures/filament/drawn_film.py, `_coat_colours`.
+function coatColour(step, tint, below) {
+  const through = [0, 1, 2].map((c) => Math.exp((-STEP_M * step) / tint[3 + c])), opacity = 1 - Math.min(...through)
+  const light = [below.r, below.g, below.b].map((part, c) =>
+    (through[c] - (1 - opacity)) * part + (1 - through[c]) * DEEP * tint[c])
+  return [...light.map((part) => Math.min(Math.max(part / Math.max(opacity, 1e-6), 0) ** (1 / 2.2), 1)), opacity]
 }
 
 // The colour of tissue under films of 0 to 255 steps of 10 um, over its own; hub/participant/view.py, `wet_colours`.

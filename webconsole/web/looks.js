@@ -3,6 +3,7 @@
 
 import * as THREE from "./vendor/three.module.js"
 import { texturesOf } from "./appearance.js"
+import { burntMaterials } from "./burns.js"
 
 export const LEVELS = ["full", "simple", "plain"]
 const COAT = 0.6, COAT_ROUGHNESS = 0.16 // the film on tissue
@@ -42,9 +43,10 @@ export class Looks {
   show(level) {
     this.level = this.contents.level = level
     for (const mesh of this.contents.rigid) this.put(mesh, () => this.rigid(mesh.userData))
-    this.contents.surfaces.forEach(({ mesh, film }, index) => {
+    this.contents.surfaces.forEach(({ mesh, film, burns }, index) => {
       if (mesh) this.put(mesh, () => this.tissue(mesh.userData.looks.plain, index))
       film?.level(level)
+      burns?.level(level)
     })
     if (!this.surroundings) return
     for (const mesh of this.surroundings.children) this.put(mesh)
@@ -76,16 +78,19 @@ export class Looks {
 
   // `plain`: the material for each kind of face.
   tissue(plain, index) {
-    const textures = plain.map((_, kind) => (kind ? this.appearance.kinds[kind] : this.appearance.skins[index])?.texture)
+    const { kinds, skins } = this.appearance
+    const textures = plain.map((_, kind) => (kinds[kind] ?? skins[index])?.texture) // burnt outsides: the skin below burns.js
     const bare = plain.map(({ color }) => ({ color: color.clone() }))
-    if (!this.appearance.skins[index]) textures.fill(undefined) // its vertices have no texture coordinates
+    if (!skins[index]) textures.fill(undefined) // its vertices have no texture coordinates
+    const isPainted = (kind) => kind > 0 && !kinds[kind] // burnt, outside
     return {
-      simple: textures.map((texture, kind) =>
-        this.keep(new THREE.MeshLambertMaterial({ ...TISSUE, ...(texture ? { map: texture.map } : bare[kind]) }))),
+      simple: textures.map((texture, kind) => this.keep(new THREE.MeshLambertMaterial({ ...TISSUE,
+        ...(texture && !isPainted(kind) ? { map: texture.map } : bare[kind]) }))),
       full: textures.map((texture, kind) => this.keep(new THREE.MeshPhysicalMaterial({ ...TISSUE,
         ...(texture ? bumpy(texture) : { ...bare[kind], roughness: PLASTIC }),
-        clearcoat: kind < 2 ? COAT : 0, clearcoatRoughness: COAT_ROUGHNESS, // burnt tissue is dry
+        clearcoat: kind > 1 && kinds[kind] ? 0 : COAT, clearcoatRoughness: COAT_ROUGHNESS, // burnt tissue is dry
       }))),
+      burns: skins[index] && burntMaterials((kind) => bumpy(kinds[kind].texture)).map((one) => this.keep(one)),
     }
   }
 

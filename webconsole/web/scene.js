@@ -374,6 +374,8 @@ export class Scene {
     }
     this.camera.updateProjectionMatrix()
     if (this.grid) this.grid.visible = !endoscope
+    const seen = endoscope && this.level !== "plain" ? this.looks.appearance?.vignette : 0
+    this.canvas.parentElement.style.setProperty("--vignette", seen || 0)
     this.light()
     this.renderer.render(this.world, this.camera)
   }

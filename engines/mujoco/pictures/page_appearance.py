@@ -19,7 +19,7 @@ from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.surroundings import make_place
 from engines.mujoco.place.dress import BRIGHT
 from engines.mujoco.place.part import PlacePart
-from engines.mujoco.textures.atlas import Atlas
+from engines.mujoco.textures.atlas import Atlas, picture_side
 from engines.mujoco.textures.coats import COATS, KINDS, Coat
 from engines.mujoco.textures.noise import SEED, Noise
 from engines.mujoco.textures.surface import Maps, Recipe, make_tile
@@ -47,11 +47,12 @@ def page_appearance(params: SceneParams, bodies: Mapping[str, RestBody]) -> Appe
     noise, seen = Noise(SEED), _endoscope_params(params, bodies)
     recipes = body_recipes(seen.soft_bodies, {name: body.nodes for name, body in bodies.items()})
     return Appearance(
-        {name: _skin(body, recipes[name], noise) for name, body in bodies.items()},
+        {name: _skin(body, recipes[name], noise, picture_side(len(bodies))) for name, body in bodies.items()},
         {kind: _coat(coat, noise) for kind, coat in KINDS.items()},
         {name: _coat(coat, noise) for name, coat in {**COATS, BRIGHT: _BRIGHT}.items()},
         _surroundings(seen, bodies, noise),
         seen.surroundings,
+        seen.sensor.vignette,
     )
 
 
@@ -63,9 +64,9 @@ def _endoscope_params(params: SceneParams, bodies: Mapping[str, RestBody]) -> En
     return EndoscopeParams.model_construct(**scene, skins={name: SkinParams() for name in bodies})
 
 
-def _skin(body: RestBody, recipe: Recipe, noise: Noise) -> Skin:
+def _skin(body: RestBody, recipe: Recipe, noise: Noise, side: int) -> Skin:
     rest, faces = body.nodes.astype(np.float64), body.faces.astype(np.int64)
-    atlas = Atlas(rest, faces)
+    atlas = Atlas(rest, faces, side)
     uv = atlas.uv(rest[faces].reshape(-1, 3), atlas.chart.repeat(3))
     return Skin(_texture(atlas.paint(recipe, noise)), uv.reshape(-1, 3, 2), atlas.chart.astype(np.uint16))
 

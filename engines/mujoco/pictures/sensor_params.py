@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from hub.participant import Params
-from schemas.quantity import Duration
+from schemas.quantity import Duration, Length
 
 __all__ = ["LensEvent", "SensorParams"]
 
@@ -59,6 +59,17 @@ class SensorParams(Params):
     )
     events: tuple[LensEvent, ...] = Field(
         default=(), max_length=100, description="later changes of fog and dirt, such as a wipe"
+    )
+    focus: Length | None = Field(
+        default=None,
+        gt=0.0,
+        description="distance in focus; default: sharp everywhere, as an endoscope is from 30 to 150 mm",
+    )
+    aperture: Length = Field(
+        default=4e-4,
+        gt=0.0,
+        le=0.01,
+        description="diameter of the lens's opening with a `focus`: the larger, the less is sharp; assumed",
     )
     compression: int | None = Field(
         default=None,

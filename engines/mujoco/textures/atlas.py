@@ -18,7 +18,7 @@ from engines.mujoco.textures.noise import Noise, Points, Values
 from engines.mujoco.textures.surface import Maps, Recipe, Surface, make_maps
 from schemas.vectors import Vector
 
-__all__ = ["SIDES", "Atlas", "Indices", "facing_side"]
+__all__ = ["SIDES", "Atlas", "Indices", "facing_side", "picture_side"]
 
 Indices = NDArray[np.int64]
 
@@ -27,8 +27,10 @@ SIDES: NDArray[np.float64] = np.array(
     [[_Y, _Z, _X], [_Z, _Y, -_X], [_Z, _X, _Y], [_X, _Z, -_Y], [_X, _Y, _Z], [_Y, _X, -_Z]]
 )
 """Axes u, v and outward normal of the sides of a box, shape (6, 3, 3), each right-handed."""
-_PIXELS = 1024
-"""Side of the picture of the outside: 0.1 to 0.4 mm a texel on an organ."""
+_PIXELS, _LEAST_PIXELS = 1024, 128
+"""Largest and least side of the picture of an outside: 0.1 to 0.4 mm a texel on an organ with the largest."""
+_TEXELS = 32 * _PIXELS**2
+"""Most texels of all outsides of a scene: with three maps and their smaller ones about 0.5 GB."""
 _MARGIN = 5
 """Texels around a chart, filled with the colours of its edge: smaller pictures of the texture mix them."""
 _FULL, _SHRINK = 0.8, 0.94
@@ -42,10 +44,18 @@ def facing_side(normals: Vector) -> Indices:
     return np.argmax(normals @ SIDES[:, 2].T, axis=1)
 
 
+def picture_side(bodies: int) -> int:
+    """Return the side of the pictures of outsides, texels, for the number of bodies in a scene."""
+    side = _PIXELS
+    while bodies * side**2 > _TEXELS and side > _LEAST_PIXELS:
+        side //= 2
+    return side
+
+
 class Atlas:
     """Charts of a surface."""
 
-    def __init__(self, rest: Vector, triangles: Indices, pixels: int = _PIXELS) -> None:
+    def __init__(self, rest: Vector, triangles: Indices, pixels: int) -> None:
         """Unfold triangles, node indices of shape (f, 3), of `rest`, shape (n, 3), m, into `pixels`^2."""
         self._rest, self._triangles, self._pixels = rest, triangles, pixels
         corners = rest[triangles]

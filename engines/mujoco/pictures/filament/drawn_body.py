@@ -41,13 +41,14 @@ class DrawnBody:
         recipe: Recipe,
         coats: Mapping[FaceKind, Coat],
         noise: Noise,
+        side: int,
     ) -> None:
-        """`recipe`: of the outside; `coats`: of changed faces."""
+        """`recipe`: of the outside; `coats`: of changed faces; `side`: of its picture, texels."""
         self._coats = coats
         self._context, self._scene, self._body, self._noise = context, scene, body, noise
         triangles = body.triangles.astype(np.int64)
         self._rest = body.rest.astype(np.float64)
-        self._atlas = Atlas(self._rest, triangles)
+        self._atlas = Atlas(self._rest, triangles, side)
         self._charts = {
             tuple(nodes): int(chart)
             for nodes, chart in zip(np.sort(triangles, axis=1).tolist(), self._atlas.chart, strict=True)

@@ -18,12 +18,14 @@ from engines.mujoco.pictures.filament.drawn_body import DrawnBody
 from engines.mujoco.pictures.filament.drawn_geoms import DrawnGeoms
 from engines.mujoco.pictures.filament.drawn_place import DrawnPlace
 from engines.mujoco.pictures.filament.drawn_solids import DrawnSolids
+from engines.mujoco.pictures.filament.focus import Focus
 from engines.mujoco.pictures.filament.lamp import Lamp, RoomLamp
 from engines.mujoco.pictures.filament.light_control import LightControl
 from engines.mujoco.pictures.skin_params import body_recipes
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.variation import Variation
 from engines.mujoco.place.part import PlacePart
+from engines.mujoco.textures.atlas import picture_side
 from engines.mujoco.textures.coats import changed_coats
 from engines.mujoco.textures.noise import Noise
 from robots.dvrk.endoscope import StereoCamera
@@ -111,6 +113,7 @@ class FilamentRenderer:
                 variation.recolour(recipes[name], name),
                 changed_coats(skins[name].tissue(name)),
                 noise,
+                picture_side(len(bodies)),
             )
             for name, body in bodies.items()
         ]
@@ -135,6 +138,10 @@ class FilamentRenderer:
         )
         self._read = mjrf.ReadRequest(target=self._target)
         self._read.set_buffer(self._pixels)
+        focus = params.sensor.focus
+        self._focus = (
+            None if focus is None else Focus(self._context, camera, clip, focus, params.sensor.aperture)
+        )
 
     def render(
         self, data: mujoco.MjData, pose: Vector, solids: Sequence[Solid] = ()
@@ -155,14 +162,15 @@ class FilamentRenderer:
         self._solids.show(solids)
         self._lamp.aim(pose)
         width, height = self._camera.width, self._camera.height
+        eyes = [self._eye(pose, side) for side in (-0.5, 0.5)]
         requests = [
             mjrf.RenderRequest(
                 scene=self._scene,
-                camera=self._eye(pose, eye - 0.5),
+                camera=camera,
                 viewport=mjrf.Rect(left=eye * width, bottom=0, width=width, height=height),
                 target=self._target,
             )
-            for eye in (0, 1)
+            for eye, camera in enumerate(eyes)
         ]
         left, right = self._pixels[:, :width, :3], self._pixels[:, width:, :3]
         for _ in range(1 if self._control is None or self._is_lit else _TRIES):
@@ -170,7 +178,10 @@ class FilamentRenderer:
             if self._control is None or not self._adjust_light(self._control, left):
                 break
         self._is_lit = True
-        return left, right
+        if self._focus is None:
+            return left, right
+        self._focus.measure(self._scene, eyes)
+        return self._focus.blur(left, 0), self._focus.blur(right, 1)
 
     def _adjust_light(self, control: LightControl, picture: NDArray[np.uint8]) -> bool:
         """Dim the lamp by a picture; return whether the first picture needs another try."""

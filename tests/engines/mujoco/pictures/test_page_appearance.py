@@ -9,7 +9,7 @@ from PIL import Image
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.page_appearance import page_appearance
-from engines.mujoco.textures.atlas import Atlas
+from engines.mujoco.textures.atlas import Atlas, picture_side
 from engines.mujoco.textures.coats import COATS, KINDS
 from engines.mujoco.textures.noise import SEED, Noise
 from engines.mujoco.textures.tissues import TISSUES
@@ -33,7 +33,7 @@ def abdomen():
 
 def test_the_skin_is_the_one_of_the_endoscope(abdomen):
     skin = abdomen.skins["organ"]
-    atlas = Atlas(MESH.nodes, MESH.triangles.astype(np.int64))
+    atlas = Atlas(MESH.nodes, MESH.triangles.astype(np.int64), picture_side(1))
     maps = atlas.paint(TISSUES["liver"], Noise(SEED))
     assert skin.uv.shape == (len(MESH.triangles), 3, 2)
     assert (skin.uv >= 0.0).all()
@@ -72,6 +72,6 @@ def test_the_place_is_the_one_of_the_scene(abdomen):
 def test_a_robot_without_endoscope_shows_bodies_by_their_names():
     found = page_appearance(MujocoParams.model_validate({"arms": ARM}), {"left_liver": BODY})
     assert found.place == "abdomen"
-    atlas = Atlas(MESH.nodes, MESH.triangles.astype(np.int64))
+    atlas = Atlas(MESH.nodes, MESH.triangles.astype(np.int64), picture_side(1))
     liver = atlas.paint(TISSUES["liver"], Noise(SEED)).colour
     assert np.abs(pixels(found.skins["left_liver"].texture.colour) - liver).mean() < 4.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engines.mujoco.textures.atlas import Atlas
+from engines.mujoco.textures.atlas import Atlas, picture_side
 from engines.mujoco.textures.noise import Noise
 from engines.mujoco.textures.surface import Surface
 from engines.tissue.organs.params import OrganParams
@@ -51,3 +51,10 @@ def test_a_single_triangle_is_unfolded() -> None:
     atlas = Atlas(np.eye(3), np.array([[0, 1, 2]]), 32)
     assert atlas.chart.tolist() == [0]
     assert atlas.paint(place_as_colour, Noise(1)).colour.shape == (32, 32, 3)
+
+
+def test_two_hundred_organs_share_the_memory_of_thirty_two() -> None:
+    assert picture_side(1) == picture_side(32) == 1024
+    assert picture_side(33) == 512
+    assert 200 * picture_side(200) ** 2 <= 32 * 1024**2
+    assert picture_side(100_000) == 128

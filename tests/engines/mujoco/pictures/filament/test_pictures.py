@@ -95,3 +95,11 @@ def test_pictures_of_tissue(shown: Shown) -> None:
     assert left[1] > 2.0 * right[1]
     dry = shown.draw(parted, np.zeros(len(parted), np.int64))
     assert dry[HEIGHT // 2, -WIDTH // 8, 1] > 2.0 * right[1]
+
+
+def test_a_camera_that_was_inside_an_organ_sees_it_again(shown: Shown) -> None:
+    nodes = shown.block.part(0.0)
+    shown.draw(nodes + np.array([0.02, 0.0, DISTANCE]))
+    for _ in range(8):  # the light follows
+        outside = shown.draw(nodes)
+    assert 40.0 < outside.mean() < 220.0
