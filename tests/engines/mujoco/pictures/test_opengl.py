@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from engines.mujoco.pictures import opengl
+from tests.waiting import LIMIT_S
 
 
 @pytest.fixture(autouse=True)
@@ -66,7 +67,7 @@ def test_mujoco_is_imported_whatever_mujoco_gl_asks_for(asked: str | None) -> No
         env=environment,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=LIMIT_S,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -87,7 +88,7 @@ def test_a_session_runs_where_mujoco_gl_names_what_is_not_there(monkeypatch: pyt
         "participants.robot.looks=false",
     ]
     done = subprocess.run(
-        [sys.executable, "-P", *what], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-P", *what], capture_output=True, text=True, timeout=LIMIT_S, check=False
     )
     assert done.returncode == 0, done.stderr
     assert "publishes no pictures" in done.stderr
