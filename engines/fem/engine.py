@@ -304,6 +304,8 @@ class FemEngine(Stepped):
                 outputs.update(nothing_held(name))
         for organ in self._organs:
             organ.meet(self._spheres, blades, scissors)
+        for probe in self._probes:
+            self._carry(probe)
         if self._attachments is not None:
             self._attachments.meet(self._spheres, blades, scissors)
         for organ in self._changing:
@@ -315,6 +317,16 @@ class FemEngine(Stepped):
             self._blood = Blood(self.params, self._organs, self._probes)
             outputs.update(self._blood.outputs | self._blood.pictures(0))
         return outputs
+
+    def _carry(self, probe: Probe) -> None:
+        """Tie the nodes of organs that are anchored to a probe; the probe's sphere touches nothing then."""
+        carried, (body, *_) = self.params.carried(probe.name), probe.bodies
+        for organ in self._organs if carried else ():
+            organ.let_touch(body, on=False)
+            for node in np.flatnonzero(carried.get(organ.name, False)).tolist():
+                organ.anchor(node, body)
+        if carried:
+            probe.hold(np.arange(1), held=True)
 
     def _look(self) -> None:
         """Find the faces near each probe; set what touches, and the laws of springs in series."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from anatomy.params import AnatomyParams
@@ -25,6 +27,7 @@ class FemParams(PressedOrgansParams):
 
     bears_exchanges: ClassVar[bool] = True
     most_corrected_nodes: ClassVar[int] = MOST_NODES
+    carrier_rule: ClassVar[str] = ", nor a probe with `spheres: 1`"
 
     anatomy: AnatomyParams | None = Field(
         default=None,
@@ -105,6 +108,30 @@ class FemParams(PressedOrgansParams):
                     )
         return self
 
+    @model_validator(mode="after")
+    def _one_meaning_of_parts(self) -> Self:
+        if twice := self.rigid.keys() & {*self.carriers}:
+            raise ValueError(f"'{min(twice)}' is a rigid part and a probe: take another name for one of them")
+        return self
+
+    @property
+    def carriers(self) -> tuple[str, ...]:
+        """Names of the probes to which organs may be anchored: of one sphere, a point that moves."""
+        return tuple(name for name, probe in self.probes.items() if probe.spheres == 1)
+
+    def carried(self, probe: str) -> dict[str, NDArray[np.bool_]]:
+        """Return the nodes that a probe carries, by organ, shape (n,); empty for one that presses."""
+        if probe not in self.carriers:
+            return {}
+        anchors = {name: organ.anchored_nodes for name, organ in self.organs.items()}
+        return {name: parts[probe] for name, parts in anchors.items() if probe in parts}
+
+    def contact_stiffness(self, probe: str) -> float:
+        """Return the largest stiffness (N/m) against a probe's spheres, or its carried nodes."""
+        if not (carried := self.carried(probe)):
+            return super().contact_stiffness(probe)
+        return sum(self.organs[name].patch_stiffness(nodes) for name, nodes in carried.items())
+
     @property
     def may_lean(self) -> bool:
         """Whether organs may lean on a rigid part that anchors none of them."""
@@ -113,9 +140,10 @@ class FemParams(PressedOrgansParams):
     def has_sub_grid(self, probe: str) -> bool:
         """Return whether a probe feels the tissue's own force: not where organs may lean on rigid parts.
 
-        The spring in series knows the organ on its anchors alone.
+        A probe that carries a surface has no spring either. The spring in series knows the organ on its
+        anchors alone.
         """
-        return not self.may_lean and super().has_sub_grid(probe)
+        return not self.may_lean and not self.carried(probe) and super().has_sub_grid(probe)
 
     @cached_property
     def changes_surfaces(self) -> bool:

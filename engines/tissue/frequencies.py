@@ -1,4 +1,4 @@
-"""The natural frequencies of a mesh."""
+"""The natural frequencies of a mesh, and its stiffness against a part that moves."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from collections.abc import Callable
 from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engines.tissue.material import Material
 from engines.tissue.meshing.tet_mesh import TetMesh, volumes
 from schemas.vectors import Vector
 
-__all__ = ["highest_frequency", "lowest_frequency"]
+__all__ = ["highest_frequency", "lowest_frequency", "patch_stiffness"]
 
 _POWER_ITERATIONS = 200
 
@@ -61,6 +62,21 @@ def lowest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
         before, square = square, float(np.vdot(rest, rest))
         direction = rest + square / before * direction
     return sqrt(float(np.vdot(sag, load) / np.vdot(sag, sag)))
+
+
+def patch_stiffness(mesh: TetMesh, patch: NDArray[np.bool_], material: Material) -> float:
+    """Return the largest stiffness (N/m) against a common motion of some nodes while the others stay.
+
+    Args:
+        mesh: the body at rest.
+        patch: the nodes that move, shape (n,).
+        material: linearised.
+    """
+    moving = patch.astype(np.float64)
+    node_mass = material.density * volumes(mesh.nodes, mesh.tetrahedra).sum() / len(mesh.nodes)
+    stiffness = _stiffness_per_mass(mesh, moving, material)
+    forces = np.stack([stiffness(moving[:, None] * axis).sum(axis=0) for axis in np.eye(3)])
+    return float(np.linalg.eigvalsh(node_mass * 0.5 * (forces + forces.T))[-1])
 
 
 def _stiffness_per_mass(mesh: TetMesh, free: Vector, material: Material) -> Callable[[Vector], Vector]:

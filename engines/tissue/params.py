@@ -24,6 +24,8 @@ class PressedOrgansParams(TissueParams):
     open_to_pages: ClassVar[bool] = True
     most_corrected_nodes: ClassVar[int] = MOST_NODES
     """Most nodes of organs whose force is corrected for their coarse mesh."""
+    carrier_rule: ClassVar[str] = ""
+    """Rule for probes to which organs may be anchored, as part of a message."""
 
     organs: dict[Name, OrganParams] = Field(min_length=1)
     rigid: dict[Name, RigidParams] = Field(
@@ -92,11 +94,17 @@ class PressedOrgansParams(TissueParams):
 
     @model_validator(mode="after")
     def _known_parts(self) -> Self:
+        known = [WORLD, *self.rigid, *self.carriers]
         for name, organ in self.organs.items():
             for part in organ.anchored_nodes:
-                if part != WORLD and part not in self.rigid:
+                if part not in known:
                     raise ValueError(
                         f"organ '{name}' is anchored to '{part}', which is not a rigid"
-                        f" part.{did_you_mean(part, [WORLD, *self.rigid])}"
+                        f" part{self.carrier_rule}.{did_you_mean(part, known)}"
                     )
         return self
+
+    @property
+    def carriers(self) -> tuple[str, ...]:
+        """Names of the probes to which organs may be anchored."""
+        return ()

@@ -1,4 +1,4 @@
-"""Anchors of an organ: surfaces tied to the world, or to rigid parts of the scene."""
+"""Anchors of an organ: surfaces tied to the world, to rigid parts of the scene, or to a moving probe."""
 
 from __future__ import annotations
 
@@ -26,7 +26,13 @@ class AnchorParams(SurfacePick):
         default=None,
         description="`trocar organs` lists them; every organ has left, right, front, back, bottom, top",
     )
-    to: Name = Field(default=WORLD, description="`world`, or the name of a rigid part")
+    to: Name = Field(
+        default=WORLD,
+        description=(
+            "`world`, the name of a rigid part, or with kind fem of a probe with `spheres: 1`, which carries"
+            " the surface along as it moves"
+        ),
+    )
 
     @model_validator(mode="after")
     def _one_part(self) -> Self:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
-from engines.tissue.frequencies import highest_frequency, lowest_frequency
+from engines.tissue.frequencies import highest_frequency, lowest_frequency, patch_stiffness
 from engines.tissue.material import Material
 from engines.tissue.meshing.grid import FEWEST_NODES
 from engines.tissue.meshing.mesh_check import LARGEST_M, MOST_NODES, SMALLEST_M
@@ -379,6 +379,11 @@ class OrganParams(BaseModel):
         width = max(radius, self._median_edge)
         layers = (layer.elastic(self.elastic.damping) for layer in self.layers)
         return max(material.contact_stiffness(width) for material in (self.elastic, *layers))
+
+    def patch_stiffness(self, patch: NDArray[np.bool_]) -> float:
+        """Return the largest stiffness (N/m) against nodes, shape (n,), that move together."""
+        layers = (layer.elastic(self.elastic.damping) for layer in self.layers)
+        return max(patch_stiffness(self.rest, patch, material) for material in (self.elastic, *layers))
 
     @cached_property
     def _median_edge(self) -> float:
