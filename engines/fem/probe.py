@@ -79,7 +79,7 @@ class Probe:
         self.targets[:] = self.positions[:] = _FAR_M
         self._spring, self._law = spring, law.reshape(3, points)
         self._compliance = compliance.reshape(2, 3, 3)
-        """Of the spring in series with the held spheres, m/N, and the share of the mesh in all yield."""
+        """Compliance of the spring in series with held spheres, m/N, and share of the mesh in all yield."""
         self._series, self._elastic_force = terms.reshape(most, 2), relaxing[most:]
         self._velocity = motion[3 * n : 3 * n + 3]
         self.held: NDArray[np.bool_] = np.zeros(n, dtype=np.bool_)
