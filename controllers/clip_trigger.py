@@ -8,8 +8,11 @@ from hub.participant import Record, flag, number
 
 __all__ = ["ClipTrigger"]
 
-_SHUT, _LOADED = radians(5.0), radians(25.0)
-"""Command to the jaw below which a clip closes, and above which the next one is loaded; assumed."""
+_SHUT, _LOADED = radians(15.0), radians(25.0)
+"""Command to the jaw below which a clip closes, and above which the next one is loaded; assumed.
+
+The routine of clip-and-cut closes its clips at 12 degrees: who imitates the routine closes them, too.
+"""
 _DELAY = 0.1
 """Time for the jaw to arrive at a command, s; assumed."""
 

@@ -224,7 +224,7 @@ def test_a_clip_applier_closes_a_clip_when_its_jaw_is_shut_after_it_was_wide_ope
     arm.driver = Driver(Governor("governor", GovernorParams.model_validate(given)), period_ns=H)
     arm.driver.set("PSM1/measured_js", [0.0, 0.0, 0.12, 0, 0, 0, *np.zeros(12)])
     clips = []
-    for opening in (0.0, 0.6, 0.0):
+    for opening in (0.0, 0.6, np.radians(12.0)):  # as in demonstrations of the routine
         rows = np.tile([*START, opening], (10, 1)).ravel()
         clips.append(0)
         for _ in range(600):

@@ -38,7 +38,7 @@ def test_a_clip_closes_only_while_the_arm_follows_and_once_the_jaw_has_arrived()
     assert clips(session, 0.0, 3000) == 0
     session.step([1, 0])
     session.driver.set("gripper", [0.0])
-    while np.degrees(session.outputs["jaw/servo_jp"][0]) > 5.0:
+    while np.degrees(session.outputs["jaw/servo_jp"][0]) > 15.0:
         session.step()
     assert clips(session, 0.0, 90) == 0
     assert clips(session, 0.0, 20) == 1
