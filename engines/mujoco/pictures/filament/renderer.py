@@ -33,7 +33,8 @@ from schemas.vectors import Vector
 
 __all__ = ["FilamentRenderer"]
 
-_SHADOW_PIXELS = 512
+_SHADOW_PIXELS, _ROOM_SHADOW_PIXELS = 512, 1024
+"""Side of a shadow map: of the lamp beside the lens, and of the lamp over a whole table."""
 _SAMPLES = 4
 _BACKGROUND = (0.42, 0.45, 0.48)
 """Colour where nothing is: an even room."""
@@ -95,8 +96,10 @@ class FilamentRenderer:
         options = mujoco.MjvOption()
         options.sitegroup[:] = 0
         self._rigid.set_options(options)
-        pixels = 0 if params.shadows is False else _SHADOW_PIXELS
         is_room = params.surroundings == "dry-lab"
+        pixels = _ROOM_SHADOW_PIXELS if is_room else _SHADOW_PIXELS
+        if params.shadows is False:
+            pixels = 0
         # shadows of two lamps would cost a fifth of a picture more
         self._lamp = Lamp(self._context, self._scene, 0 if is_room else pixels, variation.lamp_colour)
         self._room_lamp = (
