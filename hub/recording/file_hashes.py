@@ -17,12 +17,13 @@ __all__ = ["file_hashes"]
 def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
     """Return the SHA-256 of every file named by a `Path` in `params`, keyed by full path.
 
-    Relative paths start at `directory`. A directory stands for all files directly inside.
+    Relative paths start at `directory`. A directory stands for all files inside, at any depth: an FMU
+    may be a directory with its sources.
     """
     files: set[Path] = set()
     for named in _paths_of(list(params)):
         path = (directory / named).resolve()
-        files |= {file for file in (path.iterdir() if path.is_dir() else (path,)) if file.is_file()}
+        files |= {file for file in (path.rglob("*") if path.is_dir() else (path,)) if file.is_file()}
     return {str(file): file_hash(file) for file in sorted(files)}
 
 

@@ -2,10 +2,12 @@
 
 import sys
 from itertools import chain
+from pathlib import Path
 
 import pytest
 
 from hub.planning.scenario_file import installed_scenarios, load, scenario_families
+from hub.recording.file_hashes import file_hashes
 from hub.recording.recording import Recording
 
 SCENARIO = "step: 1 ms\nduration: 3 ms\nparticipants:\n  robot: {kind: mujoco, arms: {PSM1: {}}}\n"
@@ -38,7 +40,7 @@ def test_they_are_listed_a_line_each(trocar):
     assert trocar("run")[1] == out, "also where a name is missing"
 
 
-@pytest.mark.parametrize("name", ["palpation", "palpation-by-hand", "ros-mirror", "retraction"])
+@pytest.mark.parametrize("name", ["palpation", "palpation-by-hand", "ros-mirror", "retraction", "tendon"])
 def test_a_copy_of_a_scenario_is_complete(trocar, here, name):
     code, out, _ = trocar("new", "my-own", "--from", name)
     assert code == 0
@@ -46,6 +48,15 @@ def test_a_copy_of_a_scenario_is_complete(trocar, here, name):
     copy, original = load("my-own/my-own.yaml"), load(name)
     assert copy.scenario.model_copy(update={"name": original.scenario.name}) == original.scenario
     assert copy.scenario.name == "my_own"
+    home = original.source.directory
+    read = {Path(file).relative_to(home) for file in file_hashes(original.params.values(), home)}
+    copied = {file.relative_to(here / "my-own") for file in (here / "my-own").rglob("*") if file.is_file()}
+    assert read <= copied
+
+
+def test_a_copy_has_the_sources_of_an_fmu(trocar, here):
+    trocar("new", "my-own", "--from", "tendon")
+    assert (here / "my-own" / "data" / "tendon_drive" / "sources" / "tendon_drive.c").is_file()
     assert (here / "my-own" / "scenario.schema.json").is_file()
 
 

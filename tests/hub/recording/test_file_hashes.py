@@ -33,7 +33,8 @@ def sha256(text):
 @pytest.fixture
 def directory(tmp_path):
     (tmp_path / "bag").mkdir()
-    for name in ("a", "b", "unused", "bag/c"):
+    (tmp_path / "fmu" / "sources").mkdir(parents=True)
+    for name in ("a", "b", "unused", "bag/c", "fmu/sources/d"):
         (tmp_path / f"{name}.txt").write_text(name)
     return tmp_path.resolve()
 
@@ -42,9 +43,9 @@ def test_every_path_among_the_parameters_is_hashed_once(directory):
     params = Models(
         model=Path("a.txt"),
         meshes={"one": Mesh(file=directory / "b.txt")},
-        more=[Path("bag"), Path("./a.txt"), Path("missing.txt")],
+        more=[Path("bag"), Path("fmu"), Path("./a.txt"), Path("missing.txt")],
     )
-    expected = {str(directory / f"{name}.txt"): sha256(name) for name in ("a", "b", "bag/c")}
+    expected = {str(directory / f"{name}.txt"): sha256(name) for name in ("a", "b", "bag/c", "fmu/sources/d")}
     assert file_hashes([params, params], directory) == expected
 
 
