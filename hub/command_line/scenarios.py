@@ -34,11 +34,12 @@ def list_scenarios() -> None:
 def print_scenarios() -> None:
     """Print the installed scenarios by family, and what to do with one."""
     installed = installed_scenarios()
+    width = max(map(len, installed)) + 1
     for family, names in scenario_families().items():
         results.print(f"[bold]{escape(family)}[/]")
         for name in names:
             what, leads, long = _columns(read(installed[name]))
-            start = f"  {name:21}{long:13}"
+            start = f"  {name:{width}}{long:13}"
             if not results.is_terminal:  # a file has any width
                 results.print(Text(f"{start}{leads:29}{what}"), soft_wrap=True)
                 continue
