@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import withdraw
+from controllers.cholecystectomy.approach import Obstacles, withdraw
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.dissection.hook_hand import HookHand
 from controllers.dissection.lifting import Lifting
@@ -140,7 +140,8 @@ class Dissector(Lifting):
             return
         is_near = bool(np.linalg.norm(hook.bare_end - place) < _BESIDE)
         way = 0.0 if is_near else _BEFORE
-        state.goal[:] = hook.choose(place, state.ahead, state.normal, way, self.seen.obstacles)
+        obstacles = Obstacles.join([self.seen.obstacles, self.grasper_shaft])
+        state.goal[:] = hook.choose(place, state.ahead, state.normal, way, obstacles)
         state.place[:], state.deeper, state.idle = place, 0.0, 0.0
         hook.state.correction[:] = 0.0
         if is_near:

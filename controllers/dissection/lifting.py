@@ -6,7 +6,7 @@ from math import radians
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import choose_pose, withdraw
+from controllers.cholecystectomy.approach import Obstacles, choose_pose, withdraw
 from controllers.cholecystectomy.grasp_place import grasp_poses
 from controllers.cholecystectomy.reach import path_margins
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
@@ -14,6 +14,7 @@ from controllers.dissection.hook_hand import HookHand
 from controllers.dissection.params import DissectionParams
 from controllers.dissection.sight import Sight
 from controllers.dissection.step import FAILURES, Failure, Step
+from controllers.expert.reach import LINK_RADII, links
 from hub.participant import Record, array, choice, flag, integer, number
 from robots.transform import matrix_to_pose, pose_to_matrix
 from schemas.vectors import Vector
@@ -181,6 +182,12 @@ class Lifting:
         state.since_stride = 0.0
         state.pulled = float(np.linalg.norm(goal[:3] - state.begun))
         return False
+
+    @property
+    def grasper_shaft(self) -> Obstacles:
+        """The grasper's wrist and shaft, which the hook keeps away from."""
+        hand = self.grasper
+        return Obstacles(links(hand.chain, hand.base, hand.joints[None])[0], LINK_RADII)
 
     @property
     def opening(self) -> float:

@@ -36,16 +36,16 @@ class DissectionParams(Params):
         default="all",
         description="what is freed: the whole attachment, or its third nearest to its `lower_end`",
     )
-    power: Power = Field(default=40.0, gt=0, le=400, description="power of the generator at the tissue")
+    power: Power = Field(default=60.0, gt=0, le=400, description="power of the generator at the tissue")
     pull: tuple[Force, Force] = Field(
-        default=(0.3, 1.0), description="least and largest pull at the gallbladder while the hook works"
+        default=(0.6, 1.5), description="least and largest pull at the gallbladder while the hook works"
     )
     farthest: Length = Field(
         default=60e-3, gt=0, le=0.2, description="longest way of the grasper from the place of its grasp"
     )
     attempts: int = Field(default=4, ge=1, le=20, description="most grasps, and most rounds without progress")
     patience: Duration = Field(
-        default=6_000_000_000, gt=0, description="longest time with the hook at a place that does not part"
+        default=10_000_000_000, gt=0, description="longest time with the hook at a place that does not part"
     )
     end: bool = Field(default=True, description="whether the session ends with the routine")
 

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from controllers.cholecystectomy.approach import Obstacles
 from controllers.dissection.step import Failure, Step
 from hub.planning.scenario_file import load
+from robots.transform import pose_to_matrix
 from schemas.errors import ScenarioError
 from tests.controllers.dissection.world import PERIOD, World
 
@@ -18,7 +20,7 @@ def test_the_whole_plate_is_freed_from_the_free_end_on_and_power_is_on_at_tissue
     assert world.state.ahead @ [0.0, 1.0, 0.0] > 0.95
     assert world.state.normal @ [0.0, 0.0, 1.0] > 0.95
     on = sum(power > 0.0 for power in world.powers) * PERIOD * 1e-9
-    assert 0.5 * 40.0 * on == pytest.approx(world.delivered, rel=0.02)  # no power in the air
+    assert 0.5 * 60.0 * on == pytest.approx(world.delivered, rel=0.02)  # no power in the air
     assert world.powers[-1] == 0.0
     at_rest = world.tip("PSM1")[:3, 3] - world.state.rests[0, :3]
     assert np.linalg.norm(at_rest) < 1e-3
@@ -99,3 +101,19 @@ def test_a_saved_routine_goes_on_with_the_same_commands():
         assert one["PSM1/servo_cp"] == other["PSM1/servo_cp"]
         assert world.powers[-1] == again.powers[-1]
     assert world.routine.state_hash() == again.routine.state_hash()
+
+
+def test_the_hook_keeps_clear_of_what_lies_in_its_way():
+    world = World()
+    hook, place, normal = world.routine._hook, np.array([-0.02, 0.03, -0.004]), np.array([0.0, 0.0, 1.0])
+    hook.period = 0.01
+    hook.stay()
+    ahead, nothing = np.array([0.0, 1.0, 0.0]), Obstacles(np.zeros((0, 3)), np.zeros(0))
+    world.step()
+    free = pose_to_matrix(hook.choose(place, ahead, normal, 0.02, nothing))
+    shaft = free[:3, 3] - 0.02 * free[:3, 2]
+    bar = Obstacles(shaft + np.linspace(-0.03, 0.03, 13)[:, None] * normal, np.full(13, 0.004))
+    other = pose_to_matrix(hook.choose(place, ahead, normal, 0.02, bar))
+    assert np.linalg.norm(other[:3, 2] - free[:3, 2]) > 0.2  # another direction
+    for pose in (free, other):
+        assert np.allclose(pose[:3, :3] @ hook._middle + pose[:3, 3], place, atol=1e-9)
