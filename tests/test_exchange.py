@@ -1,7 +1,13 @@
 """An exchange of instruments in a whole session: routine, motion, robot, tissue; and simulated again."""
 
-import trocar
+from pathlib import Path
 
+import numpy as np
+
+import trocar
+from schemas.ros import Joy, StringMessage
+
+LED = Path(__file__).parent / "webconsole" / "led_exchange.yaml"
 SCENARIO = """\
 name: exchange
 step: 1 ms
@@ -52,3 +58,35 @@ def test_an_arm_gets_scissors_for_its_hook_and_the_session_verifies(tmp_path):
     held = recording["motion.drive/PSM1/instrument"].values.ravel()
     assert (held[0], held[-1]) == (0.0, 1.0)
     assert trocar.verify(tmp_path / "recording").same
+
+
+def test_a_hand_puts_down_what_it_holds_before_it_gets_scissors_and_leads_on(tmp_path):
+    """The scenario of the page, with a hand in the session: a grasped block, a refusal, an exchange."""
+    text = LED.read_text().replace(
+        "{kind: browser, host: remote}", '{kind: "tests.hand_in_session:HandInSession"}'
+    )
+    text = text.replace("order: [", "order: [hand, ").replace("  - hand.set_tool_type", "  # ")
+    (tmp_path / "led.yaml").write_text(text)
+    scissors = {"motion.PSM1/set_tool_type": (StringMessage(data="ROUND_TIP_SCISSORS:400007"),)}
+    with trocar.SteppedSession(trocar.load_scenario(tmp_path / "led.yaml")) as session:
+
+        def close(opening):
+            for asked in np.linspace(1.0 - opening, opening, 200):
+                session.advance(1, {"hand.asked": np.array([asked])})
+            session.advance(400)
+
+        session.advance(1, {"hand.press": (Joy(buttons=[1, 0]),)})
+        close(0.0)
+        assert session["robot.block/held_by"][0] == 1.0
+        session.advance(1, scissors)
+        assert "open the jaw first" in session["motion.PSM1/error"][0].data
+        close(1.0)
+        session.advance(1, scissors)
+        assert session["motion.PSM1/instrument"][0] == -1.0
+        session.advance(1)
+        assert not session["teleop.following"].data
+        while session["motion.PSM1/instrument"][0] < 0.0:
+            session.advance(1)
+        session.advance(2)
+        assert session["motion.PSM1/instrument"][0] == 1.0
+        assert session["teleop.following"].data

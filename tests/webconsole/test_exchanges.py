@@ -15,7 +15,7 @@ OPENING = """(() => {
   const [{ names, groups }] = trocar.scene.parts, finger = (side) => groups[names.indexOf(`PSM1/jaw_${side}`)]
   return finger("left").quaternion.angleTo(finger("right").quaternion)
 })()"""
-HELD_RAD, OPEN_RAD = 0.45, 0.6
+HELD_RAD, OPEN_RAD = 0.65, 0.9
 """Openings of the jaw: at most this with the block between the fingers, at least this without."""
 PRESSED_MS = 3000
 """More than a gripper takes to close, so that the fingers press on the block."""
