@@ -35,7 +35,6 @@ MODELS = (
     "Resource",
     "Stair",
     "VanDerPol",
-    "StateSpace",
     "Clocks",
 )
 _STEP_S = 0.01
