@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import radians
-from typing import NamedTuple
+from math import ceil, radians
 
 import numpy as np
+from numpy.typing import NDArray
 
+from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.reach import path_margins
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.expert.reach import LINK_RADII, links
@@ -16,23 +16,25 @@ from robots.transform import pose_to_matrix
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Obstacles", "choose_pose", "hurts", "jaw_poses", "skewed", "withdraw"]
+__all__ = ["MARGIN", "NEAR", "choose_pose", "clearance", "hurts", "jaw_poses", "skewed", "withdraw"]
+
+Bits = NDArray[np.bool_]
 
 MARGIN = 0.06
 """Least share of each joint's range, from its middle to its end, that stays free."""
 _ROOMY, _CLEAR = 0.3, 4.0e-3
 """Margin, and distance from obstacles (m), beyond which more is no better."""
 _TOUCHING = 1.0e-3
-"""Distance from nodes of an organ within which an instrument may touch the faces between, m."""
-_FACE = 2.0e-3
-"""Distance from nodes of an organ within which blades may close on the faces between, m."""
+"""Distance from obstacles below which less is worse than few joints left: tissue moves, m."""
+_CUT = 1.0e-3
+"""Least distance from closing blades of an organ to be spared, m: blades drag tissue along."""
 _WAY = np.array([1.0, 0.5, 0.2, 0.0])
 """Checked parts of the straight way to a goal, from its beginning."""
 _ALONE = 2.0e-3
 """Distance of other tissue from the space between the jaws beyond which more is no better, m."""
 _HALF_CLIP, _HALF_GAP = 1.0e-3, 2.5e-3
 """Half the size of that space along the tube, and from jaw to jaw, m."""
-_NEAR = 0.06
+NEAR = 0.06
 """Obstacles farther from the goal do not count, m."""
 _TILTS = np.radians(np.arange(-75.0, 76.0, 15.0))
 """Angles about the tube, from the direction in which the shaft comes."""
@@ -40,28 +42,6 @@ _SKEW = radians(20.0)
 """Deviation from a right angle to a tube out of reach; a clip may lie 30 degrees off square."""
 _SPREAD = np.linspace(0.25, 1.0, 4)
 """Points along a finger, as shares of its length."""
-
-
-class Obstacles(NamedTuple):
-    """Spheres that jaws and shaft keep away from."""
-
-    points: Vector
-    """m, shape (n, 3)."""
-    radii: Vector
-    """m, shape (n,)."""
-
-    @staticmethod
-    def join(parts: Sequence[Obstacles]) -> Obstacles:
-        """Return all obstacles of several."""
-        points = [np.zeros((0, 3)), *(part.points for part in parts)]
-        return Obstacles(
-            np.concatenate(points), np.concatenate([np.zeros(0), *(part.radii for part in parts)])
-        )
-
-    def near(self, point: Vector) -> Obstacles:
-        """Return the obstacles near a point (m, shape (3,))."""
-        chosen = np.linalg.norm(self.points - point, axis=1) < _NEAR
-        return Obstacles(self.points[chosen], self.radii[chosen])
 
 
 def withdraw(pose: Vector, away: float) -> Vector:
@@ -112,6 +92,7 @@ def choose_pose(
     obstacles: Obstacles,
     what: str,
     spared: Obstacles | None = None,
+    uncut: Obstacles | None = None,
 ) -> Vector:
     """Return the best of `poses`, shape (4, 4), by joint margins and distance from obstacles.
 
@@ -125,6 +106,7 @@ def choose_pose(
         obstacles: in the neighbourhood.
         what: the goal, for the message.
         spared: what blades must not touch; None for other jaws.
+        uncut: what blades may touch, but not close on.
     """
     ways = np.repeat(poses[:, None], len(_WAY), axis=1)
     ways[:, :, :3, 3] -= away * _WAY[:, None] * poses[:, None, :3, 2]
@@ -135,63 +117,85 @@ def choose_pose(
             f"{hand.arm} does not reach {what}: with the tip at ({x:.0f}, {y:.0f}, {z:.0f}) mm the joints"
             f" have {max(0.0, float(margins.max())):.2f} of their ranges left, {MARGIN} at least is needed"
         )
-    clearances = _clearances(hand, ways, joints, opening, obstacles)
+    refused = margins < MARGIN
     gaps = np.array([gap_between(hand, pose, obstacles) for pose in poses])
+    if spared is not None:
+        refused |= np.array([hurts(hand, pose, spared) for pose in poses])
+        free = _clearances(hand, ways, joints, opening, spared, refused)
+        refused |= free < 0.0
+    if uncut is not None:
+        refused |= np.array([hurts(hand, pose, uncut) for pose in poses])
+    if refused.all():
+        raise MotionError(f"{hand.arm} does not reach {what} without touching an organ to be spared")
+    room = _clearances(hand, ways, joints, opening, obstacles, refused)
     turns = np.abs(np.linspace(-1.0, 1.0, len(poses)))
     travel = np.abs(joints[:, 0] - hand.joints).max(axis=1)
     score = (
         np.minimum(margins / _ROOMY, 1.0)
-        + np.clip(clearances / _CLEAR, -0.5, 1.0)
-        + np.clip(clearances / _TOUCHING - 1.0, -2.0, 0.0)
+        + np.clip(room / _CLEAR, -0.5, 1.0)
+        + np.clip(room / _TOUCHING - 1.0, -2.0, 0.0)
         + np.clip(gaps / _ALONE, -2.0, 1.0)
         - 0.3 * turns
         - 0.1 * travel
     )
-    refused = margins < MARGIN
-    if spared is not None:
-        refused |= _clearances(hand, ways, joints, opening, spared) < 0.0
-        refused |= np.array([hurts(hand, pose, spared) for pose in poses])
-    if refused.all():
-        raise MotionError(f"{hand.arm} does not reach {what} without touching an organ to be spared")
     return poses[int(np.where(refused, -np.inf, score).argmax())]
-
-
-def _clearances(
-    hand: SurgeonHand, ways: Vector, joints: Vector, opening: float, obstacles: Obstacles
-) -> Vector:
-    """Return the least clearance of each way, shape (n,)."""
-    return np.array(
-        [
-            min(clearance(hand, pose, q, opening, obstacles) for pose, q in zip(way, angles, strict=True))
-            for way, angles in zip(ways, joints, strict=True)
-        ]
-    )
 
 
 def hurts(hand: SurgeonHand, pose: Vector, spared: Obstacles) -> bool:
     """Whether closing blades at a pose, shape (4, 4), would meet an organ to be spared."""
-    return gap_between(hand, pose, spared) <= _FACE
+    return gap_between(hand, pose, spared) <= _CUT
 
 
 def gap_between(hand: SurgeonHand, pose: Vector, obstacles: Obstacles) -> float:
     """Return the distance of the nearest obstacle from the space between the closing jaws, m."""
-    local = (obstacles.points - pose[:3, 3]) @ pose[:3, :3]
-    nearest = np.clip(local, [-_HALF_CLIP, -_HALF_GAP, JAW_ROOT], [_HALF_CLIP, _HALF_GAP, hand.jaw.length])
-    return float((np.linalg.norm(local - nearest, axis=1) - obstacles.radii).min(initial=np.inf))
+    far = np.linspace(JAW_ROOT, hand.jaw.length, 1 + ceil((hand.jaw.length - JAW_ROOT) / _HALF_CLIP))
+    apart = np.array([-1.0, 0.0, 1.0]) * (_HALF_GAP - _HALF_CLIP)
+    local = np.stack(np.broadcast_arrays(0.0, apart[:, None], far), axis=-1).reshape(-1, 3)
+    points = pose[:3, 3] + local @ pose[:3, :3].T
+    return float(obstacles.distances(points, _ALONE + _HALF_CLIP).min()) - _HALF_CLIP
 
 
-def clearance(hand: SurgeonHand, pose: Vector, joints: Vector, opening: float, obstacles: Obstacles) -> float:
-    """Return the distance of an instrument with open jaws from the nearest obstacle, m."""
-    if not len(obstacles.points):
-        return _CLEAR
+def _clearances(
+    hand: SurgeonHand, ways: Vector, joints: Vector, opening: float, obstacles: Obstacles, refused: Bits
+) -> Vector:
+    """Return the least distance of an instrument from obstacles on each way, m, shape (n,).
+
+    Args:
+        hand: the arm.
+        ways: poses of the tip, shape (n, poses, 4, 4).
+        joints: of these poses, shape (n, poses, 6).
+        opening: of the jaw, rad.
+        obstacles: in the neighbourhood.
+        refused: ways that are not measured, shape (n,); their clearance is that of no obstacle.
+    """
+    found: Vector = np.full(len(ways), _CLEAR)
+    for k in np.flatnonzero(~refused).tolist():
+        found[k] = clearance(hand, ways[k], joints[k], opening, obstacles)
+    return found
+
+
+def clearance(
+    hand: SurgeonHand, poses: Vector, joints: Vector, opening: float, obstacles: Obstacles
+) -> float:
+    """Return the least distance of an instrument from obstacles at some poses, 4 mm at most, in m.
+
+    Args:
+        hand: the arm.
+        poses: of the tip, shape (n, 4, 4).
+        joints: at these poses, shape (n, 6).
+        opening: of the jaw, rad.
+        obstacles: in the neighbourhood.
+    """
+    radii = np.concatenate([np.full(2 * len(_SPREAD), FINGER_HALF_WIDTH), LINK_RADII])
+    bodies = np.concatenate([_fingers(hand, poses, opening), links(hand.chain, hand.base, joints)], axis=1)
+    apart = obstacles.distances(bodies.reshape(-1, 3), _CLEAR + float(radii.max()))
+    return min(_CLEAR, float((apart.reshape(len(bodies), -1) - radii).min()))
+
+
+def _fingers(hand: SurgeonHand, poses: Vector, opening: float) -> Vector:
+    """Return points in both fingers of an open jaw, m, shape (poses, points, 3)."""
     half = 0.5 * opening + radians(5.0)
+    ahead, aside = np.cos(half) * poses[:, :3, 2], np.sin(half) * poses[:, :3, 1]
     ways = hand.jaw.length * _SPREAD[:, None]
-    fingers = [
-        pose[:3, 3] + ways * (np.cos(half) * pose[:3, 2] + side * np.sin(half) * pose[:3, 1])
-        for side in (1.0, -1.0)
-    ]
-    body = links(hand.chain, hand.base, joints[None])[0]
-    points = np.concatenate([*fingers, body])
-    radii = np.concatenate([np.full(2 * len(ways), FINGER_HALF_WIDTH), LINK_RADII])
-    apart = np.linalg.norm(points[:, None] - obstacles.points, axis=2) - radii[:, None] - obstacles.radii
-    return float(apart.min())
+    fingers = [poses[:, None, :3, 3] + ways * (ahead + side * aside)[:, None] for side in (1.0, -1.0)]
+    return np.concatenate(fingers, axis=1)

@@ -9,12 +9,13 @@ from controllers.cholecystectomy.ports import PROGRESS, routine_ports
 from controllers.cholecystectomy.procedure import SurgeonHands
 from controllers.cholecystectomy.sight import Sight
 from controllers.cholecystectomy.sub_task import SubTask, instruction
+from controllers.cholecystectomy.surfaces import Surfaces
 from controllers.cholecystectomy.surgeon import Surgeon
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.expert.ports import EVENTS
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import PsmParams
-from hub.participant import Controller, Inputs, Outputs, Params, Setup
+from hub.participant import Controller, Inputs, Outputs, Params, Setup, state_hash
 from robots.dvrk.parameters import ArmName
 from schemas.errors import SessionError
 from schemas.ports import Port
@@ -34,6 +35,7 @@ class ClipAndCut(Controller):
         arms = (params.applier, params.grasper, params.scissors)
         self._hands = SurgeonHands(*(self._hand(arm) for arm in arms))
         self._surgeon = Surgeon(params, self._hands)
+        self._surfaces = Surfaces(dict.fromkeys((params.gallbladder, *params.avoid)))
         state = self._surgeon.state
         self.keep(state, *(hand.state for hand in self._hands))
         self._outputs: dict[str, Any] = {name: state.part(name) for name in PROGRESS}
@@ -73,7 +75,7 @@ class ClipAndCut(Controller):
         self._sense(inputs)
         if t == 0:
             surgeon.begin()
-        surgeon.step(Sight(self.params, inputs))
+        surgeon.step(Sight(self.params, inputs, self._surfaces))
         for hand in self._hands:
             settles = surgeon.settles and hand is surgeon.hand
             self._outputs[f"{hand.arm}/servo_cp"] = (hand.advance(settle=settles),)
@@ -89,6 +91,21 @@ class ClipAndCut(Controller):
         organ = self.params.tubes[max(state.tube, 0)]
         text = "" if state.sub_task is before else instruction(state.sub_task, organ)
         return (StringMessage(data=text),) if text else ()
+
+    def state_hash(self) -> int:
+        """Return the hash of the whole state."""
+        return state_hash(super().save(), self._surfaces.digest)
+
+    def save(self) -> bytes:
+        """Return the bytes of the whole state."""
+        state = super().save()
+        return len(state).to_bytes(8, "little") + state + self._surfaces.save()
+
+    def restore(self, state: bytes) -> None:
+        """Return to a saved state. Raises StateError if the state does not fit."""
+        end = 8 + int.from_bytes(state[:8], "little")
+        self._surfaces.restore(state[end:])
+        super().restore(state[8:end])
 
     def _sense(self, inputs: Inputs) -> None:
         for hand in self._hands:

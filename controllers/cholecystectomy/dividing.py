@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from math import radians
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import choose_pose, hurts, jaw_poses, skewed, withdraw
-from controllers.cholecystectomy.places import choose_places
-from controllers.cholecystectomy.procedure import Procedure, opening
+from controllers.cholecystectomy.approach import NEAR, choose_pose, hurts, jaw_poses, skewed, withdraw
+from controllers.cholecystectomy.grasping import Grasping
+from controllers.cholecystectomy.obstacles import Obstacles
+from controllers.cholecystectomy.places import STAYS, choose_places, cut_window
+from controllers.cholecystectomy.procedure import opening
 from controllers.cholecystectomy.sub_task import CUT, Failure, Step
 from robots import rotation
 from robots.transform import matrix_to_pose, pose_to_matrix
 from schemas.errors import MotionError
+from schemas.vectors import Vector
 
 __all__ = ["Dividing"]
 
@@ -25,6 +29,8 @@ _BITES = {False: (11.0e-3, 9.0e-3, 12.0e-3, 8.0e-3), True: (8.0e-3, 7.0e-3, 9.0e
 The ends of the jaws pass the tube, and what lies close behind stays outside. Closing blades push a slack tube
 some 6 mm towards their ends.
 """
+_FEW = 2
+"""How many of these the scissors try in one attempt."""
 _BESIDE = 1.0e-3
 """Way of further attempts beside the place of the first, m."""
 _SQUEEZED, _SNIPPED = radians(12.0), radians(-10.0)
@@ -40,7 +46,7 @@ _SHIFTED, _TURNED = 1.0e-3, 0.12
 _MOST_AIMS = 3
 
 
-class Dividing(Procedure):
+class Dividing(Grasping):
     """Clips and cut."""
 
     @property
@@ -58,7 +64,12 @@ class Dividing(Procedure):
             return
         state.aims = 0
         state.succeeded = state.slipped = False
-        self._choose()
+        try:
+            self._choose()
+        except MotionError as error:
+            if self.pull_elsewhere(str(error)):
+                return
+            raise
         hand.move_jaw(opening(hand))
         hand.go(withdraw(state.goal, BEFORE_TUBE))
         self.enter(Step.HOVER)
@@ -92,7 +103,8 @@ class Dividing(Procedure):
     def _would_hurt(self) -> bool:
         """Whether the blades would close on an organ to be spared."""
         pose = pose_to_matrix(self.hand.measured)
-        return hurts(self.hand, pose, self.seen.spared.near(pose[:3, 3]))
+        spared = [self.seen.spared, self.seen.wall] if self.state.spares_wall else [self.seen.spared]
+        return hurts(self.hand, pose, Obstacles.join(spared).near(pose[:3, 3], NEAR))
 
     def check_tube(self) -> None:
         """Wait for the sign of success."""
@@ -112,36 +124,64 @@ class Dividing(Procedure):
     def _place(self) -> float:
         """Return the place of the present job; further attempts go away from the cut."""
         state = self.state
-        tube = self.seen.tube(state.tube)
-        if (state.clip_places[state.tube] < 0.0).all():
+        if state.aim >= 0.0:
+            return state.aim
+        tube, closed = self.seen.tube(state.tube), state.clip_places[state.tube]
+        if (closed < 0.0).all():
             eye = self.hands.applier.base[:3, 3]
-            state.begins[state.tube] = tube.first_place(self.seen.gallbladder, _FREE, eye)
+            state.begins[state.tube] = tube.first_place(self.seen.wall, _FREE, eye)
         places = choose_places(tube.length, float(state.begins[state.tube]))
         if self.cuts:
-            return places.cut
+            window = cut_window(self.closed(state.tube))
+            return float(np.mean(window or closed[STAYS - 1 :]))
         outwards = 1.0 if state.job < CUT - 1 else -1.0
         beside = _BESIDE if state.attempts and places.is_roomy else 0.0
-        return float(places.clips[state.job] + outwards * beside)
+        return float(places.beside(closed)[state.job] + outwards * beside)
 
     def _choose(self) -> None:
-        state, hand, seen = self.state, self.hand, self.seen
-        tube = seen.tube(state.tube)
-        point, along = tube.point(state.along), tube.direction(state.along)
-        bite = _BITES[self.cuts][state.attempts % len(_BITES[self.cuts])]
-        obstacles = seen.obstacles(hand, self.hands, state.tube).near(point)
-        spared = seen.spared.near(point) if self.cuts else None
-        what = f"{self.params.tubes[state.tube]} {1e3 * state.along:.0f} mm from the gallbladder"
+        """Choose the pose, and for scissors the place of the cut. Raises MotionError without any."""
+        refusal: MotionError | None = None
+        for along, bite, wall in self._options():
+            try:
+                pose = self._pose(along, bite, wall=wall)
+            except MotionError as error:
+                refusal = refusal or error
+                continue
+            self.state.along, self.state.spares_wall = along, wall
+            self.state.goal[:] = matrix_to_pose(pose)
+            return
+        assert refusal is not None
+        raise refusal
+
+    def _options(self) -> Iterator[tuple[float, float, bool]]:
+        """Yield place on the tube and distance from the hinge (m), and if the gallbladder stays uncut."""
+        state = self.state
+        bites = np.roll(_BITES[self.cuts], -state.attempts).tolist()
+        if not self.cuts:
+            yield from ((state.along, bite, False) for bite in bites)
+            return
+        window = cut_window(self.closed(state.tube))
+        places = [state.along, *(window or ())]
+        for wall in (True, False):
+            for place in places:
+                yield from ((place, bite, wall) for bite in bites[:_FEW])
+
+    def _pose(self, along: float, bite: float, *, wall: bool) -> Vector:
+        """Return the best pose with a place of the tube between the jaws. Raises MotionError without any."""
+        hand, seen = self.hand, self.seen
+        tube = seen.tube(self.state.tube)
+        point, direction = tube.point(along), tube.direction(along)
         chosen = partial(
             choose_pose,
             hand,
             away=BEFORE_TUBE,
             opening=opening(hand),
-            obstacles=obstacles,
-            what=what,
-            spared=spared,
+            obstacles=seen.obstacles(hand, self.hands, self.state.tube).near(point, NEAR),
+            what=f"{self.params.tubes[self.state.tube]} {1e3 * along:.0f} mm from the gallbladder",
+            spared=seen.spared.near(point, NEAR) if self.cuts else None,
+            uncut=seen.wall.near(point, NEAR) if wall else None,
         )
         try:
-            pose = chosen(jaw_poses(hand, point, along, bite))
+            return chosen(jaw_poses(hand, point, direction, bite))
         except MotionError:
-            pose = chosen(np.concatenate([jaw_poses(hand, point, each, bite) for each in skewed(along)]))
-        state.goal[:] = matrix_to_pose(pose)
+            return chosen(np.concatenate([jaw_poses(hand, point, each, bite) for each in skewed(direction)]))

@@ -12,6 +12,7 @@ from controllers.cholecystectomy.sight import Sight
 from controllers.cholecystectomy.sub_task import FAILURES, Failure, Step, SubTask
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from hub.participant import Record, array, choice, flag, integer, number
+from schemas.vectors import Vector
 
 __all__ = ["GENTLE", "GRASP", "Procedure", "SurgeonHands", "SurgeonState"]
 
@@ -57,6 +58,18 @@ class SurgeonState(Record):
     """Where each tube is free of the gallbladder, m."""
     clip_places = array(2, 3)
     """Place of each clip on its tube at rest, m; -1: none."""
+    further = array(2, 4)
+    """Place of each further clip on each tube at rest, m; -1: none."""
+    aim = number(_NONE)
+    """Place of the further clip under way, m; -1: a clip or cut of the plan."""
+    leaks = array(2)
+    """Place where each tube leaks, m; -1: nowhere."""
+    spares_wall = flag()
+    """Whether the scissors do not close on the gallbladder."""
+    pulls = integer()
+    """How often the gallbladder was pulled elsewhere to open a way."""
+    swing = number()
+    """Way that is left of the present pull elsewhere, m."""
     clips = integer()
     cuts = integer()
     parted = array(2)
@@ -89,7 +102,8 @@ class Procedure:
     def __init__(self, params: ClipAndCutParams, hands: SurgeonHands) -> None:
         self.params, self.hands = params, hands
         self.state = SurgeonState()
-        self.state.clip_places[:] = _NONE
+        for places in (self.state.clip_places, self.state.further, self.state.leaks):
+            places[:] = _NONE
         self.sight: Sight | None = None
         self.fires = False
         """Whether a clip is closed in this step."""
@@ -109,6 +123,11 @@ class Procedure:
         if self.state.tube == GRASP:
             return self.hands.grasper
         return self.hands.applier if self.state.job < self.state.clip_places.shape[1] else self.hands.scissors
+
+    def closed(self, tube: int) -> Vector:
+        """Return the places of all clips on a tube as they lie, m, shape (n,)."""
+        found = np.concatenate([self.state.clip_places[tube], self.state.further[tube]])
+        return found[found >= 0.0]
 
     def statuses(self) -> tuple[str, ...]:
         """Return and clear the statuses of this step."""
@@ -162,7 +181,7 @@ def opening(hand: SurgeonHand) -> float:
     return min(hand.jaw.upper - 0.02, radians(50.0))
 
 
-def nearest_clip(places: np.ndarray, along: float) -> int | None:
+def nearest_clip(places: Vector, along: float) -> int | None:
     """Return the number of the clip nearest to a place, of those that are closed; None: none is."""
     apart = np.where(places >= 0.0, np.abs(places - along), np.inf)
     return int(apart.argmin()) if np.isfinite(apart).any() else None

@@ -7,8 +7,9 @@ from typing import cast
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import Obstacles
+from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.params import ClipAndCutParams
+from controllers.cholecystectomy.surfaces import Surfaces
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.cholecystectomy.tube import Tube
 from controllers.expert.reach import LINK_RADII, links
@@ -20,10 +21,14 @@ __all__ = ["Sight"]
 
 
 class Sight:
-    """Lines of the tubes, nodes of the organs, and the state of the grasp."""
+    """Lines of the tubes, surfaces of the organs, and the state of the grasp."""
 
-    def __init__(self, params: ClipAndCutParams, inputs: Inputs) -> None:
-        self._params, self._inputs = params, inputs
+    def __init__(self, params: ClipAndCutParams, inputs: Inputs, surfaces: Surfaces) -> None:
+        """`surfaces`: triangles seen so far; those of this step are added."""
+        self._params, self._inputs, self._surfaces = params, inputs, surfaces
+        for organ in dict.fromkeys((params.gallbladder, *params.avoid)):
+            if isinstance(state := inputs.message(f"{organ}/nodes"), SoftBodyState):
+                surfaces.see(organ, state)
 
     @property
     def is_complete(self) -> bool:
@@ -57,6 +62,11 @@ class Sight:
         return float(np.linalg.norm(self._inputs[f"{self._params.grasper}/pull"]))
 
     @property
+    def wall(self) -> Obstacles:
+        """Surface of the gallbladder."""
+        return self._organ(self._params.gallbladder)
+
+    @property
     def spared(self) -> Obstacles:
         """Organs that scissors never touch."""
         organs = [organ for organ in self._params.avoid if organ != self._params.gallbladder]
@@ -65,19 +75,18 @@ class Sight:
     def obstacles(self, hand: SurgeonHand, hands: Sequence[SurgeonHand], tube: int | None) -> Obstacles:
         """Return what a hand keeps away from at work on a tube, or, with None, at the gallbladder."""
         params = self._params
-        organs = params.avoid if tube is None else dict.fromkeys((params.gallbladder, *params.avoid))
-        parts = [self._organ(organ) for organ in organs if organ not in params.tubes]
+        others = [organ for organ in params.avoid if organ not in (params.gallbladder, *params.tubes)]
+        parts = [self._organ(organ) for organ in others]
+        parts += [] if tube is None else [self.wall]
         parts += [self._line(other) for other in range(len(params.tubes)) if other != tube]
         parts += [_shaft(other) for other in hands if other is not hand]
         return Obstacles.join(parts)
 
     def _organ(self, name: str) -> Obstacles:
-        nodes = self._nodes(name)
-        return Obstacles(nodes, np.zeros(len(nodes)))
+        return self._surfaces.obstacles(name, self._nodes(name))
 
     def _line(self, index: int) -> Obstacles:
-        tube = self.tube(index)
-        return Obstacles(tube.points, tube.radii)
+        return self.tube(index).body
 
     def _nodes(self, organ: str) -> Vector:
         state = cast("SoftBodyState", self._inputs.message(f"{organ}/nodes"))
@@ -85,4 +94,4 @@ class Sight:
 
 
 def _shaft(hand: SurgeonHand) -> Obstacles:
-    return Obstacles(links(hand.chain, hand.base, hand.joints[None])[0], LINK_RADII)
+    return Obstacles.points(links(hand.chain, hand.base, hand.joints[None])[0], LINK_RADII)

@@ -95,6 +95,7 @@ class Failure(IntEnum):
     TOO_SHORT = 7
     BLOCKED = 8
     REFUSED = 9
+    OPEN = 10
 
 
 FAILURES = {
@@ -107,5 +108,6 @@ FAILURES = {
     Failure.TOO_SHORT: "tube too short",
     Failure.BLOCKED: "blocked",
     Failure.REFUSED: "command refused",
+    Failure.OPEN: "stump not closed",
 }
 """Words for each failure."""

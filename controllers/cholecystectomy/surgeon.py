@@ -7,12 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from controllers.cholecystectomy.approach import withdraw
-from controllers.cholecystectomy.dividing import BEFORE_TUBE, Dividing
-from controllers.cholecystectomy.grasping import BEFORE_GRASP, Grasping
+from controllers.cholecystectomy.dividing import BEFORE_TUBE
+from controllers.cholecystectomy.grasping import BEFORE_GRASP
+from controllers.cholecystectomy.next_job import NextJob
 from controllers.cholecystectomy.params import ClipAndCutParams
 from controllers.cholecystectomy.procedure import GENTLE, GRASP, OPENING_TIME, SurgeonHands, nearest_clip
 from controllers.cholecystectomy.sight import Sight
-from controllers.cholecystectomy.sub_task import CLIPS, CUT, Failure, Step, SubTask, sub_task_of
+from controllers.cholecystectomy.sub_task import Failure, Step, SubTask, sub_task_of
 from schemas.errors import MotionError
 from schemas.trocar_msgs import TissueEvent
 
@@ -22,11 +23,15 @@ _ACCURATE = 0.4e-3
 """Accuracy of a tip at the tissue, m."""
 _WAITS = 1.0
 """Patience for this accuracy, s."""
+_LEAKS, _STOPS = ("bleeding", "leaking"), ("bleeding stopped", "leaking stopped")
+"""Kinds of events where a tube begins to leak, and where this ends."""
+_SAME = 1.5e-3
+"""Distance from a noted clip within which a lost clip is this one, m."""
 _STRUCK = 5.0e-3
 """Error of a tip after a collision, m."""
 
 
-class Surgeon(Grasping, Dividing):
+class Surgeon(NextJob):
     """Grasps the gallbladder, and clips and cuts both tubes."""
 
     def __init__(self, params: ClipAndCutParams, hands: SurgeonHands) -> None:
@@ -95,23 +100,43 @@ class Surgeon(Grasping, Dividing):
         state = self.state
         at = np.array([event.position.x, event.position.y, event.position.z])
         along = self.seen.tube(tube).nearest(at)
-        places = state.clip_places[tube]
         if event.kind == "clipped" and event.instrument == self.params.applier:
             if tube == state.tube:
-                places[state.job], state.succeeded = along, True
-                state.clips += 1
+                self._keep(along)
             else:
                 state.slipped = True
                 self.say(f"the clip is on {self.params.tubes[tube]}")
         elif event.kind in ("clip slipped", "clip not across") and event.instrument == self.params.applier:
             state.slipped = True
-        elif event.kind == "clip pulled off" and (clip := nearest_clip(places, along)) is not None:
-            places[clip] = -1.0
-            state.clips -= 1
-            self._lose(
-                Failure.CLIP_LOST,
-                f"clip {clip + 1} has come off {self.params.tubes[tube]} at {event.size:.1f} N",
-            )
+        elif event.kind == "clip pulled off":
+            self._drop(tube, along, event.size)
+        elif event.kind in _LEAKS:
+            state.leaks[tube] = along
+        elif event.kind in _STOPS:
+            state.leaks[tube] = -1.0
+
+    def _keep(self, along: float) -> None:
+        """Note where a clip lies."""
+        state = self.state
+        if state.aim < 0.0:
+            state.clip_places[state.tube, state.job] = along
+        else:
+            further = state.further[state.tube]
+            further[int(further.argmin())] = along
+        state.clips += 1
+        state.succeeded = True
+
+    def _drop(self, tube: int, along: float, force: float) -> None:
+        """Strike off the clip that was pulled off at a place (m), at a force (N)."""
+        state = self.state
+        for name, places in (("clip", state.clip_places[tube]), ("further clip", state.further[tube])):
+            clip = nearest_clip(places, along)
+            if clip is not None and abs(float(places[clip]) - along) < _SAME:
+                places[clip] = -1.0
+                state.clips -= 1
+                where = f"{name} {clip + 1} has come off {self.params.tubes[tube]}"
+                self._lose(Failure.CLIP_LOST, f"{where} at {force:.1f} N")
+                return
 
     def _lose(self, failure: Failure, why: str) -> None:
         """Count a loss; its sub-task is planned again, or there have been too many."""
@@ -126,13 +151,16 @@ class Surgeon(Grasping, Dividing):
     def _plan(self) -> None:
         """Begin the next attempt at the first sub-task that is not done."""
         state = self.state
-        if state.parted.all() and (state.clip_places >= 0.0).all():
-            state.done, state.sub_task = True, SubTask.DONE
-            return
         if state.clips == 0 and not state.parted.any():
             state.second_first = self.seen.tube(1).hides(self.seen.tube(0), self.hands.applier.base[:3, 3])
-        tube, job = self._next_job()
-        task = SubTask.GRASP_GALLBLADDER if tube == GRASP else sub_task_of(self._order.index(tube), job)
+        job_next = self.next_job()
+        if job_next is None:
+            self._end()
+            return
+        tube, job, state.aim = job_next
+        if tube != state.tube:
+            state.pulls = 0
+        task = SubTask.GRASP_GALLBLADDER if tube == GRASP else sub_task_of(self.order.index(tube), job)
         if task is not state.sub_task:
             state.sub_task, state.tube, state.job = task, tube, job
             state.attempts, state.spent, state.reason = 0, 0.0, Failure.NONE
@@ -144,22 +172,14 @@ class Surgeon(Grasping, Dividing):
         else:
             self.aim_at_tube()
 
-    @property
-    def _order(self) -> tuple[int, int]:
-        """Numbers of the tubes, that in front first."""
-        return (1, 0) if self.state.second_first else (0, 1)
-
-    def _next_job(self) -> tuple[int, int]:
-        state = self.state
-        if not state.grasped and not state.parted.all():
-            return GRASP, 0
-        for tube in self._order:
-            for job in range(CLIPS):
-                if state.clip_places[tube, job] < 0.0:
-                    return tube, job
-            if not state.parted[tube]:
-                return tube, CUT
-        raise MotionError("nothing is left to do")
+    def _end(self) -> None:
+        """Finish, or give up with a stump that is not closed."""
+        for tube, name in enumerate(self.params.tubes):
+            if self.open_side(tube) is not None:
+                stays = len(self.closed(tube))
+                self.fail(Failure.OPEN, f"{name} has {stays} clips, and no room for a further one")
+                return
+        self.state.done, self.state.sub_task = True, SubTask.DONE
 
     @property
     def _away(self) -> float:

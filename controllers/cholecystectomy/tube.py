@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from controllers.cholecystectomy.obstacles import Obstacles
 from robots.polyline import nearest_feet
 from schemas.trocar_msgs import TubeLine
 from schemas.vectors import Vector
@@ -36,6 +37,17 @@ class Tube:
         return bool(np.any(self._parted))
 
     @property
+    def body(self) -> Obstacles:
+        """The tube with its thickness, without the gaps where it is parted."""
+        return Obstacles.line(self.points, self.radii, self._parted[:-1] == 0)
+
+    @property
+    def partings(self) -> Vector:
+        """Places where the tube is parted, m, ascending."""
+        at = np.flatnonzero(self._parted)
+        return 0.5 * (self._along[at] + self._along[np.minimum(at + 1, len(self._along) - 1)])
+
+    @property
     def slack(self) -> float:
         """Present length over the distance of the ends; 1: straight."""
         chord = float(np.linalg.norm(self.points[-1] - self.points[0]))
@@ -52,8 +64,15 @@ class Tube:
         return np.array([np.interp(along, self._along, self.points[:, axis]) for axis in range(3)])
 
     def direction(self, along: float) -> Vector:
-        """Return the present direction at a place, away from the gallbladder, shape (3,)."""
-        ends = np.clip([along - _BESIDE, along + _BESIDE], self._along[0], self._along[-1])
+        """Return the present direction at a place, away from the gallbladder, shape (3,).
+
+        It is measured on the piece of the tube with this place.
+        """
+        cuts = np.flatnonzero(self._parted)
+        before, after = cuts[self._along[cuts] < along], cuts[self._along[cuts] >= along]
+        first = self._along[before[-1] + 1] if before.size else self._along[0]
+        last = self._along[after[0]] if after.size else self._along[-1]
+        ends = np.clip([along - _BESIDE, along + _BESIDE], first, last)
         way = self.point(float(ends[1])) - self.point(float(ends[0]))
         return way / max(float(np.linalg.norm(way)), 1e-9)
 
@@ -67,12 +86,12 @@ class Tube:
         reach = self.radii + other.radii[:, None]
         return bool(((ahead > reach) & (aside < reach)).any())
 
-    def first_place(self, nodes: Vector, gap: float, eye: Vector) -> float:
+    def first_place(self, organ: Obstacles, gap: float, eye: Vector) -> float:
         """Return the first place that is free, and lies across the view, m; 0 without any.
 
-        nodes: of an organ that the wall is at least `gap` (m) away from, m, shape (n, 3). eye: m, shape (3,).
+        organ: surface that the wall is at least `gap` (m) away from. eye: m, shape (3,).
         """
-        apart = np.linalg.norm(self.points[:, None] - nodes, axis=2).min(axis=1) - self.radii
+        apart = organ.distances(self.points, gap + float(self.radii.max()) + _BESIDE) - self.radii
         ways = np.gradient(self.points, axis=0)
         views = eye - self.points
         lengths = np.linalg.norm(ways, axis=1) * np.linalg.norm(views, axis=1)

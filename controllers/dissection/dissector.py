@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import Obstacles, withdraw
+from controllers.cholecystectomy.approach import withdraw
+from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.dissection.hook_hand import HookHand
 from controllers.dissection.lifting import Lifting

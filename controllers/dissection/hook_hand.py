@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import MARGIN, Obstacles, clearance
+from controllers.cholecystectomy.approach import MARGIN, NEAR, clearance
+from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.reach import path_margins
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from robots import rotation
@@ -66,8 +67,10 @@ class HookHand(SurgeonHand):
         begins = poses.copy()
         begins[:, :3, 3] -= away * poses[:, :3, 2]
         margins, joints = path_margins(self, np.stack([begins, poses], axis=1))
-        near = obstacles.near(place)
-        rooms = [clearance(self, pose, q[-1], 0.0, near) for pose, q in zip(poses, joints, strict=True)]
+        near = obstacles.near(place, NEAR)
+        rooms = [
+            clearance(self, pose[None], q[-1:], 0.0, near) for pose, q in zip(poses, joints, strict=True)
+        ]
         order = np.linspace(0.0, 0.5, len(poses))
         room = np.clip(np.array(rooms) / _CLEAR, -1.0, 1.0)
         score = np.where(margins < MARGIN, -np.inf, np.minimum(margins / _ROOMY, 1.0) + room - order)

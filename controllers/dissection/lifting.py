@@ -6,8 +6,9 @@ from math import radians
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import Obstacles, choose_pose, withdraw
+from controllers.cholecystectomy.approach import NEAR, choose_pose, withdraw
 from controllers.cholecystectomy.grasp_place import grasp_poses
+from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.reach import path_margins
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.dissection.hook_hand import HookHand
@@ -122,7 +123,7 @@ class Lifting:
         along = nodes @ state.ahead
         neck = nodes[along < along.min() + _NECK].mean(axis=0)
         poses = grasp_poses(hand, nodes, neck, state.grasps)
-        obstacles = self.seen.obstacles.near(poses[0, :3, 3])
+        obstacles = self.seen.obstacles.near(poses[0, :3, 3], NEAR)
         pose = choose_pose(hand, poses, _BEFORE, self.opening, obstacles, "the gallbladder")
         state.goal[:] = matrix_to_pose(pose)
         hand.move_jaw(self.opening)
@@ -187,7 +188,7 @@ class Lifting:
     def grasper_shaft(self) -> Obstacles:
         """The grasper's wrist and shaft, which the hook keeps away from."""
         hand = self.grasper
-        return Obstacles(links(hand.chain, hand.base, hand.joints[None])[0], LINK_RADII)
+        return Obstacles.points(links(hand.chain, hand.base, hand.joints[None])[0], LINK_RADII)
 
     @property
     def opening(self) -> float:

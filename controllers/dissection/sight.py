@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from controllers.cholecystectomy.approach import Obstacles
+from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.dissection.params import DissectionParams
 from hub.participant import Inputs
 from schemas.trocar_msgs import SoftBodyState, TiedPlaces
@@ -53,7 +53,7 @@ class Sight:
     def obstacles(self) -> Obstacles:
         """Organs that the shaft of the hook keeps away from."""
         nodes = [self._nodes(organ) for organ in self._params.avoid]
-        return Obstacles.join([Obstacles(own, np.zeros(len(own))) for own in nodes])
+        return Obstacles.join([Obstacles.points(own, np.zeros(len(own))) for own in nodes])
 
     @property
     def is_held(self) -> bool:

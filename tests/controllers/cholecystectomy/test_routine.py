@@ -118,6 +118,53 @@ def test_a_cut_that_leaves_the_tube_together_is_made_again():
     assert world.state.failure is Failure.NOT_PARTED
 
 
+def test_the_cut_goes_between_the_clips_as_they_lie_and_a_further_clip_makes_room():
+    world = World()
+    world.astray[0, 1], world.astray[1, 2] = -1.9e-3, 3.2e-3
+    assert world.run() is SubTask.DONE
+    assert [len(clips) for clips in world.clips] == [3, 4]
+    for clips, cut in zip(world.clips, world.cuts, strict=True):
+        apart = np.array(clips) - cut
+        assert (apart > 1.5e-3).sum() >= 2
+        assert (apart < -1.5e-3).any()
+        assert (np.abs(apart) > 1.5e-3).all()
+
+
+def test_a_stump_that_bleeds_after_the_cut_is_clipped_again():
+    world = World()
+    world.leaks[0] = 2e-3
+    assert world.run() is SubTask.DONE
+    assert [len(clips) for clips in world.clips] == [4, 3]
+    assert world.clips[0][3] > world.cuts[0] + 1.5e-3
+
+
+def test_a_tube_parted_beyond_its_second_clip_gets_another_or_is_given_up_without_room():
+    world = World()
+    world.run(lambda world: world.cuts[0] is not None)
+    world.cuts[0] = float(np.mean(world.clips[0][:2]))
+    assert world.run() is SubTask.DONE
+    assert [len(clips) for clips in world.clips] == [4, 3]
+    assert world.clips[0][3] > world.cuts[0] + 1.5e-3
+    world.cuts[0], world.state.done = 24e-3, False
+    assert world.run() is SubTask.FAILED
+    assert world.state.failure is Failure.OPEN
+    assert "stump not closed: cystic_duct has 4 clips, and no room for a further one" in world.routine.ended
+
+
+def test_the_gallbladder_is_pulled_elsewhere_where_no_way_leads_past_an_organ():
+    world = World("avoid=[wall]")
+    world.run(lambda world: world.is_at(SubTask.BACK_FROM_CLIP_3_LEFT))
+    world.spared = world.line(0).points_m.reshape(-1, 3)
+    world.run(lambda world: world.state.pulls > 0)
+    assert "the gallbladder is pulled elsewhere" in world.said[-1]
+    before = world.shift.copy()
+    world.run(lambda world: world.state.step is not Step.RETRACT)
+    across = world.shift - before
+    assert np.linalg.norm(across - across @ before / (before @ before) * before) > 4e-3
+    world.spared = world.spared + 0.2
+    assert world.run() is SubTask.DONE
+
+
 def test_scissors_do_not_close_on_an_organ_to_be_spared():
     world = World("avoid=[wall]")
     world.run(lambda world: world.is_at(SubTask.CUT_LEFT) and world.state.step is Step.REACH)

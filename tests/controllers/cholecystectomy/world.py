@@ -47,6 +47,10 @@ class World:
         self.misses = self.slips = self.blunt = 0
         """How often the next grasps, clips and cuts fail."""
         self.events, self.refused, self.t = ([], []), [], 0
+        self.astray = np.zeros((2, 3))
+        """Distance of each clip from where it was meant to close, on each tube, m."""
+        self.leaks = [None, None]
+        """Distance from the cut at which each tube leaks until it is clipped beyond, m."""
         self.spared = np.full((1, 3), 0.2)
         """Nodes of an organ `wall` to be spared, m."""
         self.tasks, self.said, self.instructions, self.held = [], [], [], False
@@ -180,6 +184,14 @@ class World:
             self._say(0, "clip slipped", "PSM1", self.tip("PSM1")[:3, 3])
             return
         tube, place, middle = found
+        number = len(self.clips[tube])
+        if number < 3 and (off := self.astray[tube, number]):
+            place, line = place + off, self.line(tube)
+            points = line.points_m.reshape(-1, 3)
+            middle = np.array([np.interp(place, line.along_m, points[:, axis]) for axis in range(3)])
+        if self.leaks[tube] is not None and self.cuts[tube] is not None and place > self.cuts[tube]:
+            self.leaks[tube] = None
+            self._say(tube, "bleeding stopped", "", middle)
         self.clips[tube].append(place)
         self._say(tube, "clipped", "PSM1", middle)
 
@@ -194,6 +206,8 @@ class World:
         found = self._between("PSM3")
         if found is not None and not self.blunt:
             self.cuts[found[0]] = found[1]
+            if (leak := self.leaks[found[0]]) is not None:
+                self._say(found[0], "bleeding", "", found[2] + leak * (self.far - NECK)[found[0]] / 0.025)
         self.blunt = max(0, self.blunt - 1)
 
     def run(self, until=None, seconds=200.0):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.cholecystectomy.approach import Obstacles
+from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.dissection.step import Failure, Step
 from hub.planning.scenario_file import load
 from robots.transform import pose_to_matrix
@@ -108,11 +108,11 @@ def test_the_hook_keeps_clear_of_what_lies_in_its_way():
     hook, place, normal = world.routine._hook, np.array([-0.02, 0.03, -0.004]), np.array([0.0, 0.0, 1.0])
     hook.period = 0.01
     hook.stay()
-    ahead, nothing = np.array([0.0, 1.0, 0.0]), Obstacles(np.zeros((0, 3)), np.zeros(0))
+    ahead, nothing = np.array([0.0, 1.0, 0.0]), Obstacles.points(np.zeros((0, 3)), np.zeros(0))
     world.step()
     free = pose_to_matrix(hook.choose(place, ahead, normal, 0.02, nothing))
     shaft = free[:3, 3] - 0.02 * free[:3, 2]
-    bar = Obstacles(shaft + np.linspace(-0.03, 0.03, 13)[:, None] * normal, np.full(13, 0.004))
+    bar = Obstacles.points(shaft + np.linspace(-0.03, 0.03, 13)[:, None] * normal, np.full(13, 0.004))
     other = pose_to_matrix(hook.choose(place, ahead, normal, 0.02, bar))
     assert np.linalg.norm(other[:3, 2] - free[:3, 2]) > 0.2  # another direction
     for pose in (free, other):
