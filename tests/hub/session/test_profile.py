@@ -80,7 +80,7 @@ def test_late_steps_have_their_cause(prepare, overrides: Iterable[str], cause):
     # other work on the machine may take the cores from any step
     assert next(found for found in profile["late_causes"] if found != NO_CORE) == cause
     assert sum(profile["late_causes"].values()) == summary.late_steps
-    assert cause in [row["cause"] for row in profile["worst_steps"]]
+    assert {row["cause"] for row in profile["worst_steps"]} <= set(profile["late_causes"])
     assert all(row["took_s"] >= 0.005 for row in profile["worst_steps"])
 
 
