@@ -17,7 +17,7 @@ from hub.participant import Inputs
 from schemas.trocar_msgs import SoftBodyState, TissueEvent, TubeLine
 from schemas.vectors import Vector
 
-__all__ = ["Sight"]
+__all__ = ["Sight", "nodes_of", "shaft_of"]
 
 
 class Sight:
@@ -49,7 +49,7 @@ class Sight:
     @property
     def gallbladder(self) -> Vector:
         """Nodes of the gallbladder, m, shape (n, 3)."""
-        return self._nodes(self._params.gallbladder)
+        return nodes_of(self._inputs, self._params.gallbladder)
 
     @property
     def is_held(self) -> bool:
@@ -79,19 +79,22 @@ class Sight:
         parts = [self._organ(organ) for organ in others]
         parts += [] if tube is None else [self.wall]
         parts += [self._line(other) for other in range(len(params.tubes)) if other != tube]
-        parts += [_shaft(other) for other in hands if other is not hand]
+        parts += [shaft_of(other) for other in hands if other is not hand]
         return Obstacles.join(parts)
 
     def _organ(self, name: str) -> Obstacles:
-        return self._surfaces.obstacles(name, self._nodes(name))
+        return self._surfaces.obstacles(name, nodes_of(self._inputs, name))
 
     def _line(self, index: int) -> Obstacles:
         return self.tube(index).body
 
-    def _nodes(self, organ: str) -> Vector:
-        state = cast("SoftBodyState", self._inputs.message(f"{organ}/nodes"))
-        return state.nodes_m.astype(np.float64).reshape(-1, 3)
+
+def nodes_of(inputs: Inputs, organ: str) -> Vector:
+    """Return the nodes of an organ, m, shape (n, 3)."""
+    state = cast("SoftBodyState", inputs.message(f"{organ}/nodes"))
+    return state.nodes_m.astype(np.float64).reshape(-1, 3)
 
 
-def _shaft(hand: SurgeonHand) -> Obstacles:
+def shaft_of(hand: SurgeonHand) -> Obstacles:
+    """Return wrist and shaft of a hand's instrument, for others to keep away from."""
     return Obstacles.points(links(hand.chain, hand.base, hand.joints[None])[0], LINK_RADII)

@@ -10,12 +10,12 @@ from controllers.cholecystectomy.approach import NEAR, choose_pose, withdraw
 from controllers.cholecystectomy.grasp_place import grasp_poses
 from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.reach import path_margins
+from controllers.cholecystectomy.sight import shaft_of
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.dissection.hook_hand import HookHand
 from controllers.dissection.params import DissectionParams
 from controllers.dissection.sight import Sight
 from controllers.dissection.step import FAILURES, Failure, Step
-from controllers.expert.reach import LINK_RADII, links
 from hub.participant import Record, array, choice, flag, integer, number
 from robots.transform import matrix_to_pose, pose_to_matrix
 from schemas.vectors import Vector
@@ -187,8 +187,7 @@ class Lifting:
     @property
     def grasper_shaft(self) -> Obstacles:
         """The grasper's wrist and shaft, which the hook keeps away from."""
-        hand = self.grasper
-        return Obstacles.points(links(hand.chain, hand.base, hand.joints[None])[0], LINK_RADII)
+        return shaft_of(self.grasper)
 
     @property
     def opening(self) -> float:

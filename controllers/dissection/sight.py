@@ -7,9 +7,10 @@ from typing import cast
 import numpy as np
 
 from controllers.cholecystectomy.obstacles import Obstacles
+from controllers.cholecystectomy.sight import nodes_of
 from controllers.dissection.params import DissectionParams
 from hub.participant import Inputs
-from schemas.trocar_msgs import SoftBodyState, TiedPlaces
+from schemas.trocar_msgs import TiedPlaces
 from schemas.vectors import Vector
 
 __all__ = ["Sight"]
@@ -47,12 +48,12 @@ class Sight:
     @property
     def gallbladder(self) -> Vector:
         """Nodes of the gallbladder, m, shape (n, 3)."""
-        return self._nodes(self._params.gallbladder)
+        return nodes_of(self._inputs, self._params.gallbladder)
 
     @property
     def obstacles(self) -> Obstacles:
         """Organs that the shaft of the hook keeps away from."""
-        nodes = [self._nodes(organ) for organ in self._params.avoid]
+        nodes = [nodes_of(self._inputs, organ) for organ in self._params.avoid]
         return Obstacles.join([Obstacles.points(own, np.zeros(len(own))) for own in nodes])
 
     @property
@@ -69,7 +70,3 @@ class Sight:
     def delivered(self) -> float:
         """Heat that the hook has given to tissue, J."""
         return float(self._inputs[f"{self._params.hook}/delivered"][0])
-
-    def _nodes(self, organ: str) -> Vector:
-        state = cast("SoftBodyState", self._inputs.message(f"{organ}/nodes"))
-        return state.nodes_m.astype(np.float64).reshape(-1, 3)
