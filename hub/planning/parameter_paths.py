@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 from hub.participant import Params
+from hub.planning.json_schema import json_schema
 
 __all__ = ["parameter_paths"]
 
@@ -17,7 +18,7 @@ _FORMATS = ("path", "file-path", "directory-path")
 
 def parameter_paths(model: type[Params], values: Mapping[str, Any]) -> set[str]:
     """Return every text in `values` at the place of a path in the model, as written."""
-    schema = model.model_json_schema()
+    schema = json_schema(model)
     return set(_paths_in(schema, values, schema.get("$defs", {})))
 
 

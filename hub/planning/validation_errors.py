@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from functools import lru_cache
 from itertools import islice
 from typing import Any, cast
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from hub.planning.json_schema import json_schema
 from hub.planning.limits import MAX_PROBLEMS, safe_text
 from hub.planning.scenario_source import Location, Source
 from schemas.errors import did_you_mean
@@ -58,17 +58,12 @@ def _message(detail: ErrorDetails, model: type[BaseModel], other_keys: Iterable[
             return message if value in message or len(value) > 60 else f"{message} (got {value})"
 
 
-@lru_cache(maxsize=64)
-def _json_schema(model: type[BaseModel]) -> dict[str, Any]:
-    return model.model_json_schema()
-
-
 def _known_keys(model: type[BaseModel], loc: Iterable[str | int]) -> set[str]:
     """Return the keys allowed by `model` at `loc`.
 
     The source is the model's JSON schema, where unions and nested models look alike.
     """
-    root = _json_schema(model)
+    root = json_schema(model)
     here = list(_schema_branches(root, root))
     for part in loc:
         children = [child for branch in here for child in _child_schemas(branch, part)]

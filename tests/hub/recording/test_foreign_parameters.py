@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -84,12 +84,10 @@ def with_value(params: Part, at: tuple[str, ...], value: str) -> dict[str, Any]:
 class Guest:
     """Makes recordings that nobody has run: a scenario, a plan and one grant, with changes."""
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, attachments: Mapping[str, bytes]) -> None:
         self.directory = directory
         (directory / "foreign.py").write_text(FOREIGN)
-        (directory / "scenario.yaml").write_text(SCENARIO)
-        file = load(str(directory / "scenario.yaml"))
-        self._attachments = attachments_of(file.scenario, plan_of(file.scenario, file.params)[0], file)
+        self._attachments = attachments
         self._made = 0
 
     def add(
@@ -111,7 +109,7 @@ class Guest:
                 "ports": [],
             }
             plan["order"] += ["guest"] if role != "device" else []
-        attachments = self._attachments | {
+        attachments = dict(self._attachments) | {
             "scenario.json": json.dumps(scenario).encode(),
             "plan.json": json.dumps(plan).encode(),
         }
@@ -129,10 +127,19 @@ class Guest:
         return Recording(place)
 
 
+@pytest.fixture(scope="module")
+def attachments(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, bytes]:
+    """What a recording of the scenario holds beside its messages."""
+    scenario = tmp_path_factory.mktemp("guest") / "scenario.yaml"
+    scenario.write_text(SCENARIO)
+    file = load(str(scenario))
+    return attachments_of(file.scenario, plan_of(file.scenario, file.params)[0], file)
+
+
 @pytest.fixture
-def guest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Guest:
+def guest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, attachments: Mapping[str, bytes]) -> Guest:
     monkeypatch.syspath_prepend(tmp_path)
-    return Guest(tmp_path)
+    return Guest(tmp_path, attachments)
 
 
 _opened: list[str] = []
@@ -211,19 +218,46 @@ def _tried(recording: Recording, *commands: str) -> dict[str, Exception | None]:
     return found
 
 
-@pytest.mark.parametrize(("kind", "at"), places())
-def test_no_command_opens_a_file_that_a_recording_names(
-    guest: Guest, pipe: Path, kind: str, at: tuple[str, ...]
+def _expect_nothing_opened(
+    guest: Guest, pipe: Path, place: tuple[str, tuple[str, ...]], commands: Iterable[str]
 ) -> None:
-    base = BASES.get(kind, {})
-    bad = with_value(base, at, str(pipe))
+    """Name the pipe at a place of a recording, and try the commands."""
+    kind, at = place
     stepped = registry.find(kind).role != "device"
-    found = _tried(guest.add(kind, bad), *(one for one in COMMANDS if stepped or one != "verify"))
+    bad = with_value(BASES.get(kind, {}), at, str(pipe))
+    found = _tried(guest.add(kind, bad), *(one for one in commands if stepped or one != "verify"))
     assert isinstance(found["fork"], TrustError)
     assert not stepped or isinstance(found["verify"], TrustError)
-    earlier = _tried(guest.add(kind, base, before=bad), *(("fork", "verify") if stepped else ("fork",)))
+    assert _opened == []
+
+
+@pytest.mark.parametrize("place", places(), ids=str)
+def test_a_file_that_a_recording_names_is_not_trusted(
+    guest: Guest, pipe: Path, place: tuple[str, tuple[str, ...]]
+) -> None:
+    """Wherever it is named, of now or of before a fork."""
+    _expect_nothing_opened(guest, pipe, place, ("fork", "verify"))
+    kind, at = place
+    base = BASES.get(kind, {})
+    commands = ("fork", "verify") if registry.find(kind).role != "device" else ("fork",)
+    earlier = _tried(guest.add(kind, base, before=with_value(base, at, str(pipe))), *commands)
     assert all(isinstance(error, TrustError) for error in earlier.values())
     assert _opened == []
+
+
+@pytest.mark.parametrize("place", {kind: (kind, at) for kind, at in places()}.values(), ids=str)
+def test_no_command_opens_a_file_of_a_kind(
+    guest: Guest, pipe: Path, place: tuple[str, tuple[str, ...]]
+) -> None:
+    _expect_nothing_opened(guest, pipe, place, COMMANDS)
+
+
+@pytest.mark.search
+@pytest.mark.parametrize("place", places(), ids=str)
+def test_no_command_opens_a_file_that_a_recording_names(
+    guest: Guest, pipe: Path, place: tuple[str, tuple[str, ...]]
+) -> None:
+    _expect_nothing_opened(guest, pipe, place, COMMANDS)
 
 
 @pytest.mark.parametrize(
