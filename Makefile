@@ -3,7 +3,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 RECORDING := recordings/palpation-$(shell date +%Y%m%d-%H%M%S)
 # Tests by what they need: markers in pyproject.toml. Four processes on two cores, as they wait a third of the time.
-NEEDS := ros or browser or release or search
+NEEDS := ros or browser or release or long or search
 PYTEST := pytest -n 4 --dist loadgroup
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
@@ -17,7 +17,7 @@ demo: $(VENV)/.all ## run the palpation scenario, record it and write a report
 test: check ## the behaviour of the code: tests that need Python, a C compiler and two cores, and nothing else
 	$(PYTEST) -m "not ($(NEEDS)) and not alone"
 
-test-all: test ## everything: also tests with ROS, a browser, fresh environments, minutes of search or simulation, all cores
+test-all: test ## everything: also tests with ROS, a browser, fresh environments, seconds or minutes of simulation, all cores
 	$(PYTEST) -m "($(NEEDS)) and not (alone or browser)"
 	pytest -m "alone or browser"
 

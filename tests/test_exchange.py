@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import trocar
 from schemas.ros import Joy, StringMessage
@@ -48,6 +49,7 @@ connections:
 """
 
 
+@pytest.mark.long
 def test_an_arm_gets_scissors_for_its_hook_and_the_session_verifies(tmp_path):
     file = tmp_path / "exchange.yaml"
     file.write_text(SCENARIO)

@@ -97,6 +97,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
         process.wait()
 
 
+@pytest.mark.long
 def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(
     start: Callable[..., subprocess.Popen[bytes]], tmp_path: Path
 ) -> None:

@@ -153,6 +153,7 @@ TISSUE = {
 }
 
 
+@pytest.mark.long
 def test_a_hand_on_tissue_comes_to_rest_behind_a_satellite(file: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("pybullet")

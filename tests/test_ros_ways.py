@@ -24,6 +24,7 @@ def run(name, *overrides):
     return summary.measures
 
 
+@pytest.mark.long
 def test_a_master_leads_an_arm_that_its_console_has_homed():
     """The hand has gone 28 mm to the right by 3.2 s, scaled by 0.2; the jaw closes with the gripper.
 

@@ -30,6 +30,7 @@ BARE = {
 PROGRAM = Path(__file__).parents[1] / "examples" / "ros2_psm.py"
 
 
+@pytest.mark.long
 def test_two_hands_at_styluses_lead_both_arms_and_are_scored():
     found = run("peg-board-by-hand", set={**BARE, "duration": "2 s"}, pace="fast", one_host=True).scores[
         "task"
@@ -39,6 +40,7 @@ def test_two_hands_at_styluses_lead_both_arms_and_are_scored():
     assert found["PSM1/clutch_count"]["value"] == 0  # still led
 
 
+@pytest.mark.long
 def test_keys_lead_the_right_arm(monkeypatch):
     """Somebody gives the window the focus, holds the space bar, and goes to the right."""
     pygame = pytest.importorskip("pygame", reason="needs trocar[keyboard]")
@@ -62,6 +64,7 @@ def test_keys_lead_the_right_arm(monkeypatch):
     assert metrics["PSM1/clutch_count"]["value"] is not None
 
 
+@pytest.mark.long
 def test_the_masters_of_a_recorded_dvrk_lead_an_arm_and_are_scored():
     measure = {"jaw": {"kind": "final", "of": "motion.PSM1/jaw/measured_js.position"}}
     found = run(

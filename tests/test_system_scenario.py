@@ -13,6 +13,7 @@ pytest.importorskip("mujoco")
 CAMERAS = ("endoscope", "room")
 
 
+@pytest.mark.long
 def test_styluses_lead_instruments_through_aligned_masters(tmp_path: Path) -> None:
     scenario = yaml.safe_load(Path("configs/system.yaml").read_text("utf-8"))
     for camera in CAMERAS:

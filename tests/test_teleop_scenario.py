@@ -2,9 +2,12 @@
 from its recording.
 """
 
+import pytest
+
 import trocar
 
 
+@pytest.mark.long
 def test_both_hands_lead_their_arms_and_the_right_one_feels_the_table(tmp_path):
     settings = {"duration": "2.6 s", "participants.endoscope.images": "none"}
     summary = trocar.run("teleop", set=settings, record=tmp_path / "bag", one_host=True)

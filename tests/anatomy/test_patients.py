@@ -101,6 +101,7 @@ def test_lines_have_the_lengths_of_the_patient(seed):
     assert length_of(layout.gallbladder) == pytest.approx(patient.gallbladder_length, rel=0.1)
 
 
+@pytest.mark.long
 @costly
 @given(SEEDS)
 @example(0)

@@ -178,6 +178,7 @@ def test_a_tracked_hand_is_met_by_the_stylus_while_the_clutch_is_open(page):
     assert samples["twist"].twist.linear.x == 0.0
 
 
+@pytest.mark.long
 @given(
     jump=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
     turn=st.floats(-3.0, 3.0),

@@ -42,6 +42,7 @@ envs.close()
 """
 
 
+@pytest.mark.long
 def test_envhub_gets_pictures_hands_and_success() -> None:
     if not (found := opengl.find()).name:
         pytest.skip(f"no OpenGL: {found.detail}")

@@ -11,6 +11,7 @@ pytestmark = pytest.mark.timeout(900)
 HANDS = {"PSM1": CLIPS, "PSM3": BLADE}
 
 
+@pytest.mark.long
 def test_three_clips_and_a_cut_between_them_lose_nothing():
     with Theatre([DUCT], HANDS) as theatre:
         theatre.clip(DUCT, 6e-3, 16e-3, 20e-3).cut(DUCT, 11e-3)
@@ -26,6 +27,7 @@ def test_three_clips_and_a_cut_between_them_lose_nothing():
         assert theatre.failure == ""
 
 
+@pytest.mark.long
 def test_a_duct_cut_without_a_clip_leaks_bile():
     with Theatre([DUCT], HANDS) as theatre:
         theatre.wait(0.05).cut(DUCT, 15e-3)
@@ -37,6 +39,7 @@ def test_a_duct_cut_without_a_clip_leaks_bile():
         assert theatre.failure == "duct open"
 
 
+@pytest.mark.long
 def test_an_artery_cut_on_the_wrong_side_of_its_clips_bleeds():
     with Theatre([ARTERY], HANDS) as theatre:
         theatre.clip(ARTERY, 6e-3, 10e-3).cut(ARTERY, 20e-3)
@@ -58,6 +61,7 @@ def test_a_clip_on_the_common_duct_shuts_it():
         assert theatre.metric("duct/clips") == 0.0
 
 
+@pytest.mark.long
 def test_a_common_duct_that_is_cut_is_an_injury():
     with Theatre([DUCT, COMMON], HANDS) as theatre:
         theatre.wait(0.05).cut(COMMON, 15e-3)
@@ -66,6 +70,7 @@ def test_a_common_duct_that_is_cut_is_an_injury():
         assert theatre.failure == "common duct injured"
 
 
+@pytest.mark.long
 def test_an_artery_that_is_pulled_too_far_tears_and_bleeds():
     weak = tube(ARTERY) | {"cutting": {"toughness": 3.0, "tear_stretch": 1.5}}
     with Theatre({ARTERY: weak}, {"PSM2": GRASPER}) as theatre:
@@ -151,6 +156,7 @@ def test_power_without_tissue_heats_nothing(beside, kind):
         assert theatre.metric("PSM1/idle_energy") == pytest.approx(15.0, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_burnt_common_duct_is_an_injury_with_its_temperature():
     with Theatre([DUCT, COMMON], {"PSM1": HOOK}) as theatre:
         z = HEIGHTS[COMMON]

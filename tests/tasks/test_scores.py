@@ -78,6 +78,7 @@ def test_the_report_shows_card_events_and_paths(session, tmp_path):
         assert words in text
 
 
+@pytest.mark.long
 def test_the_command_prints_json_and_refuses_unknown_rules(session):
     def score(*options):
         command = [sys.executable, "-P", "-m", "trocar", "score", session[0], *options]

@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
+import pytest
+
 from hub.recording.recording import Recording
 from tests.tasks.test_scores_of_scenarios import compare
 from trocar import verify
 
 
+@pytest.mark.long
 def test_a_session_its_recording_and_its_re_simulation_agree(tmp_path):
     summary = compare(str(Path(__file__).parent / "operation.yaml"), tmp_path)
     metrics = summary.scores["task"]["metrics"]

@@ -41,6 +41,7 @@ def test_a_wrong_value_is_located() -> None:
         trocar.run("table", set={"order": ["robot"]})
 
 
+@pytest.mark.long
 def test_numpy_that_was_imported_first_is_reported(tmp_path: Path) -> None:
     script = (
         "import numpy, logging; logging.basicConfig(); import trocar\n"

@@ -56,6 +56,7 @@ def get(server, cookie, path):
     return found
 
 
+@pytest.mark.long
 def test_textures_are_loaded_by_their_hashes_and_may_be_kept(served_cut):
     server, block = served_cut
     cookie = cookie_of(f"127.0.0.1:{server.port}", server.gate.invite("viewer"))

@@ -96,6 +96,7 @@ def test_a_viewer_forks_nothing(table):
         run(body, server, role="viewer")
 
 
+@pytest.mark.long
 def test_processes_that_wait_for_nothing_end_with_the_server():
     started = Started()
     started.prepare(["no.such.module"])
@@ -105,6 +106,7 @@ def test_processes_that_wait_for_nothing_end_with_the_server():
     assert (hub.returncode, page.returncode) == (0, 0)
 
 
+@pytest.mark.long
 def test_a_page_forks_and_follows(table):
     """One fork fails with the words of the command line; another one is live until it is ended."""
 

@@ -120,6 +120,7 @@ def test_a_network_link_is_changed_and_the_session_can_be_verified(tmp_path):
     assert verify(recording).same
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("scenario", "name", "value", "words"),
     [
@@ -178,6 +179,7 @@ def test_without_a_session_it_says_so_and_goes_on():
     live.close()
 
 
+@pytest.mark.long
 def test_a_hub_that_is_killed_is_missed_and_the_next_one_is_shown(tmp_path):
     (tmp_path / "seen.yaml").write_text(SCENARIO.replace("name: seen", "name: lost").replace("1 s", "10 min"))
     command = [sys.executable, "-P", "-m", "trocar", "run", str(tmp_path / "seen.yaml"), "--pace", "realtime"]

@@ -107,6 +107,7 @@ def test_a_clip_that_comes_off_later_is_replaced():
     assert len(world.clips[0]) == 3
 
 
+@pytest.mark.long
 def test_a_cut_that_leaves_the_tube_together_is_made_again():
     world = World()
     world.blunt = 2
@@ -151,6 +152,7 @@ def test_a_tube_parted_beyond_its_second_clip_gets_another_or_is_given_up_withou
     assert "stump not closed: cystic_duct has 4 clips, and no room for a further one" in world.routine.ended
 
 
+@pytest.mark.long
 def test_the_gallbladder_is_pulled_elsewhere_where_no_way_leads_past_an_organ():
     world = World("avoid=[wall]")
     world.run(lambda world: world.is_at(SubTask.BACK_FROM_CLIP_3_LEFT))

@@ -25,6 +25,7 @@ def test_the_duct_is_clipped_three_times_and_parted(tmp_path):
     assert not told(trocar.Recording(run), "cystic_artery")
 
 
+@pytest.mark.long
 def test_a_clip_that_does_not_fit_is_given_up_with_its_name_and_simulated_again_to_the_bit(tmp_path):
     run = tmp_path / "run"
     probe = {"spheres": 6, "clip": {"diameters": ["5 mm", "13 mm"]}}

@@ -99,6 +99,7 @@ def starts(name):
     return {index: (*what.position, *what.orientation) for index, what in params.objects.items()}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["pick-and-place", "peg-board", "peg-board-surrol", "peg-board-fls"])
 def test_everything_is_carried_where_it_belongs_at_the_first_attempt(name):
     world = World(name).run(120)

@@ -182,12 +182,14 @@ def test_a_wrench_of_a_program_that_dies_stays_until_hold():
     assert np.linalg.norm(masters.pose("MTML")[:3] - before[:3]) < 1e-4
 
 
+@pytest.mark.long
 def test_home_goes_to_zero():
     masters = Masters("disabled").step(1, MTMR__state_command=StringStamped(string="home"))
     masters.step(3000)
     assert np.abs(masters.robot.outputs["MTMR/measured_js"][:7]).max() < np.radians(1.0)
 
 
+@pytest.mark.long
 def test_a_hand_moves_a_free_master_and_feels_what_is_commanded_to_it():
     masters = Masters().step(1, MTML__body__servo_cf=WrenchStamped())
     goal = masters.pose("MTML")

@@ -93,6 +93,7 @@ def plain():
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "position", "normal", "axis"),
     [("ours", 0.7, 1.0, 2.0), ("theirs", 0.6, 0.3, 1.0), ("one", 1.0, 1.6, 2.0)],
@@ -107,6 +108,7 @@ def test_errors_stay_within_what_is_asked(plain, name, position, normal, axis):
         assert np.percentile(errors, 90) < 1.5 * bound
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["ours", "theirs", "one"])
 def test_it_is_as_wrong_as_it_says(plain, name):
     """NEES of 6 degrees of freedom, at pictures far enough apart to be nearly independent."""

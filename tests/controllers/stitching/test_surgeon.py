@@ -162,6 +162,7 @@ def test_a_needle_under_the_skin_but_beside_the_pad_is_not_said_to_be_in_the_tis
     assert world.said[-1].endswith("at 120, 0, -30 mm, its tip outside; it is taken again")
 
 
+@pytest.mark.long
 def test_a_needle_that_is_always_dropped_is_given_up():
     world = World(stitches=1)
     for _ in range(4):

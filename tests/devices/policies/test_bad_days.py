@@ -113,6 +113,7 @@ def test_a_delay_of_the_network_link_is_in_simulated_time(tmp_path):
     assert trocar.verify(tmp_path / "recording").same
 
 
+@pytest.mark.long
 def test_answers_in_wall_time_enter_when_they_come(tmp_path):
     with openpi_server(lambda *_: good()) as (address, _):
         values = {"pace": "realtime", "duration": "1.5 s", "participants.policy.time": "wall"}
@@ -131,6 +132,7 @@ def test_a_contract_that_the_server_contradicts_ends_the_session_at_its_start(tm
         run(tmp_path, address)
 
 
+@pytest.mark.long
 def test_answers_that_are_late_are_late(tmp_path):
     """An answer of 50 ms of rows comes after a second: none of them is executed."""
 

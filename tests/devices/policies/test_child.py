@@ -49,6 +49,7 @@ def test_a_class_answers_with_rows_whatever_it_prints(opened):
     assert ask(policy, 2).dtype == np.float64
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "error", "said"),
     [

@@ -39,6 +39,7 @@ def trocar(monkeypatch, capsys):
     return run
 
 
+@pytest.mark.long
 def test_a_strangers_policy_drives_the_arm(stranger):
     summary = public.run(
         "my.yaml", set=dict([stranger.split("=")], duration="1.5 s"), record="mine", one_host=True

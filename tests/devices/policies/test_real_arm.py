@@ -44,6 +44,7 @@ def dvrk(tmp_path):
     process.wait(LIMIT_S)
 
 
+@pytest.mark.long
 def test_a_policy_leads_an_arm_behind_ros_within_the_governors_limits(dvrk, tmp_path):
     own = installed_scenarios()["policy"].parent / "data" / "policies" / "pick.py"
     shutil.copy(own, tmp_path / "pick.py")

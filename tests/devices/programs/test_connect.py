@@ -180,6 +180,7 @@ def test_the_operating_state_changes(program):
     assert arm.operating_state().is_homed
 
 
+@pytest.mark.long
 def test_pictures_come_with_their_time(program):
     first = program.endoscope.left(LIMIT_S)
     assert first.pixels.shape == (288, 320, 3)
@@ -204,6 +205,7 @@ def test_of_two_programs_one_leads_an_arm_and_both_may_stop_it(program, running)
     program.PSM1.set_trajectory_ratio(1.0)
 
 
+@pytest.mark.long
 def test_the_end_of_the_session_ends_the_wait_and_what_was_led_is_simulated_again(tmp_path):
     session = Running("--record", str(tmp_path / "led"))
     with session.connect() as program:
@@ -221,6 +223,7 @@ def test_the_end_of_the_session_ends_the_wait_and_what_was_led_is_simulated_agai
     assert trocar.verify(tmp_path / "led").same
 
 
+@pytest.mark.long
 def test_a_program_on_another_machine_needs_the_certificate_of_a_console(tmp_path):
     authority, endpoint = Authority.founded(tmp_path / "certs"), f"tls/127.0.0.1:{free_port()}"
     session = Running("--listen", endpoint, "--certs", str(authority.directory))
@@ -267,6 +270,7 @@ def test_of_a_session_closed_to_programs_it_is_said_what_opens_it(alone, endpoin
         trocar.connect("peg-board")
 
 
+@pytest.mark.long
 def test_without_a_name_a_session_about_to_start_is_waited_for(alone, endpoints):
     with (
         hub_file(endpoints[0], [], session="teleop"),
@@ -297,6 +301,7 @@ def test_a_program_loads_no_engine():
     assert not engines & set(json.loads(loaded.stdout))
 
 
+@pytest.mark.long
 def test_the_script_and_the_notebook_of_the_documentation_run(running, monkeypatch, capsys):
     monkeypatch.setattr(trocar, "connect", lambda endpoint="": running.connect())
     runpy.run_path(str(ROOT / "examples" / "lead_psm1.py"))["main"]()

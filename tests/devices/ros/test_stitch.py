@@ -74,5 +74,6 @@ def in_turn(peer, rows):
     surgeon.hears("/stitch/state", "RUNNING")
 
 
+@pytest.mark.long
 def test_a_program_guides_a_stitch(middleware):
     middleware.run(scenario(), {"stitch"}, in_turn)

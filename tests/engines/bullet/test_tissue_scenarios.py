@@ -4,7 +4,10 @@ import json
 import subprocess
 import sys
 
+import pytest
 
+
+@pytest.mark.long
 def test_the_liver_is_lifted_and_held():
     run = [
         sys.executable,

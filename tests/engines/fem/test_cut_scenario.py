@@ -4,6 +4,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 import trocar
 
 
@@ -14,6 +16,7 @@ def run(*more):
     return command
 
 
+@pytest.mark.long
 def test_scissors_cut_a_strip_that_forceps_hold(tmp_path):
     commands = (
         [*run(), "--one-host", "--record", str(tmp_path / "cut")],

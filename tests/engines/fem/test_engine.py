@@ -266,6 +266,7 @@ def test_parameters_are_those_of_bullet_but_for_its_own():
     assert BulletParams.model_fields.keys() - shared == {"standstill"}
 
 
+@pytest.mark.long
 def test_a_palpation_with_it_is_recorded_and_verified(tmp_path):
     recording = str(tmp_path / "press")
     options = ["--set", "participants.tissue.kind=fem", "--set", "duration=1.2 s", "--record", recording]

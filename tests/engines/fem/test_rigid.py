@@ -143,6 +143,7 @@ participants:
 """
 
 
+@pytest.mark.long
 def test_a_session_of_a_pile_in_one_process_and_in_two_has_the_same_bits(tmp_path):
     hashes = []
     for host in ("host: hub", "host: elsewhere"):

@@ -175,6 +175,7 @@ def compiled_with(folder, flag):
     return module
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="calls cc")
 @pytest.mark.parametrize("flag", ["-DTROCAR_PLAIN_LANES", "-DTROCAR_NARROW_LANES"])
 def test_plain_c_and_four_lanes_have_the_bits_of_eight(flag, tmp_path, monkeypatch):

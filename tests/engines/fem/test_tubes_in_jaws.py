@@ -78,6 +78,7 @@ def test_a_clip_keeps_a_flattened_tube_shut_when_the_jaws_open():
         assert line.areas_m2[shut[0] - 4] > 0.9 * line.areas_m2[0]
 
 
+@pytest.mark.long
 def test_a_duct_that_is_held_and_pulled_is_borne_by_its_joints_without_chatter():
     far = np.array([[0.0, -0.2, 0.2], [0.0, -0.2, 0.21]])
     probes = {"probe": {"spheres": 2, "radius": "1 mm"}}

@@ -193,6 +193,7 @@ def scenario(libraries: dict[str, Path], tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_session_of_two_fmus_keeps_its_book_and_verifies(scenario: Path, tmp_path: Path) -> None:
     """The motor pulls the mass 5 mm along, with all the current there is; then both swing."""
     summary = launch(load(str(scenario), ["participants.drive.host=drive"]), record=tmp_path / "rec").run()

@@ -35,6 +35,7 @@ def scenario(libraries: dict[str, Path], tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("overrides", "steps"),
     [

@@ -63,6 +63,7 @@ def test_a_usable_surface_gives_a_sound_mesh_of_about_as_many_nodes(tmp_path, na
     assert said in "; ".join(organ.report)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", REFUSED)
 def test_an_unusable_surface_is_refused_with_reason_and_remedy(tmp_path, name):
     file = written(tmp_path, name)
@@ -182,6 +183,7 @@ def test_the_unit_is_stated_where_no_guess_makes_an_organ(tmp_path):
     assert np.ptp(organ.mesh.nodes, axis=0).max() == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.mark.long
 def test_an_unknown_anchor_or_an_empty_pick_is_refused(tmp_path):
     with pytest.raises(ScenarioError, match=r"no surface 'botom'.*Did you mean 'bottom'"):
         import_organ([written(tmp_path, "holes")], nodes=60, anchors=["botom"])

@@ -110,6 +110,7 @@ def patient(scan):
     return import_patient(scan, {})
 
 
+@pytest.mark.long
 def test_organs_have_the_volume_of_their_voxels_and_a_sound_mesh(patient):
     assert list(patient.organs) == list(LABELS)
     for organ in patient.organs.values():
@@ -152,6 +153,7 @@ def test_organs_that_touch_have_surfaces_there_and_hang_together(patient):
     assert [organ.anchors for organ in patient.organs.values()] == [("posterior",), (), ()]
 
 
+@pytest.mark.long
 def test_the_command_writes_a_patient_that_runs(scan, tmp_path):
     output = tmp_path / "mine.yaml"
     arguments = ["import", str(scan), "-o", str(output), "--nodes", "300"]
@@ -171,6 +173,7 @@ def test_the_command_writes_a_patient_that_runs(scan, tmp_path):
     assert organ.local.nodes[fundus, 1].min() > organ.local.nodes[:, 1].mean()
 
 
+@pytest.mark.long
 def test_the_organs_hang_at_rest_by_their_attachments(patient, tmp_path):
     organs = {}
     for name, organ in patient.organs.items():

@@ -92,6 +92,7 @@ def test_check_shows_the_wiring_of_a_good_scenario(trocar, pendulum, tmp_path):
     assert "<- goal" in trocar("check", file, "--ports")[1]
 
 
+@pytest.mark.long
 def test_every_installed_scenario_is_valid(trocar):
     for name in sorted(installed_scenarios()):
         code, _, err = trocar("check", name)
@@ -112,6 +113,7 @@ def test_every_installed_scenario_names_its_schema():
         assert file.read_text().splitlines()[0] == "# yaml-language-server: $schema=scenario.schema.json"
 
 
+@pytest.mark.long
 def test_doctor(trocar, monkeypatch):
     findings = examination.examine()  # once: it tries every OpenGL in a process of its own
     monkeypatch.setattr(examination, "examine", lambda: findings)
@@ -206,6 +208,7 @@ def test_run_with_a_profile_shows_where_the_time_goes(trocar, swinging):
     assert "late because of" not in text
 
 
+@pytest.mark.long
 def test_a_participant_hosted_elsewhere_and_ls(tmp_path):
     (tmp_path / "session.yaml").write_text(REMOTE)
     endpoint = free_endpoint()

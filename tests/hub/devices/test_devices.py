@@ -62,6 +62,7 @@ def test_a_device_that_fails_ends_the_run(prepare, host, when):
     assert raised.value.participant == "player"
 
 
+@pytest.mark.long
 def test_a_remote_device_may_leave_and_join_again(prepare):
     session = prepare(SCENARIO, "participants.player.host=remote")
     outcome, hosts, fresh_steps = [], [], [0.0]

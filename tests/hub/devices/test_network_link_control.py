@@ -70,6 +70,7 @@ def relink(session, device="player", **change):
     ).link
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("host", ["hub", "other"])
 def test_a_link_is_changed_while_the_session_runs(prepare, host):
     session = prepare(SCENARIO, f"participants.player.host={host}")

@@ -35,6 +35,7 @@ def run(prepare, *overrides, **options):
     return summary.state_hash, summary.measures["last"]
 
 
+@pytest.mark.long
 def test_the_same_bits_wherever_its_sources_run(prepare):
     first, *others = [run(prepare, *placement) for placement in PLACEMENTS]
     assert others == [first] * len(others)

@@ -100,6 +100,7 @@ def test_words_of_a_scenario_are_no_markup(text: str) -> None:
     assert "<and>" not in text
 
 
+@pytest.mark.long
 def test_the_same_recording_gives_the_same_page(tmp_path: Path) -> None:
     write_session(tmp_path / "run", 0.1)
     for name in ("a.html", "b.html"):
@@ -191,6 +192,7 @@ def _hostile(directory: Path) -> Path:
     return file
 
 
+@pytest.mark.long
 def test_nothing_in_a_strangers_recording_is_markup(tmp_path: Path, text: str) -> None:
     """The page of a hostile recording has no element and no attribute that another page has not."""
     report(Recording(_hostile(tmp_path)), tmp_path / "x.html")

@@ -134,6 +134,7 @@ def test_an_interrupt_that_was_lost_ends_the_host(prepare):
     running.end()
 
 
+@pytest.mark.long
 def test_a_second_process_for_the_same_device_is_refused(prepare, tmp_path):
     running = Running(prepare(SCENARIO))
     until(lambda: running.status)
@@ -161,6 +162,7 @@ def test_a_second_process_for_the_same_device_is_refused(prepare, tmp_path):
     assert running.summary.dropped_messages == 1  # the request to join
 
 
+@pytest.mark.long
 def test_an_arm_holds_while_the_network_is_choked(prepare, tmp_path):
     forces = "loud.out -> player.noise"
     running = Running(prepare(SCENARIO))
@@ -188,6 +190,7 @@ def test_an_arm_holds_while_the_network_is_choked(prepare, tmp_path):
     assert (tmp_path / "player.log").read_text().count("takes part") == 1
 
 
+@pytest.mark.long
 def test_a_host_that_is_cut_off_joins_again(prepare, tmp_path, caplog):
     running = Running(prepare(SCENARIO))
     until(lambda: running.status)
@@ -211,6 +214,7 @@ def test_a_host_that_is_cut_off_joins_again(prepare, tmp_path, caplog):
     assert (tmp_path / "player.log").read_text().count("takes part") == 2
 
 
+@pytest.mark.long
 def test_a_host_outlives_a_network_that_is_gone_for_long(prepare, tmp_path):
     """Packets are lost and no connection is closed, until both sides have given the other one up."""
     running = Running(prepare(SCENARIO))
@@ -229,6 +233,7 @@ def test_a_host_outlives_a_network_that_is_gone_for_long(prepare, tmp_path):
     assert log.read_text().count("takes part") == 2
 
 
+@pytest.mark.long
 def test_a_host_outlives_a_hub_that_is_killed(toys, tmp_path):
     (tmp_path / "session.yaml").write_text(SCENARIO)
     endpoint = free_endpoint()

@@ -135,6 +135,7 @@ def site(toys, other_machine, tmp_path):
     return Site(other_machine, tmp_path)
 
 
+@pytest.mark.long
 def test_a_stylus_of_another_machine_moves_the_simulation_is_told_of_it_and_outlives_the_network(site):
     fresh_steps, outcome, hosts = [0.0], [], []
 
@@ -204,6 +205,7 @@ except ConnectError:
 """
 
 
+@pytest.mark.long
 def test_strangers_of_another_machine_get_nothing_in_or_out_and_the_log_tells(site, tmp_path, caplog):
     caplog.set_level("INFO")
     own, foreign, mixed = (

@@ -179,6 +179,7 @@ def test_the_command_line_revokes(authority):
     assert "revoked" not in run(app, ["show", *place]).output
 
 
+@pytest.mark.long
 def test_doctor_tells_until_when_they_are_valid(monkeypatch, tmp_path):
     monkeypatch.setattr(doctor, "_run_package_checks", lambda: iter(()))
     monkeypatch.setattr(credentials, "default_directory", lambda: tmp_path / "certs")

@@ -109,6 +109,7 @@ def test_coco_has_a_mask_and_keypoints_of_each_instance(recording: Path) -> None
         ).all()
 
 
+@pytest.mark.long
 def test_models_of_bop_are_where_the_poses_put_them(recording: Path) -> None:
     made = make(recording, "bop")
     scene = made / "train" / "000000"

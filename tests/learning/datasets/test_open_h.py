@@ -54,6 +54,7 @@ def table(made: Path, episode: int):
     return pq.read_table(made / f"data/chunk-000/episode_{episode:06d}.parquet")
 
 
+@pytest.mark.long
 def test_it_has_what_open_h_asks_for(made: Path) -> None:
     """The rules of Open-H's validator, in our own words."""
     assert {path.name for path in (made / "meta").iterdir()} >= set(META)

@@ -62,6 +62,7 @@ class Projection:
         """Nothing is held."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "duration"),
     [*FAST.items(), *(pytest.param(*row, marks=pytest.mark.release) for row in SLOW.items())],

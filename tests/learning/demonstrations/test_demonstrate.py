@@ -88,6 +88,7 @@ def test_other_settings_are_refused(made: Path) -> None:
     assert "holds other demonstrations" in str(done.exception)
 
 
+@pytest.mark.long
 def test_a_run_that_does_not_finish_its_task_is_dropped(tmp_path: Path) -> None:
     words = ("pick-and-place", "-o", tmp_path / "none", "--episodes", 1, "--set", "duration=200 ms")
     done = run(*words, "--jobs", 1)

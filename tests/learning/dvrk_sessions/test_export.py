@@ -110,6 +110,7 @@ def document(file: Path) -> Any:
     return json.loads(file.read_text())
 
 
+@pytest.mark.long
 def test_documents_have_the_fields_of_dvrk_data(session: Path) -> None:
     shown = document(session / "index.json")
     assert fits(shown, INDEX)
@@ -187,6 +188,7 @@ def test_a_session_is_scored_and_relived(recording: Path, session: Path, tmp_pat
         assert np.abs(followed - joints).max(axis=1).min() == 0.0, "each set-point is commanded to the bit"
 
 
+@pytest.mark.long
 def test_pictures_that_were_not_recorded_are_drawn(recording: Path, tmp_path: Path) -> None:
     place = tmp_path / "unseen"
     trocar.run(

@@ -46,6 +46,7 @@ def episode(env, seed):
     return env.unwrapped.state_hash, observation["observation"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", IDS)
 def test_gymnasium_finds_nothing_to_complain_of(name):
     env = gymnasium.make(name)
@@ -63,6 +64,7 @@ def test_the_seed_decides_the_episode(needle):
     assert first[0] != other[0]
 
 
+@pytest.mark.long
 def test_episodes_of_a_vector_are_those_of_one_process(needle):
     alone = [episode(needle, seed)[0] for seed in (3, 4)]
     make = partial(gymnasium.make, "trocar.environments:trocar/NeedlePick-v0")
@@ -162,6 +164,7 @@ def test_an_oracle_does_what_surrol_s_does_in_as_many_steps(name):
     env.close()
 
 
+@pytest.mark.long
 def test_tissue_is_grasped_and_lifted_and_a_new_episode_has_it_where_it_was(tmp_path):
     """The second episode begins with restored tissue; it is simulated again with new one."""
     pytest.importorskip("pybullet")
@@ -179,6 +182,7 @@ def test_tissue_is_grasped_and_lifted_and_a_new_episode_has_it_where_it_was(tmp_
     assert trocar.verify(tmp_path / "episode-00001").same
 
 
+@pytest.mark.long
 def test_a_sheet_is_burnt_off_its_bed_and_is_whole_in_a_new_episode(tmp_path):
     env = gymnasium.make("trocar/Dissect-v0", reward="shaped", record=tmp_path)
     dead, hashes, bonuses = env.unwrapped.layout["tissue/dead"], list[list[str]](), list[float]()
@@ -200,6 +204,7 @@ def test_a_sheet_is_burnt_off_its_bed_and_is_whole_in_a_new_episode(tmp_path):
     assert trocar.verify(tmp_path / "episode-00001").same
 
 
+@pytest.mark.long
 def test_a_strip_is_cut_off_and_whole_in_a_new_episode(tmp_path):
     env = gymnasium.make("trocar/TissueCut-v0", reward="shaped", record=tmp_path)
     bonus, hashes = 0.0, list[list[str]]()
@@ -353,6 +358,7 @@ def test_an_episode_is_recorded_where_reset_says(needle, tmp_path):
         needle.reset(options={"recrod": tmp_path})
 
 
+@pytest.mark.long
 def test_the_seed_of_an_episode_decides_its_looks_and_the_recording_states_them(tmp_path):
     if not (found := backend.find()).name:
         pytest.skip(f"no Filament: {found.detail}")

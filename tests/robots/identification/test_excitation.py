@@ -17,6 +17,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(design, "_ITERATIONS", 0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("arm", ARMS)
 def test_a_motion_is_within_the_limits_and_rests_at_home(arm):
     joints, motion = ARMS[arm].joints, excitation(ARMS[arm], 2, 50.0)

@@ -168,6 +168,7 @@ def messages(bag, *topics):
         ]
 
 
+@pytest.mark.long
 def test_a_bag_of_a_session_drives_another_one_to_the_same_bits(driven, bag):
     """Of what the program sent on its own time all comes at the same communication points again."""
     then = values(driven, MEASURED)

@@ -127,6 +127,7 @@ class TablePeer:
         return message_type(f"{row.type}_Response").model_validate(flat(response))
 
 
+@pytest.mark.long
 def test_every_row_of_the_table(hub, tmp_path):
     with showing(hub, tmp_path, **WHOLE) as gateway:
         with Peer(hub) as console:

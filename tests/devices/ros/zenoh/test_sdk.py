@@ -102,6 +102,7 @@ def published(gateway):
     return [one for one in gateway._transport._entities if hasattr(one, "matching_status")]
 
 
+@pytest.mark.long
 def test_the_table_through_a_client_of_others(tmp_path, caplog):
     caplog.set_level(logging.ERROR, "zenoh_ros2_sdk")
     with router() as hub, showing(hub, tmp_path, **WHOLE) as gateway, ExitStack() as stack:

@@ -104,6 +104,7 @@ def test_the_moduli_at_a_frequency_are_those_of_a_swing():
     assert answer.imag / answer.real / (2 * np.pi * frequency) == pytest.approx(damping, rel=1e-2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("indenter", "stiffening"),
     [(SPHERE, 0.0), (Indenter("sphere", 5e-3, 15e-3), 0.0), (Indenter("punch", 3e-3), 0.0), (SPHERE, 12.0)],

@@ -16,6 +16,7 @@ from tests.engines.bullet.finite_elements import Body
 from tests.engines.bullet.rig import RADIUS, SMALL_BLOCK, Rig, params
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("damping_ns", [0, 100_000])
 @pytest.mark.parametrize(("ratio", "stable"), [(0.97, True), (1.15, False)])
 def test_free_tissue_is_stable_up_to_the_longest_step(damping_ns, ratio, stable):

@@ -43,6 +43,7 @@ def test_the_tissue_receives_what_the_probe_feels(organ, at):
         np.testing.assert_allclose(force, body.reaction(nodes), atol=0.02 * np.linalg.norm(force))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("radius", [2e-3, 5e-3])
 @pytest.mark.parametrize(
     ("organ", "rest", "at"),
@@ -56,6 +57,7 @@ def test_the_force_at_a_depth_is_that_of_finite_elements(organ, rest, at, radius
         assert force[2] == pytest.approx(body.press([centre], [radius])[0, 2], rel=0.1)
 
 
+@pytest.mark.long
 def test_each_of_several_spheres_feels_what_it_does():
     # on neighbouring faces
     at, radii = np.array([[-12e-3, 0.0], [0.0, 5e-3], [8e-3, -7e-3]]), [2e-3, 3e-3, 5e-3]

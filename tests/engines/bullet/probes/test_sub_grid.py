@@ -39,12 +39,14 @@ def layer(radius, depths, young_modulus=10e3):
     return np.interp(depths, SAG_M * 10e3 / young_modulus + half_space + body * forces, forces)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("at", PLACES.values(), ids=PLACES)
 def test_it_is_that_of_tissue(at):
     forces = list(pressed(params(BLOCK, sub_grid=True), at, DEPTHS_M))
     np.testing.assert_allclose(forces, CONVERGED_N, rtol=0.06)
 
 
+@pytest.mark.long
 def test_a_finer_mesh_has_the_same_force():
     forces = list(pressed(params(FINE, sub_grid=True, **HALF_MS), PLACES["face"], DEPTHS_M[[1, 4]]))
     np.testing.assert_allclose(forces, CONVERGED_N[[1, 4]], rtol=0.06)

@@ -21,6 +21,7 @@ def holed(rig):
     return (), ()
 
 
+@pytest.mark.long
 def test_a_hole_empties_a_sac_as_torricelli_says():
     with TubeRig(lumen=SAC) as rig:
         tube, _ = holed(rig)

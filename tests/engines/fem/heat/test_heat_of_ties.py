@@ -69,6 +69,7 @@ def test_parted_ties_pass_nothing_and_cold_organs_stay_cold():
         assert bed.is_cold
 
 
+@pytest.mark.long
 def test_a_burn_on_the_outside_warms_the_organ_below():
     start = np.array([0.0, 0.7e-3, 4.8e-3 + 0.2e-3])
     with PlateRig(HOOK, start, gravity=0.0) as rig:

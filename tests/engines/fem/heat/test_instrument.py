@@ -113,6 +113,7 @@ def test_insulated_spheres_conduct_nothing_and_press_all_the_same():
     assert instrument.reach == pytest.approx(4.0 * 0.6e-3)
 
 
+@pytest.mark.long
 def test_a_cutting_current_takes_more_tissue_away_and_leaves_less_of_it_hot():
     gone, hottest = [], []
     for effect in ("coag", "cut"):
@@ -126,6 +127,7 @@ def test_a_cutting_current_takes_more_tissue_away_and_leaves_less_of_it_hot():
     assert hottest[1] < hottest[0]
 
 
+@pytest.mark.long
 def test_power_without_contact_heats_nothing_and_is_said_once(caplog):
     with CauteryRig(start=(0.0, 0.0, 0.02)) as rig, caplog.at_level(logging.WARNING):
         rig.watts[:] = 30.0
@@ -136,6 +138,7 @@ def test_power_without_contact_heats_nothing_and_is_said_once(caplog):
     assert len([record for record in caplog.records if "power without contact" in record.message]) == 1
 
 
+@pytest.mark.long
 def test_a_moving_hook_leaves_a_coagulated_track():
     """Half width to 60 degrees of a point source of 15 W at 5 mm/s, without boiling: 2.7 mm; of pig wall cut
     with 60 W: 0.15 mm (Homayounfar et al. 2012).
@@ -196,6 +199,7 @@ def test_tissue_in_bullet_is_not_heated():
         BulletParams.model_validate({"organs": {"block": SLAB}, "probes": {"probe": cautery()}})
 
 
+@pytest.mark.long
 def test_vaporised_tissue_goes_and_leaves_charred_walls():
     with CauteryRig(SLAB | {"cutting": {}}, power="400 W", efficiency=1.0) as rig:
         solid = rig.engine._organs[0].solid

@@ -31,6 +31,7 @@ def abdomen():
     return page_appearance(params, {"organ": BODY})
 
 
+@pytest.mark.long
 def test_the_skin_is_the_one_of_the_endoscope(abdomen):
     skin = abdomen.skins["organ"]
     atlas = Atlas(MESH.nodes, MESH.triangles.astype(np.int64), picture_side(1))
@@ -48,6 +49,7 @@ def test_the_skin_is_the_one_of_the_endoscope(abdomen):
         assert difference.mean() < 4.0, "grey levels lost in the file"
 
 
+@pytest.mark.long
 def test_coats_and_kinds_of_faces_have_tiles(abdomen):
     assert abdomen.kinds.keys() == KINDS.keys()
     assert set(COATS) <= abdomen.coats.keys()
@@ -69,6 +71,7 @@ def test_the_place_is_the_one_of_the_scene(abdomen):
     assert (bare.place, bare.surroundings) == ("none", ())
 
 
+@pytest.mark.long
 def test_a_robot_without_endoscope_shows_bodies_by_their_names():
     found = page_appearance(MujocoParams.model_validate({"arms": ARM}), {"left_liver": BODY})
     assert found.place == "abdomen"

@@ -94,6 +94,7 @@ def pictures(recording: Recording) -> list[NDArray[np.uint8]]:
     return [image.data.reshape(image.height, image.width, 3) for image in found]
 
 
+@pytest.mark.long
 def test_the_camera_sees_the_tissue_wherever_that_runs(recordings: dict[str, Recording]) -> None:
     assert [ack.state_hash.tolist() for ack in recordings["hub"].acks("camera")] == [
         ack.state_hash.tolist() for ack in recordings["tissue"].acks("camera")

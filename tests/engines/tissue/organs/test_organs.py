@@ -152,6 +152,7 @@ def written(directory, mesh):
     return load(str(directory / "session.yaml"))
 
 
+@pytest.mark.long
 def test_a_session_with_two_tissue_engines_and_a_mesh_of_ones_own_is_re_simulated_bit_for_bit(tmp_path):
     mesh = block(np.array([40.0, 30.0, 20.0]), 45)
     launch(written(tmp_path, mesh), record=tmp_path / "recording").run()

@@ -69,6 +69,7 @@ def likeness(one: Picture, other: Picture) -> float:
     return float(np.corrcoef(one[middle].ravel(), other[middle].ravel())[0, 1])
 
 
+@pytest.mark.long
 def test_pictures_of_tissue(shown: Shown) -> None:
     """One scene for all: the first picture takes seconds."""
     nodes = shown.block.mesh.nodes

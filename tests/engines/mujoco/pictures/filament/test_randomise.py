@@ -74,6 +74,7 @@ def test_without_parameters_nothing_varies() -> None:
     assert np.array_equal(none.lamp_colour, np.ones(3))
 
 
+@pytest.mark.long
 def test_pictures_are_drawn_again_from_the_recording(tmp_path: Path) -> None:
     if not (found := backend.find()).name:
         pytest.skip(f"no Filament: {found.detail}")
