@@ -53,6 +53,7 @@ class Person:
         self.context = browser.new_context(viewport={"width": 1100, "height": 700}, **context)
         for script in scripts:
             self.context.add_init_script(script)
+        self.context.set_default_timeout(60_000)
         self.page = self.context.new_page()
         self.errors, self.requested = [], []
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))

@@ -13,7 +13,7 @@ from hub.observation.recorded_measures import recorded_measures
 from tests.webconsole.conftest import finish, served
 from tests.webconsole.recorded_scene import write_scene
 from tests.webconsole.test_gate import Visitor
-from tests.webconsole.test_page import answer
+from tests.webconsole.test_page import LIMIT_S, answer
 from webconsole.library import home_of
 from webconsole.recorded import Recorded
 
@@ -116,7 +116,7 @@ def page(server, name, role="operator"):
     visitor = Visitor(server).admit(role)
     headers = {"Cookie": visitor.cookie, "Origin": f"http://{visitor.host}"}
     url = f"ws://{visitor.host}/page?recording={quote(name, safe='')}"
-    return connect(url, additional_headers=headers, origin=None)
+    return connect(url, additional_headers=headers, origin=None, open_timeout=LIMIT_S)
 
 
 def test_pages_of_two_recordings_are_served_beside_each_other(server):
