@@ -74,6 +74,9 @@ def places() -> list[tuple[str, tuple[str, ...]]]:
     return sorted(one for one in found if one[1][:2] not in others)
 
 
+PLACES = places()
+
+
 def with_value(params: Part, at: tuple[str, ...], value: str) -> dict[str, Any]:
     """Return parameters with a value at a place."""
     name, *rest = at
@@ -231,7 +234,7 @@ def _expect_nothing_opened(
     assert _opened == []
 
 
-@pytest.mark.parametrize("place", places(), ids=str)
+@pytest.mark.parametrize("place", PLACES, ids=str)
 def test_a_file_that_a_recording_names_is_not_trusted(
     guest: Guest, pipe: Path, place: tuple[str, tuple[str, ...]]
 ) -> None:
@@ -245,7 +248,7 @@ def test_a_file_that_a_recording_names_is_not_trusted(
     assert _opened == []
 
 
-@pytest.mark.parametrize("place", {kind: (kind, at) for kind, at in places()}.values(), ids=str)
+@pytest.mark.parametrize("place", {kind: (kind, at) for kind, at in PLACES}.values(), ids=str)
 def test_no_command_opens_a_file_of_a_kind(
     guest: Guest, pipe: Path, place: tuple[str, tuple[str, ...]]
 ) -> None:
@@ -253,7 +256,7 @@ def test_no_command_opens_a_file_of_a_kind(
 
 
 @pytest.mark.search
-@pytest.mark.parametrize("place", places(), ids=str)
+@pytest.mark.parametrize("place", PLACES, ids=str)
 def test_no_command_opens_a_file_that_a_recording_names(
     guest: Guest, pipe: Path, place: tuple[str, tuple[str, ...]]
 ) -> None:
