@@ -18,7 +18,7 @@ from engines.mujoco.arms.friction import Friction
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
 from hub.participant import Inputs, Setup
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from schemas.vectors import Vector
 
 PERIOD_NS = 1_000_000

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hub.participant import Params
-from robots.dvrk.mounted import AnyArm, MountedEcm, MountedMtml, MountedMtmr, MountedPsm
+from robots.dvrk.mounted.mounted_arms import AnyArm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
+from robots.dvrk.mounted.mounted_mtm import MountedMtml, MountedMtmr
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.setup_joints import CartArm, DrivenArm
 
 __all__ = ["SceneArms"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hub.participant import Inputs
 from robots.dvrk import setup_joints
-from robots.dvrk.mounted import MountedEcm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
 from robots.dvrk.setup_joints import CartArm
 from robots.transform import pose_to_matrix
 from schemas.ros import BoolMessage

@@ -13,7 +13,9 @@ from pydantic import Field, GetPydanticSchema
 from hub.participant import Params
 from robots.dvrk import endoscope
 from robots.dvrk.endoscope import StereoCamera
-from robots.dvrk.mounted import AnyArm, MountedArms, MountedEcm, MountedPsm
+from robots.dvrk.mounted.mounted_arms import AnyArm, MountedArms
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.parameters import SetupPositions
 from robots.dvrk.setup_joints import CartArm, DrivenArm
 from robots.training.fixtures import FixtureParams

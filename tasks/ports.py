@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hub.participant import event_in, event_out, signal_in, signal_out
-from robots.dvrk.mounted import MountedEcm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
 from schemas.ports import Port
 from schemas.ros import BoolMessage, Float64Message, PoseStamped, WrenchStamped
 from schemas.trocar_msgs import ScoreCard, TaskEvent

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from robots.dvrk.ecm import tip
 from robots.dvrk.endoscope import StereoCamera, optical_in_roll
-from robots.dvrk.mounted import MountedEcm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
 from schemas.vectors import Vector
 
 __all__ = ["Frustum", "optical_in_tip"]

@@ -12,13 +12,10 @@ from controllers.motion.joint_errors import JointErrors
 from hub.participant import Params
 from robots.dvrk import ecm, mtm, psm
 from robots.dvrk.crtk import Mounting, Reference
-from robots.dvrk.mounted import (
-    MountedEcm,
-    MountedMtml,
-    MountedMtmr,
-    MountedPsm,
-    require_classic_cart,
-)
+from robots.dvrk.mounted.mounted_arms import require_classic_cart
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
+from robots.dvrk.mounted.mounted_mtm import MountedMtml, MountedMtmr
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm, DrivenArm
 from robots.dvrk.tool_type import tool_type

@@ -17,7 +17,7 @@ from hub.participant import Inputs, signal_in
 from robots.dvrk import crtk
 from robots.dvrk.ecm import tip
 from robots.dvrk.endoscope import EYES, Eye, StereoCamera, optical_in_roll
-from robots.dvrk.mounted import MountedEcm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
 from robots.transform import inverse_transform, pose_to_matrix, translation
 from schemas.errors import MotionError, did_you_mean
 from schemas.ports import Port

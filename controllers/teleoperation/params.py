@@ -12,7 +12,7 @@ from controllers.motion.params import Arms, PsmParams
 from controllers.teleoperation.contact_model import ForceParams, PlanesParams
 from hub.participant import Params
 from robots.dvrk import ecm, psm, si
-from robots.dvrk.mounted import DEFAULT_INSTRUMENT, PsmTool
+from robots.dvrk.mounted.psm_tool import DEFAULT_INSTRUMENT, PsmTool
 from robots.dvrk.parameters import ArmName, InstrumentName, MountedPositions, UnitQuaternion, home
 from schemas.quantity import Angle, Duration
 

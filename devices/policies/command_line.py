@@ -15,7 +15,7 @@ from devices.policies.policy import Observation, open_policy
 from hub.command_line.display import show_tables
 from hub.command_line.options import Json, Overrides, ScenarioName
 from hub.planning.scenario_file import load
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.parameters import ArmName
 from robots.policies.states import ArmReading, encode_state
 from robots.transform import matrix_to_pose

@@ -43,7 +43,7 @@ from devices.ros.topics.whole_robot import (
 from devices.ros.transport import Publisher, ServiceHandler, Transport
 from devices.samples import stamp_of
 from hub.participant import Device, Sample, Value, event_out
-from robots.dvrk.mounted import MountedMtm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
 from robots.dvrk.mtm import BASE
 from robots.dvrk.setup_joints import DrivenArm
 from robots.transform import matrix_to_pose

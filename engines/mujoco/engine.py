@@ -29,7 +29,7 @@ from hub.participant import (
     Value,
     state_hash,
 )
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
 from schemas.ports import BondSide, Port

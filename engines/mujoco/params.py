@@ -24,7 +24,9 @@ from engines.mujoco.object_params import ObjectParams, TableParams
 from engines.mujoco.tools import instrument_tools
 from hub.participant import Params, Tool, ToolParams
 from robots.dvrk.end_effectors.rolling_jaw import RollingJaw
-from robots.dvrk.mounted import AnyArm, MountedArms, MountedMtm, MountedPsm, require_classic_cart
+from robots.dvrk.mounted.mounted_arms import AnyArm, MountedArms, require_classic_cart
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import SIMULATED, CartArm, DrivenArm, base_pose
 from robots.training.fixtures import FixtureParams

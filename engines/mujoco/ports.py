@@ -11,7 +11,10 @@ from engines.mujoco.params import MujocoParams, SceneParams
 from hub.participant import event_in, signal_in, signal_out, tunable_in
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.linkage import LINKAGES
-from robots.dvrk.mounted import AnyArm, MountedArm, MountedMtm, MountedPsm
+from robots.dvrk.mounted.mounted_arm import MountedArm
+from robots.dvrk.mounted.mounted_arms import AnyArm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.mtm import DISPLAY_FRAME
 from robots.dvrk.psm import ARM_JOINTS
 from robots.serial_chain import Joint

@@ -10,7 +10,7 @@ from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.end_effectors.scissors import Scissors
 from robots.dvrk.end_effectors.suction_tube import SuctionTube
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from schemas.vectors import Vector
 
 __all__ = ["instrument_tools"]

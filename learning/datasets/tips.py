@@ -17,7 +17,8 @@ from learning.datasets.columns import Columns, commanded_columns, measured_colum
 from robots import rotation
 from robots.dvrk import setup_joints
 from robots.dvrk.crtk import CAMERA_FRAME, WORLD_FRAME
-from robots.dvrk.mounted import MountedArms, MountedPsm
+from robots.dvrk.mounted.mounted_arms import MountedArms
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.transform import inverse_transform
 from schemas.errors import RecordingError
 from schemas.vectors import Vector

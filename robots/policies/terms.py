@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from robots.dvrk.crtk import Mounting, reference_frame
-from robots.dvrk.mounted import MountedArm
+from robots.dvrk.mounted.mounted_arm import MountedArm
 from robots.policies.actions import ACTIONS
 from robots.policies.contract import CameraContract, Contract
 from robots.policies.fields import Field, Group

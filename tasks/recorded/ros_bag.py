@@ -11,7 +11,7 @@ import numpy as np
 
 from hub.recording.ros_bag_reader import RosBag
 from robots import rotation
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from schemas.errors import RecordingError
 from schemas.magnitudes import MAGNITUDES
 from schemas.ros import JointState, PoseStamped

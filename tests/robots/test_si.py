@@ -15,7 +15,8 @@ from engines.mujoco.params import MujocoParams
 from robots.dvrk import arms, cannula, drives, psm, si
 from robots.dvrk.instruments import instrument
 from robots.dvrk.inverse import inverse
-from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from schemas.errors import MotionError
 
 SCENARIO = """

@@ -12,7 +12,7 @@ import pytest
 from hub.recording.recording import Recording
 from hub.recording.report import report
 from hub.recording.scores import score_numbers
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from schemas.errors import RecordingError, ScenarioError
 from schemas.ros import Header, JointState, Point, Pose, PoseStamped, Quaternion
 from tasks.recorded.ros_bag import score_ros_bag

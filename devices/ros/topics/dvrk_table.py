@@ -22,7 +22,8 @@ from hub.participant import SignalFields, event_in, event_out, signal_in, signal
 from robots.dvrk import arms as dvrk
 from robots.dvrk import crtk
 from robots.dvrk.console_topics import PARTS, PEDALS, TELEOPERATION
-from robots.dvrk.mounted import AnyArm, MountedMtm
+from robots.dvrk.mounted.mounted_arms import AnyArm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
 from robots.dvrk.setup_joints import CartArm, DrivenArm, joint_names
 from schemas.ros import (
     CameraInfo,

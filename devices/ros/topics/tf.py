@@ -11,7 +11,9 @@ from devices.ros.params import GatewayParams
 from devices.ros.topics.publications import State
 from robots.dvrk.ecm import tip
 from robots.dvrk.endoscope import BASELINE, optical_in_roll
-from robots.dvrk.mounted import MountedArm, MountedEcm, MountedMtm
+from robots.dvrk.mounted.mounted_arm import MountedArm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
 from robots.transform import inverse_transform, matrix_to_pose, translation
 from schemas.codec import encode
 from schemas.ros import Header, Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3

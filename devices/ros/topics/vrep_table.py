@@ -15,7 +15,8 @@ from devices.ros.params import GatewayParams
 from devices.ros.topics.diagnostics import DIAGNOSTICS_ROW
 from devices.ros.topics.row import Row
 from hub.participant import SignalFields, event_in, event_out, signal_in
-from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.ros import (
     BoolMessage,

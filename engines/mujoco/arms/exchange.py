@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from engines.mujoco.model.names import PARKED_M, SEAT
 from hub.participant import Inputs
-from robots.dvrk.mounted import AnyArm
+from robots.dvrk.mounted.mounted_arms import AnyArm
 from robots.dvrk.setup_joints import DrivenArm
 from schemas.errors import SessionError
 from schemas.vectors import Vector

@@ -13,7 +13,8 @@ import numpy as np
 
 from engines.mujoco.model.hands import ACTUATORS, hand_name
 from hub.participant import Inputs
-from robots.dvrk.mounted import AnyArm, MountedMtm
+from robots.dvrk.mounted.mounted_arms import AnyArm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
 from robots.dvrk.setup_joints import DrivenArm
 from robots.rotation import from_matrix
 from schemas.vectors import Vector

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model.leading import to_all_joints
-from robots.dvrk.mounted import AnyArm
+from robots.dvrk.mounted.mounted_arms import AnyArm
 from robots.dvrk.setup_joints import DrivenArm
 from schemas.vectors import Vector
 

@@ -15,7 +15,8 @@ from engines.mujoco.model import first_sensor
 from engines.mujoco.model.end_effector import sensed_motors
 from engines.mujoco.model.poses import ROS_ORDER
 from robots.dvrk.end_effectors.end_effector import EndEffector
-from robots.dvrk.mounted import AnyArm, MountedArm
+from robots.dvrk.mounted.mounted_arm import MountedArm
+from robots.dvrk.mounted.mounted_arms import AnyArm
 from robots.dvrk.setup_joints import DrivenArm
 from schemas.vectors import Vector
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from engines.mujoco.arms.friction import Friction
 from hub.participant import Inputs
-from robots.dvrk.mounted import AnyArm, MountedMtm
+from robots.dvrk.mounted.mounted_arms import AnyArm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
 from robots.dvrk.psm import ARM_JOINTS
 from robots.dvrk.setup_joints import DrivenArm
 from robots.serial_chain import Joint

@@ -21,7 +21,7 @@ import numpy as np
 
 from engines.mujoco.export.assets import FOLDER, file_of, numbers
 from robots import rotation
-from robots.dvrk.mounted import MountedArm
+from robots.dvrk.mounted.mounted_arm import MountedArm
 from robots.dvrk.setup_joints import DrivenArm
 from schemas.errors import ScenarioError
 from schemas.vectors import Vector

@@ -11,7 +11,7 @@ from engines.mujoco.params import SceneParams
 from robots.dvrk.crtk import CART_FRAME, WORLD_FRAME
 from robots.dvrk.ecm import tip
 from robots.dvrk.endoscope import BASELINE, optical_in_roll
-from robots.dvrk.mounted import MountedEcm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
 from robots.transform import inverse_transform, translation
 from schemas.errors import SessionError
 from schemas.vectors import Vector

@@ -18,7 +18,7 @@ from engines.mujoco.model.tree import BASE, links, spare_links
 from robots.dvrk.drive import Disc
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
 from robots.dvrk.link import Link
-from robots.dvrk.mounted import MountedArm
+from robots.dvrk.mounted.mounted_arm import MountedArm
 from robots.dvrk.setup_joints import DrivenArm
 from robots.transform import inverse_transform
 from schemas.vectors import Vector

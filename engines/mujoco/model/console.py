@@ -8,7 +8,7 @@ import numpy as np
 from engines.mujoco.model import shapes
 from engines.mujoco.model.poses import pose_attributes
 from engines.mujoco.params import SceneParams
-from robots.dvrk.mounted import MountedMtm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
 from robots.dvrk.mtm import BASE
 
 __all__ = ["CONSOLE", "add"]

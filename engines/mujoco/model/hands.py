@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from robots.dvrk.mounted import MountedMtm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
 
 __all__ = ["ACTUATORS", "add", "hand_name"]
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model.tree import links
-from robots.dvrk.mounted import AnyArm
+from robots.dvrk.mounted.mounted_arms import AnyArm
 from robots.dvrk.setup_joints import DrivenArm
 from schemas.vectors import Vector
 

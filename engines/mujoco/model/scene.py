@@ -11,7 +11,10 @@ from engines.mujoco.model import arm, console, fixtures, hands, objects, setup_j
 from engines.mujoco.model.names import PARKED_M, SEAT
 from engines.mujoco.model.tree import links, spare_links
 from engines.mujoco.params import SceneParams
-from robots.dvrk.mounted import AnyArm, MountedArm, MountedMtm, MountedPsm
+from robots.dvrk.mounted.mounted_arm import MountedArm
+from robots.dvrk.mounted.mounted_arms import AnyArm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.setup_joints import DrivenArm
 from schemas.vectors import Vector
 

@@ -20,7 +20,10 @@ from engines.mujoco.model.names import SEAT
 from engines.mujoco.model.poses import pose_attributes
 from robots.dvrk.end_effectors.probe import Probe
 from robots.dvrk.instruments import Instrument
-from robots.dvrk.mounted import AnyArm, MountedEcm, MountedMtm, MountedPsm
+from robots.dvrk.mounted.mounted_arms import AnyArm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
+from robots.dvrk.mounted.mounted_mtm import MountedMtm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.setup_joints import CartArm, DrivenArm
 from robots.transform import inverse_transform
 from schemas.vectors import Vector

@@ -13,7 +13,7 @@ import numpy as np
 from engines.mujoco.model.names import PARKED_M, SEAT
 from robots.dvrk.link import Follow, Link
 from robots.dvrk.linkage import LINKAGES
-from robots.dvrk.mounted import MountedArm
+from robots.dvrk.mounted.mounted_arm import MountedArm
 from robots.dvrk.psm import ARM_JOINTS
 from robots.dvrk.setup_joints import DrivenArm
 

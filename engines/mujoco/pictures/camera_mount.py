@@ -8,7 +8,7 @@ import numpy as np
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.pictures.variation import Variation
 from robots.dvrk.endoscope import FAR, optical_in_roll
-from robots.dvrk.mounted import MountedEcm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
 from robots.transform import rigid_transform
 from schemas.vectors import Vector
 

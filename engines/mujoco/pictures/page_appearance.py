@@ -26,7 +26,7 @@ from engines.mujoco.textures.surface import Maps, Recipe, make_tile
 from hub.participant import appearance
 from hub.participant.appearance import Appearance, RestBody, Skin, Surrounding, Texture
 from robots.dvrk.endoscope import optical_in_roll
-from robots.dvrk.mounted import MountedEcm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
 from robots.transform import rigid_transform
 from schemas.vectors import Vector
 

@@ -16,7 +16,7 @@ from engines.mujoco.place.dress import BRIGHT, SHINING
 from hub.participant.view import Camera, Frame, Part, Rgb
 from robots import rotation
 from robots.dvrk.endoscope import BASELINE, FIELD_OF_VIEW, optical_in_roll
-from robots.dvrk.mounted import MountedEcm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
 from schemas.errors import MessageError
 from schemas.vectors import Vector
 

@@ -15,7 +15,7 @@ from engines.mujoco.truth.labels import Body
 from engines.mujoco.truth.sight import Sight, Viewpoint
 from engines.mujoco.truth.surfaces import body_triangles
 from robots.dvrk.instruments import SHAFT_RADIUS
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.transform import inverse_transform, rigid_transform
 from schemas.vectors import Vector
 

@@ -9,7 +9,7 @@ from typing import Any
 from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import SceneParams
 from engines.mujoco.truth.scene_class import INSTRUMENT_CLASSES, SceneClass
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 
 __all__ = ["Body", "label_bodies", "rigid_class"]
 

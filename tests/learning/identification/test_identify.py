@@ -13,7 +13,7 @@ from learning.identification.command_line import app
 from learning.identification.measurements import has_jaw, measurements
 from robots.dvrk import arm_bodies
 from robots.dvrk.instruments import instrument
-from robots.dvrk.mounted import MountedPsm
+from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.dvrk.own_dynamics import OwnDynamics
 from robots.identification import excitation
 from schemas.errors import RecordingError

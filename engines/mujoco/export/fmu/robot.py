@@ -14,7 +14,7 @@ from engines.mujoco.arms.servos import ServoLaw, Servos
 from engines.mujoco.model import place, spec, ties
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.ports import GRAVITY, scene_ports
-from robots.dvrk.mounted import MountedArm
+from robots.dvrk.mounted.mounted_arm import MountedArm
 from schemas.errors import ScenarioError
 from schemas.ports import Port
 from schemas.ros import JointState, PoseStamped

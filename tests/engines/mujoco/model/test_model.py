@@ -13,7 +13,7 @@ from robots import rotation
 from robots.dvrk import setup_joints
 from robots.dvrk.end_effectors.jaw import FINGERS
 from robots.dvrk.linkage import LINKAGES
-from robots.dvrk.mounted import MountedEcm
+from robots.dvrk.mounted.mounted_ecm import MountedEcm
 
 ARMS = ("PSM1", "PSM2", "PSM3", "ECM")
 ORIENTATION = rotation.exp(np.array([0.3, -0.5, 0.7]))
