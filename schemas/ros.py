@@ -62,6 +62,7 @@ __all__ = [
     "TransformStamped",
     "Twist",
     "TwistStamped",
+    "UInt8MultiArray",
     "Vector3",
     "Wrench",
     "WrenchStamped",
@@ -153,6 +154,14 @@ class Float64MultiArray(Message):
     ros_type: ClassVar[str] = "std_msgs/msg/Float64MultiArray"
     layout: MultiArrayLayout = MultiArrayLayout()
     data: Float64Array = Field(default_factory=_empty_values)
+
+
+class UInt8MultiArray(Message):
+    """Bytes with a layout."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/UInt8MultiArray"
+    layout: MultiArrayLayout = MultiArrayLayout()
+    data: Bytes = Field(default_factory=_no_bytes)
 
 
 class Vector3(Message):

@@ -30,7 +30,7 @@ __all__ = ["Started", "StartedSession", "new_recording_path", "page_devices"]
 
 log = logging.getLogger(__name__)
 
-_COMMAND = "hub.command_line"
+_COMMAND = "hub.command_line.app"
 _MOST = 4
 """Most sessions at once: each takes a core and more."""
 _LOOK_S = 0.1

@@ -17,6 +17,7 @@ from engines.fmu.clock import Clock, clock_of
 from engines.fmu.model import interface_of, read_model, suggested_tolerance
 from engines.fmu.sources import listed_sources
 from engines.fmu.start import Start, declared_start, given_start, settable, size_of, unit_of
+from engines.fmu.texts import MESSAGES, TextVariable
 from engines.fmu.tunable import tunable_parameters
 from engines.fmu.variables import Variable, number_type, port_name
 from hub.participant import signal_in, signal_out
@@ -57,6 +58,9 @@ class Description:
     """C files of the library, compiled where there is none for this platform."""
     bonds: tuple[BondVariables, ...] = ()
     """The scenario's bonds; their inputs are neither `inputs` nor `ports`."""
+    text_inputs: tuple[TextVariable, ...] = ()
+    text_outputs: tuple[TextVariable, ...] = ()
+    """Inputs and outputs that are texts or bytes."""
     tunable: tuple[Variable, ...] = ()
     """Parameters that may change while the session runs."""
     clocks: tuple[Clock, ...] = ()
@@ -97,9 +101,15 @@ def describe(
     starts = {value.name: value for value in _starts(path, model, major, start)}
     clocks = _clocks(path, model, part)
     variables: dict[str, list[Variable]] = {"input": [], "output": []}
+    texts: dict[str, list[TextVariable]] = {"input": [], "output": []}
     ports: list[Port] = []
     for row in model.modelVariables:
         if row.causality not in variables or row.alias is not None:
+            continue
+        if row.type in MESSAGES and not row.dimensions and not (clocks and row.clocks):
+            text = TextVariable(row.name, port_name(row.name), row.valueReference, row.type)
+            texts[row.causality].append(text)
+            ports.append(_text_port(row, text))
             continue
         variable = _variable(path, row, major, _size(path, row, start), clocked=bool(clocks))
         if variable is not None:
@@ -125,6 +135,8 @@ def describe(
         tuple(starts.values()),
         listed_sources(model),
         tuple(found),
+        tuple(texts["input"]),
+        tuple(texts["output"]),
         tuple(variable for variable, _ in tuned),
         clocks,
         model.numberOfContinuousStates,
@@ -226,7 +238,9 @@ def _variable(path: Path, row: ModelVariable, major: int, size: int, *, clocked:
         reason = (
             "it is empty"
             if number
-            else f"it is a {row.type}; only numbers and booleans are exchanged between participants"
+            else f"it is an array of type {row.type}, or clocked"
+            if row.type in MESSAGES
+            else f"it is a {row.type}, which goes by its ticks"
         )
         _log.info("%s: %s '%s' becomes no port: %s", path, row.causality, row.name, reason)
         return None
@@ -241,10 +255,21 @@ def _variable(path: Path, row: ModelVariable, major: int, size: int, *, clocked:
     )
 
 
-def _port(row: ModelVariable, variable: Variable, start: tuple[float, ...] | None) -> Port:
+def _about(row: ModelVariable) -> str:
     text = f"FMU variable '{row.name}' ({row.type})"
-    if row.description:
-        text += f": {' '.join(row.description.split())}"
+    return f"{text}: {' '.join(row.description.split())}" if row.description else text
+
+
+def _text_port(row: ModelVariable, variable: TextVariable) -> Port:
+    """Return the port of a text or of bytes; an input that is not connected keeps the FMU's own value."""
+    type_ = MESSAGES[variable.type]
+    if row.causality == "input":
+        return signal_in(variable.port, type_, _about(row), start=())
+    return signal_out(variable.port, type_, _about(row))
+
+
+def _port(row: ModelVariable, variable: Variable, start: tuple[float, ...] | None) -> Port:
+    text = _about(row)
     type_ = Float64MultiArray if row.dimensions else Float64Message
     declare = signal_in if row.causality == "input" else signal_out
     return declare(variable.port, type_, text, size=variable.size, unit=unit_of(row), start=start)

@@ -4,7 +4,8 @@ Inputs and outputs of the FMU are ports, with names by `engines.fmu.variables.po
 a length in mm fits an input in mm alone, unless `inputs` states a conversion. Scalars are
 `std_msgs/msg/Float64`, FMI 3 arrays `std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and
 booleans (0, 1) are exchanged as doubles; an input without a valid number of its type ends the session.
-Triggered clocks are event ports. Strings and binaries become no ports, with an entry in the log.
+Triggered clocks are event ports. Strings are `std_msgs/msg/String`, binaries `std_msgs/msg/UInt8MultiArray`;
+arrays of these, and clocked ones, become no ports, with an entry in the log.
 """
 
 from __future__ import annotations
@@ -216,9 +217,14 @@ class FmuEngine(Stepped):
         self._has_clocks = bool(description.clocks)
         is_whole = step in (None, setup.period_ns)
         self._is_plain = is_whole and not (
-            self._bonds or description.tunable or description.clocks or self._converted[1]
+            self._bonds
+            or description.tunable
+            or description.clocks
+            or description.text_inputs
+            or self._converted[1]
         )
         """Whether a step is one call of the FMU's, with the inputs as they are."""
+        self._has_texts = bool(description.text_outputs)
         self._has_more = bool(self._bonds or instance.memory.size)
         outputs = self._read(0, instance, instance.get_outputs())
         warn_of_changes(instance, self.name)
@@ -290,7 +296,8 @@ class FmuEngine(Stepped):
         if self._hashes_state:
             return state_hash(instance.memory, *bonds, instance.serialise())
         values = (block.values for block in (*instance.inputs, *instance.outputs))
-        return state_hash(self._time, *bonds, *values)
+        texts = b"\0".join([*instance.text_inputs.values(), *instance.text_outputs.values()])
+        return state_hash(self._time, *bonds, *values, texts)
 
     def save(self) -> bytes:
         """Return the FMU's state. Raises StateError for an FMU without this capability."""
@@ -354,4 +361,6 @@ class FmuEngine(Stepped):
                 instance.refuse_output(*stop)
             except SessionError as error:
                 raise SessionError(f"{error}, at {t / 1e9:.9g} s") from error
+        if self._has_texts:
+            self._outputs |= instance.text_outputs.get()
         return self._outputs

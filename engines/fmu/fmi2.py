@@ -109,6 +109,7 @@ class Fmi2Instance(Instance):
         if not self._slope_ports:
             tau += dt / 2
         self._set_blocks.set(inputs, tau)
+        self.set_texts(self.text_inputs.changed(inputs))
         if not self._slope_ports:
             return
         rates = [inputs.rate(port) for port in self._slope_ports]

@@ -15,6 +15,7 @@ from engines.fmu.description import Description
 from engines.fmu.instance import Instance
 from engines.fmu.log import log_everything, log_message
 from engines.fmu.start import Start
+from engines.fmu.texts import Text
 from engines.fmu.ticks import Ticks
 from engines.fmu.transfers import Transfers, compiled
 from hub.participant import Inputs
@@ -122,18 +123,29 @@ class Fmi3Instance(Instance):
         self._set_blocks.set(inputs, tau + dt / 2)
         for block in (*self._event_blocks, *self._clocked_blocks):
             block.store(inputs, tau)
-        if self._event_blocks:
-            values = np.concatenate([block.values for block in self._event_blocks])
-            if not np.array_equal(values, self.memory[1 : self._events_end]):
-                self.memory[1 : self._events_end] = values
-                self._handle_event(self._event_blocks, at=self.now_ns / 1e9)
+        texts = self.text_inputs.changed(inputs)
+        if texts and not self._has_events:
+            self.set_texts(texts)
+        elif self._take_discrete() or texts:
+            self._handle_event(self._event_blocks, texts=texts, at=self.now_ns / 1e9)
         for port, clock in self._ticks.triggered.items() if tau == 0.0 else ():
             for _ in inputs.events(port):
                 if not self.ended:
                     self._handle_event(clocks=[clock], at=self.now_ns / 1e9)
 
+    def _take_discrete(self) -> bool:
+        """Keep the discrete inputs, and return whether one has changed."""
+        if not self._event_blocks:
+            return False
+        values = np.concatenate([block.values for block in self._event_blocks])
+        if np.array_equal(values, self.memory[1 : self._events_end]):
+            return False
+        self.memory[1 : self._events_end] = values
+        return True
+
     def recall(self) -> None:
         """Take over `memory`, after a return to a saved state."""
+        super().recall()
         self._ticks.recall()
 
     def take_ticks(self) -> Mapping[str, tuple[EmptyMessage, ...]]:
@@ -182,11 +194,19 @@ class Fmi3Instance(Instance):
             self._end(reached, "terminateSimulation of fmi3DoStep")
         return reached
 
-    def _handle_event(self, inputs: Sequence[Block] = (), *, clocks: Sequence[Clock] = (), at: float) -> None:
+    def _handle_event(
+        self,
+        inputs: Sequence[Block] = (),
+        *,
+        texts: Sequence[tuple[Text, bytes]] = (),
+        clocks: Sequence[Clock] = (),
+        at: float,
+    ) -> None:
         """Handle the event at `at` (s). An FMU at the end of its simulation stays in event mode."""
         self.call("EnterEventMode")
         for block in inputs:
             self.transfer(block)
+        self.set_texts(texts)
         if self._update_discrete_states(clocks, at=at):
             self.call("EnterStepMode")
         else:

@@ -24,6 +24,7 @@ from engines.fmu.log import last_warning
 from engines.fmu.model import library_path
 from engines.fmu.sources import provide_library
 from engines.fmu.start import Start
+from engines.fmu.texts import Text, TextInputs, TextOutputs
 from engines.fmu.transfers import Stop, Transfers, compiled
 from engines.fmu.variables import Variable
 from hub.participant import Inputs
@@ -106,6 +107,8 @@ class Instance(ABC):
         """Inputs set at the start of each step."""
         self.outputs = [Block("Get", group, self._prepare_access) for group in grouped(description.outputs)]
         self._read_blocks = Transfers(self, [block for block in self.outputs if not block.clocks])
+        self.text_inputs = TextInputs(self, description.text_inputs)
+        self.text_outputs = TextOutputs(self, description.text_outputs)
 
     def _check_functions(self, description: Description) -> None:
         needed = dict.fromkeys(self.prefix + name for name in self.required)
@@ -114,6 +117,7 @@ class Instance(ABC):
         needed |= dict.fromkeys(f"{self.prefix}Set{v.type.access}" for v in inputs)
         needed |= dict.fromkeys(f"{self.prefix}Get{v.type.access}" for v in description.outputs)
         needed |= dict.fromkeys(f"{self.prefix}Set{start.access}" for start in description.starts)
+        needed |= dict.fromkeys(f"{self.prefix}Set{text.type}" for text in description.text_inputs)
         if missing := self.library.missing(needed):
             raise ScenarioError(
                 f"the library of '{description.path}' cannot be used: it lacks {', '.join(missing)}"
@@ -151,6 +155,8 @@ class Instance(ABC):
         """Set the start values and bring the FMU to time 0."""
         self._initialise(starts, tolerance)
         self._initialised = True
+        self.text_inputs.recall()
+        self.text_outputs.begin()
 
     @abstractmethod
     def _initialise(self, starts: Sequence[Start], tolerance: float | None) -> None: ...
@@ -170,6 +176,11 @@ class Instance(ABC):
     def block(self, verb: Literal["Set", "Get"], variables: Sequence[Variable]) -> Block:
         """Return variables of one type, to be set or got apart from inputs and outputs."""
         return Block(verb, variables, self._prepare_access)
+
+    def set_texts(self, texts: Sequence[tuple[Text, bytes]]) -> None:
+        """Set inputs that are texts or bytes."""
+        for text, value in texts:
+            text.write(value)
 
     def tune(self, blocks: Sequence[Block]) -> None:
         """Set tunable parameters between two steps."""
@@ -196,8 +207,9 @@ class Instance(ABC):
             self.advance(t, h)
         return self._read_blocks.get()
 
-    def recall(self) -> None:  # noqa: B027
-        """Take over `memory`, after a return to a saved state; nothing to do without clocks."""
+    def recall(self) -> None:
+        """Take over `memory`, after a return to a saved state."""
+        self.text_inputs.recall()
 
     def take_ticks(self) -> Mapping[str, tuple[EmptyMessage, ...]]:
         """Return the ticks of output clocks since the last call, by port."""
@@ -265,7 +277,11 @@ class Instance(ABC):
 
     def call(self, function: str, *arguments: Any) -> None:
         """Call an FMI function, named without prefix."""
-        self._check(function, self._function(function)(self.component, *arguments))
+        self._check(function, self.status(function, *arguments))
+
+    def status(self, function: str, *arguments: Any) -> int:
+        """Call an FMI function, named without prefix, and return FMI's status."""
+        return self._function(function)(self.component, *arguments)
 
     def _check(self, function: str, status: int) -> None:
         if status > WARNING:

@@ -20,6 +20,7 @@ from engines.fmu.description import Description
 from engines.fmu.instance import DISCARD, Instance
 from engines.fmu.log import fmi2_callbacks, log_everything, log_message
 from engines.fmu.start import Start
+from engines.fmu.texts import Text
 from engines.fmu.transfers import Transfers
 from hub.participant import Inputs
 from schemas.errors import SessionError
@@ -119,14 +120,15 @@ class ModelExchange(Instance):
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
         """Set continuous inputs to their mean over `dt` seconds, changed discrete inputs in event mode."""
         self._set_blocks.set(inputs, tau + dt / 2)
-        if not self._event_blocks:
+        texts = self.text_inputs.changed(inputs)
+        if not self._event_blocks and not texts:
             return
         for block in self._event_blocks:
             block.store(inputs, tau)
-        values = np.concatenate([block.values for block in self._event_blocks])
-        if not np.array_equal(values, self.memory[1:]):
+        values = np.concatenate([self.memory[:0], *(block.values for block in self._event_blocks)])
+        if texts or not np.array_equal(values, self.memory[1:]):
             self.memory[1:] = values
-            self._handle_event(self._event_blocks, at=self.now_ns / 1e9)
+            self._handle_event(self._event_blocks, texts, at=self.now_ns / 1e9)
 
     def tune(self, blocks: Sequence[Block]) -> None:
         """Set tunable parameters in event mode."""
@@ -164,10 +166,13 @@ class ModelExchange(Instance):
                 self._end(now, f"terminateSimulation of {self.prefix}CompletedIntegratorStep")
         return is_event, now
 
-    def _handle_event(self, inputs: Sequence[Block] = (), *, at: float) -> None:
+    def _handle_event(
+        self, inputs: Sequence[Block] = (), texts: Sequence[tuple[Text, bytes]] = (), *, at: float
+    ) -> None:
         self.call("EnterEventMode")
         for block in inputs:
             self.transfer(block)
+        self.set_texts(texts)
         if self._update_discrete_states():
             self.call("EnterContinuousTimeMode")
         else:

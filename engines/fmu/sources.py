@@ -6,6 +6,7 @@ FMI 2.0.5 section 2.2.7 (SourceFiles), FMI 3.0.2 section 2.5.1.2 (buildDescripti
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -24,6 +25,9 @@ _FLAGS = ("-O2", "-fPIC", "-ffp-contract=off", "-fvisibility=hidden", "-shared")
 """A product and a sum are rounded one after the other, so that results do not depend on the processor."""
 NO_COMPILER = "this machine has no C compiler; install cc, gcc or clang, or set CC"
 _TIMEOUT_S = 300
+_ERROR = re.compile(r"\berror: |undefined reference|cannot find ")
+"""Marks an error of gcc, clang or the linker."""
+_LONGEST_ERROR = 300
 
 
 def find_compiler() -> str | None:
@@ -46,7 +50,7 @@ def _identifier(model: ModelDescription) -> str | None:
 def provide_library(path: Path, directory: Path, library: str, sources: tuple[str, ...]) -> None:
     """Compile `library` in the FMU unpacked to `directory`, unless the FMU has it.
 
-    Raises ScenarioError, with the compiler's message, if the sources cannot be compiled.
+    Raises ScenarioError, with the compiler's first error, if the sources cannot be compiled.
     """
     target = directory / library
     if target.exists() or not sources:
@@ -77,6 +81,16 @@ def _compile(path: Path, contents: tuple[tuple[str, bytes], ...], sources: tuple
             [compiler, *options], cwd=root, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False
         )
         if run.returncode:
-            reason = run.stderr.strip()[-1000:]
-            raise ScenarioError(f"the sources of '{path}' cannot be compiled by {compiler}: {reason}")
+            raise ScenarioError(
+                f"the sources of '{path}' cannot be compiled by {compiler}: {_first_error(run.stderr)}"
+            )
         return (root / "library.bin").read_bytes()
+
+
+def _first_error(output: str) -> str:
+    """Return the first error in a compiler's output, of which the rest mostly follows, and their number."""
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
+    errors = [line for line in lines if _ERROR.search(line)]
+    first = (errors or lines or ["it says no reason"])[0]
+    more = f" ({len(errors) - 1} further errors)" if len(errors) > 1 else ""
+    return "".join(letter if letter.isprintable() else "?" for letter in first[:_LONGEST_ERROR]) + more

@@ -4,8 +4,13 @@ import os
 
 from hub.hosting.numerics import pin_numerics
 
+__all__ = ["main"]
+
 pin_numerics(os.environ)  # before anything imports numpy: participants may run in this process
 
-from hub.command_line.app import main  # noqa: E402
 
-__all__ = ["main"]
+def main() -> None:
+    """Run the command line."""
+    from hub.command_line.app import main as run  # imports plug-ins, which import this package
+
+    run()

@@ -28,12 +28,12 @@ def inputs_of(engine: FmuEngine, rates: dict[str, float] | None = None, **values
 def run(
     engine: FmuEngine, steps: int, period: int = MS, start: int = 0, inputs: Inputs | None = None
 ) -> dict[str, float]:
-    """Step the engine; return the first element of every output at the end."""
+    """Step the engine; return the first element of every output of numbers at the end."""
     outputs: Any = {}
     inputs = inputs or inputs_of(engine)
     for i in range(start, start + steps):
         outputs = engine.step(i * period, period, inputs)
-    return {name: float(value[0]) for name, value in outputs.items()}
+    return {name: float(value[0]) for name, value in outputs.items() if isinstance(value, np.ndarray)}
 
 
 def ports(engine: FmuEngine) -> dict[str, Port]:

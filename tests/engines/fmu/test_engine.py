@@ -39,6 +39,7 @@ class TestPorts:
             "stage",
             "locked",
             "seen_locked",
+            "note",
         }
         assert (found["F"].causality, found["F"].unit, found["F"].start) == ("input", "N", (0.0,))
         # unit of the declared type
@@ -46,6 +47,7 @@ class TestPorts:
         assert found["x_mm"].unit == "mm"  # as the FMU declares it
         assert found["body/a_x5B_1_x5D_"].unit == "m/s2"
         assert found["locked"].start == (0.0,)
+        assert found.pop("note").type == "std_msgs/msg/String"
         assert {port.type for port in found.values()} == {"std_msgs/msg/Float64"}
         assert "force on the mass" in found["F"].description
 
@@ -63,16 +65,6 @@ class TestPorts:
     def test_a_start_value_of_an_input_is_that_of_its_port(self, make: Make) -> None:
         found = ports(make(BALL, period=0, start={"u": [1, 2, 3], "frozen": True}))
         assert (found["u"].start, found["frozen"].start) == ((1.0, 2.0, 3.0), (1.0,))
-
-    @pytest.mark.parametrize(
-        ("model", "variable", "kind"), [(SPRING, "note", "String"), (BALL, "image", "Binary")]
-    )
-    def test_what_is_no_number_is_left_out_with_a_reason(
-        self, make: Make, caplog: pytest.LogCaptureFixture, model: str, variable: str, kind: str
-    ) -> None:
-        with caplog.at_level(logging.INFO, "engines.fmu"):
-            assert variable not in ports(make(model, period=0))
-        assert any(f"'{variable}' becomes no port" in line and kind in line for line in caplog.messages)
 
     def test_a_relative_path_starts_at_the_scenario(self, tmp_path: Path) -> None:
         params = FmuParams.model_validate({"path": "parts/a.fmu"}, context={"directory": tmp_path})

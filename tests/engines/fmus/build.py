@@ -20,6 +20,7 @@ FOLDERS = {
     "stair": "linux64",
     "hopper": "linux64",
     "metronome": "x86_64-linux",
+    "notes": "linux64",
 }
 """Platform folders of FMI 2.0 and 3.0."""
 

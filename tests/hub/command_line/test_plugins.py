@@ -106,3 +106,10 @@ def test_one_with_a_single_command_is_that_command(command_line, install_plugin)
     install_plugin("scales", {"trocar.commands": {"scale": "scales:app"}}, text=single)
     plugins.mount_plugins(command_line)
     assert run(command_line, "scale", "2.5").stdout == "2.5 kg\n"
+
+
+def test_a_plugin_module_can_be_imported_by_itself():
+    """Its import of `hub.command_line` mounts no plug-ins, which would include the module itself."""
+    code = "import engines.fmu.ssp.export_command, sys; sys.exit('hub.command_line.app' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
