@@ -116,8 +116,9 @@ class Engagement:
         if phase is not before:
             now.phase = phase
         if phase is EngagementPhase.DISABLED and before is not EngagementPhase.DISABLED:
+            again = ": let go of the dead-man, and hold it again" if self._must_hold else ""
             reason = (
-                f"its master has been silent for more than {self._max_age / 1e6:g} ms"
+                f"its master has been silent for more than {self._max_age / 1e6:g} ms{again}"
                 if self.arm_is_ready
                 else "its instrument is exchanged"
                 if self.exchanging

@@ -94,6 +94,8 @@ def test_held_a_master_that_comes_back_must_be_taken_hold_of_again():
     session.step(HELD)
     assert moved(session)
     assert session.states == ["ENABLED", "DISABLED", "CLUTCHED", "ENABLED"]
+    (warning,) = session.warnings
+    assert warning.endswith("silent for more than 100 ms: let go of the dead-man, and hold it again")
 
 
 @pytest.mark.parametrize(("engage", "events"), [("released", [HELD, FREE]), ("held", [FREE, HELD])])
