@@ -51,7 +51,7 @@ def score(
 
 
 def _score_file(path: Path, rules: list[str], *, trust: bool) -> dict[str, Scored]:
-    from hub.recording.bag import bag_file
+    from hub.recording.bag_files import bag_file
     from hub.recording.recording import Recording
     from schemas.errors import RecordingError
     from tasks.recorded.ros_bag import score_ros_bag

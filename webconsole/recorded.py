@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from hub.participant import Params
-from hub.recording.bag import output_port
 from hub.recording.bond_trace import BondTrace, Contact
 from hub.recording.moments import Moments
+from hub.recording.output_port import output_port
 from hub.recording.recording import STATUS_TOPIC, Recording
 from hub.recording.series import Series
 from hub.recording.trust import trusted_parameters

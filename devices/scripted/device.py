@@ -15,7 +15,8 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from devices.samples import Playback, clock_of, stamp_message
 from hub.participant import Device, Params, Sample, VectorSample
-from hub.recording.bag import Bag, BagMessage, output_port
+from hub.recording.bag import Bag, BagMessage
+from hub.recording.output_port import output_port
 from schemas.codec import decode, message_type
 from schemas.errors import MessageError, RecordingError
 from schemas.files import find_file

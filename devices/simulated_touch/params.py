@@ -11,7 +11,7 @@ from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInf
 from devices.haptics.limits import TOUCH
 from devices.haptics.params import SafetyParams
 from hub.participant import Params
-from hub.recording.bag import bag_file
+from hub.recording.bag_files import bag_file
 from robots.dvrk.parameters import UnitQuaternion
 from schemas.errors import RecordingError, ScenarioError
 from schemas.files import find_file

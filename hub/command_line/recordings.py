@@ -11,7 +11,7 @@ import typer
 from hub.command_line.display import RunProgress, console, results, show
 from hub.command_line.options import Directory, Json, Listen, RecordingPath, Trust
 from hub.planning.limits import safe_text
-from hub.recording.bag import default_output
+from hub.recording.bag_files import default_output
 from hub.recording.recording import Recording
 
 __all__ = ["recover", "replay", "report", "verify"]

@@ -2,73 +2,44 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections import Counter
 from collections.abc import Collection, Generator, Iterator
 from contextlib import contextmanager
 from functools import cached_property
-from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Schema
+from mcap.records import Attachment, Chunk, ChunkIndex
 from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
+from hub.recording.bag_files import bag_file, reading_errors
+from hub.recording.located_messages import (
+    INDEX_ENTRY,
+    MAX_RECORD_BYTES,
+    MESSAGE_HEADER_BYTES,
+    RECORD_HEAD,
+    LocatedMessage,
+    chunk_records,
+    index_entries,
+    located_messages,
+    message_at,
+)
 from hub.recording.unfinished import Unfinished
-from hub.recording.unpacking import MAX_CHUNK_BYTES, most_unpacked, unpack
-from schemas import ros
-from schemas.codec import decode, message_type
+from hub.recording.unpacking import most_unpacked
 from schemas.errors import CutShortError, MessageError, RecordingError, did_you_mean
-from schemas.ports import Port
-from schemas.vectors import has_vector
 
-__all__ = [
-    "MAX_RECORD_BYTES",
-    "MESSAGE_HEADER_BYTES",
-    "Bag",
-    "BagMessage",
-    "bag_file",
-    "chunk_declarations",
-    "chunk_records",
-    "default_output",
-    "located_messages",
-    "message_errors",
-    "output_port",
-    "reading_errors",
-]
+__all__ = ["Bag", "BagMessage", "message_errors"]
 
-MAX_RECORD_BYTES = 64 * 2**20
-"""A longer MCAP record is not read: chunks have 192 KiB and a step, or a single image."""
 
-_MAX_RECORDS = 2**18
-"""Records of a chunk: ours have some thousands; the smallest take 9 bytes, and each costs a reader 200."""
 _MAX_TOPIC_RATIO, _FREE_TOPIC_BYTES = 32, 2**29
 """Bytes of a single topic in memory at once: a multiple of the file's size, or the second number if greater.
 """
-
-_RECORD = struct.Struct("<BQ")
-"""Opcode and length of a record."""
-
-_MESSAGE = struct.Struct("<BQHIQQ")
-"""Opcode, length, channel, sequence, log time, publish time; the payload follows.
-
-https://mcap.dev/spec#message-op0x05
-"""
-
-MESSAGE_HEADER_BYTES = _MESSAGE.size
-
-_MESSAGE_INDEX = struct.Struct("<BQHI")
-"""Opcode, length, channel, bytes of the following entries (https://mcap.dev/spec#message-index-op0x07)."""
-
-_INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 
 
 class BagMessage(NamedTuple):
@@ -78,53 +49,6 @@ class BagMessage(NamedTuple):
     type: str
     time_ns: int
     payload: bytes
-
-
-def bag_file(path: Path) -> Path:
-    """Return the MCAP file at `path`: the file itself, or the file in a rosbag2 directory.
-
-    Raises RecordingError if there is not exactly one file.
-    """
-    if path.is_dir():
-        files = sorted(file for file in path.glob("*.mcap") if file.is_file())  # a pipe would never end
-        if len(files) != 1:
-            raise RecordingError(
-                f"'{path}' holds {len(files)} .mcap files; name a recording's directory, which holds one, or"
-                " a file"
-            )
-        return files[0]
-    if not path.is_file():
-        raise RecordingError(f"no recording at '{path}'; name a recording's directory or an .mcap file")
-    return path
-
-
-def default_output(recording: Path, ending: str) -> Path:
-    """Return the default output beside a recording: `x.png` for the recordings `x` and `x.mcap`.
-
-    Raises RecordingError if there is a link: a file beside a stranger's recording may be the stranger's, and
-    lead to any file of the user.
-    """
-    place = recording.resolve() if recording.name in ("", "..") else recording
-    path = place.with_name(f"{place.stem if place.is_file() else place.name}{ending}")
-    if path.is_symlink():
-        raise RecordingError(f"'{path}' is a link, through which nothing is written: name another --output")
-    return path
-
-
-@contextmanager
-def reading_errors(file: Path) -> Generator[None]:
-    """Turn the parsers' errors at damaged bytes into a RecordingError with the name of `file`."""
-    try:
-        yield
-    except (RecordingError, GeneratorExit):
-        raise
-    except OSError as error:
-        raise RecordingError(f"cannot read '{file}': {error.strerror}") from error
-    except Exception as error:  # struct.error, KeyError, ValueError, and those of zstd and lz4
-        raise RecordingError(
-            f"'{file}' is damaged ({type(error).__name__}: {error}); `trocar recover {file}` saves what is"
-            " whole"
-        ) from error
 
 
 @contextmanager
@@ -309,7 +233,7 @@ class Bag:
     def _records_of(self, index: ChunkIndex, stream: BinaryIO) -> bytes:
         place, records = self._unpacked  # another thread may replace both
         if place != index.chunk_start_offset:
-            stream.seek(index.chunk_start_offset + _RECORD.size)
+            stream.seek(index.chunk_start_offset + RECORD_HEAD.size)
             records = chunk_records(Chunk.read(ReadDataStream(stream)))
             self._unpacked = index.chunk_start_offset, records
         return records
@@ -327,14 +251,16 @@ class Bag:
                 [m.offset for m in found], np.int64
             )
         with reading_errors(self.file), self.file.open("rb") as stream:
-            entries = [_entries(stream, places[channel], channel) for channel in sorted(ids & places.keys())]
-        all_ = np.concatenate(entries) if entries else np.zeros(0, _INDEX_ENTRY)
+            entries = [
+                index_entries(stream, places[channel], channel) for channel in sorted(ids & places.keys())
+            ]
+        all_ = np.concatenate(entries) if entries else np.zeros(0, INDEX_ENTRY)
         return all_["time"].astype(np.int64), all_["offset"].astype(np.int64)
 
     def payload(self, records: bytes, offset: int) -> bytes:
         """Return the message at a place in the records of a chunk; raises RecordingError if there is none."""
         with reading_errors(self.file):
-            found = _message_at(records, offset, set(self._summary.channels))
+            found = message_at(records, offset, set(self._summary.channels))
             return records[found.offset + MESSAGE_HEADER_BYTES : found.end]
 
     def _channel_ids(self, topic: str) -> set[int]:
@@ -382,113 +308,9 @@ class Bag:
                         found = [m for m in located_messages(records) if m.channel in wanted]
                     else:
                         offsets = [
-                            o for c in wanted & places.keys() for o in _message_offsets(stream, places[c], c)
+                            index_entries(stream, places[one], one)["offset"]
+                            for one in sorted(wanted & places.keys())
                         ]
-                        found = [_message_at(records, offset, wanted) for offset in sorted({*offsets})]
+                        starts = np.unique(np.concatenate(offsets)).tolist()
+                        found = [message_at(records, start, wanted) for start in starts]
                 yield index, records, found
-
-
-class LocatedMessage(NamedTuple):
-    """The place of a message in the records of a chunk."""
-
-    channel: int
-    time_ns: int
-    offset: int
-    """Start of the record."""
-    end: int
-
-
-def _message_offsets(stream: BinaryIO, place: int, channel: int) -> list[int]:
-    """Return where the messages of `channel` start in their chunk, from the message index at `place`."""
-    return _entries(stream, place, channel)["offset"].tolist()
-
-
-def _entries(stream: BinaryIO, place: int, channel: int) -> NDArray[np.void]:
-    """Return time and place in their chunk of the messages of `channel`, from the index at `place`."""
-    stream.seek(place)
-    opcode, length, stated, size = _MESSAGE_INDEX.unpack(stream.read(_MESSAGE_INDEX.size))
-    if (opcode, stated, length) != (Opcode.MESSAGE_INDEX, channel, size + 6) or length > MAX_RECORD_BYTES:
-        raise ValueError(f"there is no index of channel {channel} at {place}")
-    return np.frombuffer(stream.read(size), _INDEX_ENTRY)
-
-
-def _message_at(records: bytes, offset: int, channels: set[int]) -> LocatedMessage:
-    opcode, length, channel, _, time_ns, _ = _MESSAGE.unpack_from(records, offset)
-    end = offset + _RECORD.size + length
-    if opcode != Opcode.MESSAGE or channel not in channels or end > len(records):
-        raise ValueError(f"the index of a chunk is wrong: no message at {offset}")
-    return LocatedMessage(channel, time_ns, offset, end)
-
-
-def chunk_records(chunk: Chunk) -> bytes:
-    """Return the uncompressed records of `chunk`, checked against its size and checksum.
-
-    Raises ValueError if size or checksum differ or the chunk is too large, and the decompressors' errors.
-    """
-    size = chunk.uncompressed_size
-    if size > MAX_CHUNK_BYTES:
-        raise ValueError(f"a chunk states {size} bytes; at most {MAX_CHUNK_BYTES} are unpacked")
-    records = unpack(chunk.compression, chunk.data, size)
-    if len(records) != size:
-        raise ValueError(f"a chunk has {len(records)} bytes instead of {size}")
-    if chunk.uncompressed_crc and zlib.crc32(records) != chunk.uncompressed_crc:
-        raise ValueError("a chunk has another checksum than the stated one")
-    return records
-
-
-def located_messages(records: bytes) -> Iterator[LocatedMessage]:
-    """Find the messages in the records of a chunk.
-
-    Raises ValueError or struct.error if records do not end at their stated length, or if there are too many.
-    """
-    for opcode, at, end in _record_heads(records):
-        if opcode == Opcode.MESSAGE:
-            _, _, channel, _, time_ns, _ = _MESSAGE.unpack_from(records, at)
-            yield LocatedMessage(channel, time_ns, at, end)
-
-
-def chunk_declarations(records: bytes) -> Iterator[Schema | Channel]:
-    """Yield the schemas and channels in the records of a chunk; raises the errors of `located_messages`."""
-    for opcode, at, end in _record_heads(records):
-        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            stream = ReadDataStream(BytesIO(records[at + _RECORD.size : end]))
-            yield Schema.read(stream) if opcode == Opcode.SCHEMA else Channel.read(stream)
-
-
-def _record_heads(records: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield opcode, start and end of each record of a chunk."""
-    at = count = 0
-    while at < len(records):
-        opcode, length = _RECORD.unpack_from(records, at)
-        end, count = at + _RECORD.size + length, count + 1
-        if end > len(records):
-            raise ValueError(f"a record of {length} bytes at {at} passes the end of its chunk")
-        if count > _MAX_RECORDS:
-            raise ValueError(f"a chunk has more than {_MAX_RECORDS} records")
-        yield opcode, at, end
-        at = end
-
-
-def output_port(name: str, type_name: str, payload: bytes) -> Port:
-    """Return the output port for messages such as `payload`.
-
-    Types with a fixed layout are signals, with frame, joint names and sizes as in `payload`; all remaining
-    types events. Raises MessageError.
-    """
-    model = message_type(type_name)
-    if not has_vector(type_name):
-        return Port(name=name, causality="output", type=type_name, variability="event")
-    message = decode(model, payload)
-    known: dict[str, Any] = {}
-    if isinstance(message, ros.JointState):
-        sizes = {field: getattr(message, field).size for field in ("position", "velocity", "effort")}
-        known = {
-            "names": tuple(message.name),
-            "fields": tuple(field for field in sizes if sizes[field]) or ("position",),
-            "size": max(1, *sizes.values()),
-        }
-    elif isinstance(message, ros.Float64MultiArray):
-        known = {"size": max(1, message.data.size)}
-    header = getattr(message, "header", None)
-    frame = header.frame_id if isinstance(header, ros.Header) else ""
-    return Port(name=name, causality="output", type=type_name, frame=frame, **known)

@@ -18,8 +18,8 @@ from typing import Self
 
 from mcap.records import Channel, Schema
 
-from hub.recording.bag import MESSAGE_HEADER_BYTES
 from hub.recording.chunk import FIRST_BLOCK, Queued, chunk_data
+from hub.recording.located_messages import MESSAGE_HEADER_BYTES
 from hub.recording.mcap_file import create_bag, write_rosbag2_metadata
 from hub.recording.vector_block import VectorBlock
 from schemas.codec import rihs01, ros2msg_definition, typestore

@@ -14,16 +14,14 @@ from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
-from hub.recording.bag import (
+from hub.recording.bag_files import bag_file, default_output, reading_errors
+from hub.recording.chunk import ChunkData
+from hub.recording.located_messages import (
     MAX_RECORD_BYTES,
-    bag_file,
     chunk_declarations,
     chunk_records,
-    default_output,
     located_messages,
-    reading_errors,
 )
-from hub.recording.chunk import ChunkData
 from hub.recording.mcap_file import McapFile, create_bag, write_rosbag2_metadata
 from schemas.errors import RecordingError
 

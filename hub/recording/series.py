@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hub.recording.bag import Bag, message_errors, output_port
+from hub.recording.bag import Bag, message_errors
+from hub.recording.output_port import output_port
 from schemas.codec import decode, message_type
 from schemas.errors import MessageError, MissingExtraError, RecordingError, did_you_mean
 from schemas.message import Message

@@ -88,7 +88,7 @@ def render(
     trust: Trusted = False,
 ) -> None:
     """Draw the scene of a recording at one moment, with its soft bodies and markers."""
-    from hub.recording.bag import default_output
+    from hub.recording.bag_files import default_output
 
     output = output or default_output(recording, ".png" if modalities is None else ".truth")
     if modalities is None and output.suffix.lower() not in (".png", ".jpg", ".jpeg"):
@@ -138,7 +138,7 @@ def film(
     trust: Trusted = False,
 ) -> None:
     """Write a film of a recording, with title and time."""
-    from hub.recording.bag import default_output
+    from hub.recording.bag_files import default_output
 
     output = output or default_output(recording, ".mp4")
     if output.suffix.lower() != ".mp4":

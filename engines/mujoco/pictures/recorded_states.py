@@ -9,8 +9,9 @@ import numpy as np
 
 from engines.mujoco.markers.store import ShownMarker, shown_markers
 from engines.mujoco.pictures.soft_body import SoftBody
-from hub.recording.bag import BagMessage, output_port
+from hub.recording.bag import BagMessage
 from hub.recording.moments import Moments
+from hub.recording.output_port import output_port
 from hub.recording.recording import Recording
 from schemas.codec import decode
 from schemas.errors import MessageError, RecordingError

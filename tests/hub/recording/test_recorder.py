@@ -21,8 +21,9 @@ from mcap.records import Channel, Schema
 from rosbags.highlevel import AnyReader
 
 from hub.recording import recorder as recorder_module
-from hub.recording.bag import Bag, located_messages
+from hub.recording.bag import Bag
 from hub.recording.chunk import FIRST_BLOCK, chunk_data
+from hub.recording.located_messages import located_messages
 from hub.recording.mcap_file import create_bag
 from hub.recording.recorder import Recorder
 from hub.recording.recover import recover

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hub.recording.bag import output_port
+from hub.recording.output_port import output_port
 from hub.recording.recording import Recording
 from hub.verify import verify
 from schemas.codec import decode

@@ -6,7 +6,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 
-from hub.recording.bag import default_output
+from hub.recording.bag_files import default_output
 from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
 from hub.recording.recover import recover
