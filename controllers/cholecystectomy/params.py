@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
-from controllers.motion.params import Arms, SetupJoints
-from hub.participant import Params
-from robots.dvrk.crtk import Mounting
+from controllers.cholecystectomy.routine_params import RoutineParams
 from robots.dvrk.parameters import ArmName
 from schemas.quantity import Duration, Force, Length
 from schemas.scenario import Name
@@ -16,18 +14,11 @@ from schemas.scenario import Name
 __all__ = ["ClipAndCutParams"]
 
 
-class ClipAndCutParams(Params):
+class ClipAndCutParams(RoutineParams):
     """Arms and their instruments, names of the organs, and the limits of the routine."""
 
-    open_to_pages: ClassVar[bool] = True
-
-    arms: Arms
-    mounting: Mounting = "free"
-    setup_joints: SetupJoints = SetupJoints()
     applier: ArmName = Field(default="PSM1", description="the arm with the clip applier")
-    grasper: ArmName = Field(default="PSM2", description="the arm that holds the gallbladder")
     scissors: ArmName = Field(default="PSM3", description="the arm with the scissors")
-    gallbladder: Name = Field(default="gallbladder", description="name of the organ that is grasped")
     tubes: tuple[Name, Name] = Field(
         default=("cystic_duct", "cystic_artery"),
         description="the organs that are clipped and cut, the first one first; left ends at the gallbladder",
@@ -49,15 +40,11 @@ class ClipAndCutParams(Params):
     patience: Duration = Field(
         default=60_000_000_000, gt=0, description="longest time of a sub-task with all its attempts"
     )
-    end: bool = Field(default=True, description="whether the session ends with the routine")
 
     @model_validator(mode="after")
     def _is_a_team(self) -> Self:
         roles = (self.applier, self.grasper, self.scissors)
-        if missing := [arm for arm in roles if arm not in self.arms.present_arms]:
-            raise ValueError(f"{', '.join(missing)} is no arm of the scene")
+        self.check_roles(roles, self.pull)
         if len(set(roles)) < len(roles):
             raise ValueError(f"{', '.join(roles)}: applier, grasper and scissors are three arms")
-        if not 0.0 <= self.pull[0] < self.pull[1]:
-            raise ValueError(f"pull {list(self.pull)}: state the least, then the largest")
         return self

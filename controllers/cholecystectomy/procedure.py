@@ -11,6 +11,7 @@ from controllers.cholecystectomy.params import ClipAndCutParams
 from controllers.cholecystectomy.sight import Sight
 from controllers.cholecystectomy.sub_task import FAILURES, Failure, Step, SubTask
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
+from controllers.cholecystectomy.telling import Telling
 from hub.participant import Record, array, choice, flag, integer, number
 from schemas.vectors import Vector
 
@@ -96,10 +97,11 @@ class SurgeonHands(NamedTuple):
     scissors: SurgeonHand
 
 
-class Procedure:
+class Procedure(Telling):
     """The hands, what they see, and the beginning and end of steps."""
 
     def __init__(self, params: ClipAndCutParams, hands: SurgeonHands) -> None:
+        super().__init__()
         self.params, self.hands = params, hands
         self.state = SurgeonState()
         for places in (self.state.clip_places, self.state.further, self.state.leaks):
@@ -107,9 +109,6 @@ class Procedure:
         self.sight: Sight | None = None
         self.fires = False
         """Whether a clip is closed in this step."""
-        self.failure = ""
-        """Sentence after giving up."""
-        self._status: list[str] = []
 
     @property
     def seen(self) -> Sight:
@@ -128,16 +127,6 @@ class Procedure:
         """Return the places of all clips on a tube as they lie, m, shape (n,)."""
         found = np.concatenate([self.state.clip_places[tube], self.state.further[tube]])
         return found[found >= 0.0]
-
-    def statuses(self) -> tuple[str, ...]:
-        """Return and clear the statuses of this step."""
-        said = tuple(self._status)
-        self._status.clear()
-        return said
-
-    def say(self, text: str) -> None:
-        """Add a status."""
-        self._status.append(text)
 
     def enter(self, step: Step) -> None:
         """Begin a step."""
@@ -168,11 +157,8 @@ class Procedure:
     def fail(self, failure: Failure, why: str) -> None:
         """Give up: all hands stay."""
         state = self.state
-        self.failure = f"given up in {self.describe()}: {FAILURES[failure]}: {why}"
-        self.say(self.failure)
+        self.give_up(f" in {self.describe()}: {FAILURES[failure]}: {why}", self.hands)
         state.failure, state.failed = failure, True
-        for hand in self.hands:
-            hand.stay()
         state.sub_task = SubTask.FAILED
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from controllers.motion.params import Arms, SetupJoints
-from hub.participant import Params
-from robots.dvrk.crtk import Mounting
+from controllers.cholecystectomy.routine_params import RoutineParams
 from robots.dvrk.end_effectors.electrode import Electrode
 from robots.dvrk.parameters import ArmName
 from schemas.quantity import Duration, Force, Length, Power
@@ -17,17 +15,10 @@ from schemas.scenario import Name
 __all__ = ["DissectionParams"]
 
 
-class DissectionParams(Params):
+class DissectionParams(RoutineParams):
     """Arms and their instruments, names in the tissue, and the limits of the routine."""
 
-    open_to_pages: ClassVar[bool] = True
-
-    arms: Arms
-    mounting: Mounting = "free"
-    setup_joints: SetupJoints = SetupJoints()
     hook: ArmName = Field(default="PSM1", description="the arm with the cautery hook")
-    grasper: ArmName = Field(default="PSM2", description="the arm that lifts the gallbladder")
-    gallbladder: Name = Field(default="gallbladder", description="name of the organ that is lifted")
     plate: Name = Field(default="cystic_plate", description="name of the attachment that is divided")
     avoid: tuple[Name, ...] = Field(
         default=("liver",), max_length=16, description="organs that the shaft of the hook keeps away from"
@@ -47,17 +38,12 @@ class DissectionParams(Params):
     patience: Duration = Field(
         default=10_000_000_000, gt=0, description="longest time with the hook at a place that does not part"
     )
-    end: bool = Field(default=True, description="whether the session ends with the routine")
 
     @model_validator(mode="after")
     def _is_a_pair(self) -> Self:
-        roles = (self.hook, self.grasper)
-        if missing := [arm for arm in roles if arm not in self.arms.present_arms]:
-            raise ValueError(f"{', '.join(missing)} is no arm of the scene")
+        self.check_roles((self.hook, self.grasper), self.pull)
         if self.hook == self.grasper:
             raise ValueError(f"{self.hook}: hook and grasper are two arms")
         if not isinstance(self.arms.present_arms[self.hook].end_effector, Electrode):
             raise ValueError(f"{self.hook} holds no cautery hook or spatula")
-        if not 0.0 <= self.pull[0] < self.pull[1]:
-            raise ValueError(f"pull {list(self.pull)}: state the least, then the largest")
         return self
