@@ -31,6 +31,8 @@ _AWAY = 0.1
 """Time with power without heat after which the hook goes deeper, s."""
 _DEEPER, _DEEPEST = 0.8e-3, 5.0e-3
 """Length of a way deeper, and of all of them, m."""
+_TOWARDS, _FARTHEST = 0.7, 2.0e-3
+"""Share of the way from a tied place to the gallbladder's wall at which the hook works, and its limit, m."""
 _PAST = 2.5e-3
 """Distance beyond which a tied place is another one, m."""
 
@@ -142,7 +144,13 @@ class Dissector(Lifting):
         is_near = bool(np.linalg.norm(hook.bare_end - place) < _BESIDE)
         way = 0.0 if is_near else _BEFORE
         obstacles = Obstacles.join([self.seen.obstacles, self.grasper_shaft])
-        state.goal[:] = hook.choose(place, state.ahead, state.normal, way, obstacles)
+        try:
+            state.goal[:] = hook.choose(self._beside(place), state.ahead, state.normal, way, obstacles)
+        except MotionError:
+            if state.skipped >= self.params.attempts * state.ties:
+                raise
+            state.skipped += 1
+            return
         state.place[:], state.deeper, state.idle = place, 0.0, 0.0
         hook.state.correction[:] = 0.0
         if is_near:
@@ -160,6 +168,14 @@ class Dissector(Lifting):
         order = np.linalg.norm(edge - self.hook.bare_end, axis=1).argsort(kind="stable")
         place: Vector = edge[order[state.skipped % len(order)]]
         return place
+
+    def _beside(self, place: Vector) -> Vector:
+        """Return where the hook works at a tied place, m, shape (3,): towards the gallbladder's wall."""
+        nodes = self.seen.gallbladder
+        wall = nodes[np.linalg.norm(nodes - place, axis=1).argmin()] - place
+        length = float(np.linalg.norm(wall))
+        found: Vector = place + min(_TOWARDS, _FARTHEST / max(length, 1e-9)) * wall
+        return found
 
     def _hover(self) -> None:
         if self.hook.has_arrived:

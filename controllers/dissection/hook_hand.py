@@ -25,6 +25,9 @@ _YAWS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])
 _ROOMY, _CLEAR = 0.3, 4.0e-3
 """Joint margin, and distance of shaft from tissue (m), beyond which more is no better."""
 
+_TRAVEL = 0.3
+"""What a radian of the joint that turns farthest counts against a pose."""
+
 
 class HookHand(SurgeonHand):
     """An arm with a hook in place of jaws."""
@@ -72,8 +75,10 @@ class HookHand(SurgeonHand):
             clearance(self, pose[None], q[-1:], 0.0, near) for pose, q in zip(poses, joints, strict=True)
         ]
         order = np.linspace(0.0, 0.5, len(poses))
+        travel = _TRAVEL * np.abs(joints[:, -1] - self.joints).max(axis=1)
         room = np.clip(np.array(rooms) / _CLEAR, -1.0, 1.0)
-        score = np.where(margins < MARGIN, -np.inf, np.minimum(margins / _ROOMY, 1.0) + room - order)
+        good = np.minimum(margins / _ROOMY, 1.0) + room - order - travel
+        score = np.where(margins < MARGIN, -np.inf, good)
         if not np.isfinite(score).any():
             x, y, z = (1e3 * place).tolist()
             raise MotionError(

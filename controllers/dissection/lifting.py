@@ -12,6 +12,7 @@ from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.reach import path_margins
 from controllers.cholecystectomy.sight import shaft_of
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
+from controllers.cholecystectomy.telling import Telling
 from controllers.dissection.hook_hand import HookHand
 from controllers.dissection.params import DissectionParams
 from controllers.dissection.sight import Sight
@@ -30,6 +31,8 @@ _SHUT, _PRESSED = 0.0, 0.6
 """Angle of the jaw on tissue (rad), and time to close, s."""
 _STRIDE, _CALM = 1.0e-3, 0.3
 """Length of a stride of the pull (m), and time between strides, s."""
+_SLACK, _LONG = 0.9, 3.0e-3
+"""Share of the least pull below which strides are long, and their length, m."""
 _TAUT = 0.3
 """Share of the pull that leads away from the edge of what is tied; the rest turns the flap over it."""
 _TURNED = radians(115.0)
@@ -77,16 +80,14 @@ class DissectionState(Record):
     failed = flag()
 
 
-class Lifting:
+class Lifting(Telling):
     """The grasper."""
 
     def __init__(self, params: DissectionParams, hook: HookHand, grasper: SurgeonHand) -> None:
+        super().__init__()
         self.params, self.hook, self.grasper = params, hook, grasper
         self.state = DissectionState()
         self.sight: Sight | None = None
-        self.failure = ""
-        """Sentence after giving up."""
-        self._status: list[str] = []
 
     @property
     def seen(self) -> Sight:
@@ -94,27 +95,14 @@ class Lifting:
         assert self.sight is not None
         return self.sight
 
-    def statuses(self) -> tuple[str, ...]:
-        """Return and clear the statuses of this step."""
-        said = tuple(self._status)
-        self._status.clear()
-        return said
-
-    def say(self, text: str) -> None:
-        """Add a status."""
-        self._status.append(text)
-
     def enter(self, step: Step) -> None:
         """Begin a step."""
         self.state.step, self.state.elapsed = step, 0.0
 
     def fail(self, failure: Failure, why: str) -> None:
         """Give up: both hands stay."""
-        self.failure = f"given up: {FAILURES[failure]}: {why}"
-        self.say(self.failure)
+        self.give_up(f": {FAILURES[failure]}: {why}", (self.hook, self.grasper))
         self.state.failure, self.state.failed = failure, True
-        for hand in (self.hook, self.grasper):
-            hand.stay()
         self.enter(Step.FAILED)
 
     def aim_grasp(self) -> None:
@@ -172,7 +160,7 @@ class Lifting:
         if pull > most:
             stride = -_STRIDE
         elif pull < least and state.pulled < self.params.farthest:
-            stride = _STRIDE
+            stride = _STRIDE if pull > _SLACK * least else _LONG
         else:
             return True
         goal = hand.line()
