@@ -41,6 +41,7 @@ export class Pilot {
     addEventListener("keydown", (event) => this.key(event, true))
     addEventListener("keyup", (event) => this.key(event, false))
     addEventListener("blur", () => this.letGo())
+    addEventListener("change", ({ target }) => { if (this.leading) target.blur?.() }) // the keys lead on
     document.addEventListener("visibilitychange", () => { if (document.hidden) this.letGo() })
     setInterval(() => this.send(), PERIOD_MS)
   }
