@@ -18,7 +18,7 @@ from xml.parsers import expat
 
 from schemas.errors import ScenarioError
 
-__all__ = ["BROKEN_ENTRY", "find_archive_problem", "opened_archive", "unpack"]
+__all__ = ["BROKEN_ENTRY", "TERMINALS", "find_archive_problem", "opened_archive", "unpack"]
 
 LARGEST_FILE = 1 << 30
 """Most bytes of an unpacked file."""
@@ -30,8 +30,9 @@ MOST_FILES = 100_000
 
 BROKEN_ENTRY = (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError)
 """Errors of `zipfile` for entries that are damaged, encrypted or packed in an unknown way."""
-_READ_XML = ("modelDescription.xml", "sources/buildDescription.xml")
-"""Files parsed by FMPy."""
+TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
+_READ_XML = ("modelDescription.xml", "sources/buildDescription.xml", TERMINALS)
+"""Files that are parsed."""
 _ENCRYPTED = 1
 """Bit of a ZIP entry's flags (APPNOTE.TXT 4.4.4)."""
 

@@ -16,11 +16,11 @@ def _listed(names: object) -> object:
 _LIST = {"type": "array", "items": {"type": "string"}, "minItems": 1, "maxItems": 3}
 VariableNames = Annotated[
     tuple[str, ...],
-    Field(min_length=1, max_length=3),
+    Field(max_length=3),
     BeforeValidator(_listed),
     WithJsonSchema({"anyOf": [{"type": "string"}, _LIST]}),
 ]
-"""One name, or a list with a name for each degree of freedom."""
+"""One name, or a list with a name for each degree of freedom; empty: by a terminal."""
 
 
 class FmuBond(BaseModel):
@@ -28,17 +28,26 @@ class FmuBond(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    side: Literal["force", "motion"] = Field(
-        description="force: the FMU takes position and velocity and gives a force; motion: the reverse"
+    terminal: str = Field(
+        default="",
+        description=(
+            "terminal of an FMI 3.0 FMU that has a force (inflow or outflow), a position and a velocity, in"
+            " place of `side`, `force`, `position` and `velocity`"
+        ),
+    )
+    side: Literal["force", "motion"] | None = Field(
+        default=None,
+        description="force: the FMU takes position and velocity and gives a force; motion: the reverse",
     )
     force: VariableNames = Field(
+        default=(),
         description=(
             "FMU variable of the force on the motion side, positive along the position, as the adaptors of"
             " the Modelica Standard Library have it; or a list, one for each degree of freedom"
-        )
+        ),
     )
-    position: VariableNames = Field(description="FMU variable of the position, or a list")
-    velocity: VariableNames = Field(description="FMU variable of the velocity, or a list")
+    position: VariableNames = Field(default=(), description="FMU variable of the position, or a list")
+    velocity: VariableNames = Field(default=(), description="FMU variable of the velocity, or a list")
     coordinate: Literal["length", "angle"] | None = Field(
         default=None,
         description="for an FMU without units: m, m/s and N, or rad, rad/s and N m; default: by its units",
@@ -67,8 +76,19 @@ class FmuBond(BaseModel):
     )
 
     @model_validator(mode="after")
-    def _has_numbers_of_its_side(self) -> Self:
-        rules = ("stiffness", "damping") if self.side == "motion" else ("effective_mass",)
-        if wrong := [name for name in rules if getattr(self, name) is not None]:
-            raise ValueError(f"a {self.side} side has no {' and no '.join(wrong)}")
+    def _is_stated_once(self) -> Self:
+        stated = [name for name in ("side", "force", "position", "velocity") if getattr(self, name)]
+        if self.terminal and stated:
+            raise ValueError(f"a terminal says what is {', '.join(stated)}: state one or the other")
+        if self.terminal:
+            return self
+        if missing := [n for n in ("side", "force", "position", "velocity") if n not in stated]:
+            raise ValueError(f"{', '.join(missing)} missing: state these, or a terminal of the FMU")
+        self.check_side(self.side)
         return self
+
+    def check_side(self, side: str | None) -> None:
+        """Raise ValueError for a number of the side opposite to `side`."""
+        rules = ("stiffness", "damping") if side == "motion" else ("effective_mass",)
+        if wrong := [name for name in rules if getattr(self, name) is not None]:
+            raise ValueError(f"a {side} side has no {' and no '.join(wrong)}")

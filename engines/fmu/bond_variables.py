@@ -19,7 +19,7 @@ from schemas.quantity import to_si
 if TYPE_CHECKING:
     from fmpy.model_description import ModelVariable
 
-__all__ = ["BondVariables", "Quantity", "find_bond"]
+__all__ = ["BondVariables", "Quantity", "find_bond", "is_multiple"]
 
 _ROLES = ("position", "velocity", "force")
 _MOST_DOF = 3
@@ -31,7 +31,7 @@ class Quantity:
 
     variables: tuple[Variable, ...]
     factor: float
-    """SI units in a unit of the FMU."""
+    """SI units in a unit of the FMU; below 0: the FMU counts the other way."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,7 @@ def find_bond(
     params: FmuBond,
     rows: Sequence[ModelVariable],
     variables: Mapping[str, Sequence[Variable]],
+    sign: float = 1.0,
 ) -> BondVariables:
     """Return the bond `name` of the FMU at `path`.
 
@@ -67,11 +68,13 @@ def find_bond(
         params: the bond as stated.
         rows: variables of the FMU's description.
         variables: exchanged variables by causality, `input` and `output`.
+        sign: of the FMU's force, 1 or -1.
 
     Raises:
         ScenarioError: A variable is missing, has another causality or type, or units and sizes do not fit.
     """
     where = ("bonds", name)
+    assert params.side is not None  # stated, or by a terminal
     found: dict[str, tuple[Variable, ...]] = {}
     for role in _ROLES:
         causality = "input" if (role == "force") == (params.side == "motion") else "output"
@@ -107,7 +110,8 @@ def find_bond(
         damping=params.damping,
         effective_mass=params.effective_mass,
     )
-    return BondVariables(side, *(Quantity(found[role], factors[role]) for role in _ROLES))
+    signs = {role: sign if role == "force" else 1.0 for role in _ROLES}
+    return BondVariables(side, *(Quantity(found[role], signs[role] * factors[role]) for role in _ROLES))
 
 
 def _coordinate(
@@ -127,6 +131,11 @@ def _coordinate(
         if params.coordinate in (None, coordinate)
     )
     raise ScenarioError(f"'{path}' states {have}; a bond needs {allowed}, or multiples", path=where)
+
+
+def is_multiple(unit: str, target: str) -> bool:
+    """Return whether a unit in FMI's spelling has the dimension of `target`."""
+    return math.isfinite(next(_factors({unit}, target)))
 
 
 def _factors(units: set[str], target: str) -> Iterator[float]:

@@ -17,6 +17,7 @@ from engines.fmu.clock import Clock, clock_of
 from engines.fmu.model import interface_of, read_model, suggested_tolerance
 from engines.fmu.sources import listed_sources
 from engines.fmu.start import Start, declared_start, given_start, settable, size_of, unit_of
+from engines.fmu.terminals import matched_bond, read_terminals
 from engines.fmu.texts import MESSAGES, TextVariable
 from engines.fmu.tunable import tunable_parameters
 from engines.fmu.variables import Variable, number_type, port_name
@@ -115,7 +116,7 @@ def describe(
         if variable is not None:
             variables[row.causality].append(variable)
             ports.append(_port(row, variable, _input_start(path, row, variable, starts, strict=strict)))
-    found = [find_bond(path, name, one, model.modelVariables, variables) for name, one in bonds.items()]
+    found = list(_bonds(path, bonds, model.modelVariables, variables))
     bonded = _bonded_inputs(found)
     numbers = {name: float(one.value[0]) for name, one in starts.items() if not isinstance(one.value, bytes)}
     tuned = list(tunable_parameters(path, model.modelVariables, major, tunable, numbers))
@@ -165,6 +166,18 @@ def _clocks(path: Path, model: ModelDescription, part: InterfaceType) -> tuple[C
             " co-simulation to let them tick. Export it for co-simulation with event mode, or without clocks."
         )
     return ()
+
+
+def _bonds(
+    path: Path,
+    bonds: Mapping[str, FmuBond],
+    rows: Sequence[ModelVariable],
+    variables: Mapping[str, Sequence[Variable]],
+) -> Iterator[BondVariables]:
+    terminals = read_terminals(path) if any(one.terminal for one in bonds.values()) else {}
+    for name, one in bonds.items():
+        bond, sign = matched_bond(path, name, one, terminals, rows)
+        yield find_bond(path, name, bond, rows, variables, sign)
 
 
 def _bonded_inputs(bonds: Sequence[BondVariables]) -> dict[str, str]:

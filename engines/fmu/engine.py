@@ -24,7 +24,7 @@ from engines.fmu.conversions import ConvertedInputs, InputConversion, convert_po
 from engines.fmu.coupling import Coupling
 from engines.fmu.description import Description, describe
 from engines.fmu.fmi2 import Fmi2Instance
-from engines.fmu.fmi3 import Fmi3Instance
+from engines.fmu.fmi3 import Fmi3Instance, co_simulation_notes
 from engines.fmu.instance import Instance
 from engines.fmu.model_exchange import Fmi2ModelExchange, Fmi3ModelExchange, default_tolerance
 from engines.fmu.repeated_reads import warn_of_changes
@@ -174,10 +174,10 @@ class FmuEngine(Stepped):
 
     @property
     def integration(self) -> str:
-        """Solver of model exchange, for the plan."""
+        """Solver of model exchange, or what of FMI 3.0's co-simulation is used, for the plan."""
         description = self._description
         if description.co_simulation is not None:
-            return ""
+            return co_simulation_notes(description.co_simulation) if description.major == 3 else ""
         tolerance = self.params.tolerance or default_tolerance(description.tolerance)
         return f"model exchange, integrated by CVode (SUNDIALS), relative tolerance {tolerance:g}"
 
@@ -215,6 +215,10 @@ class FmuEngine(Stepped):
         if description.tunable:
             self._tunable = TunableParameters(instance, description.tunable, description.ports)
         self._has_clocks = bool(description.clocks)
+        # what has ticked until now leaves with the first step: a message at time 0 has no reader
+        self._outputs |= {
+            port.name: () for clock in description.clocks if not clock.is_input for port in clock.ports
+        }
         is_whole = step in (None, setup.period_ns)
         self._is_plain = is_whole and not (
             self._bonds

@@ -6,6 +6,7 @@ import ctypes
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,12 +23,27 @@ from hub.participant import Inputs
 from schemas.errors import SessionError
 from schemas.ros import EmptyMessage
 
-__all__ = ["Fmi3Instance"]
+if TYPE_CHECKING:
+    from fmpy.model_description import CoSimulation
+
+__all__ = ["Fmi3Instance", "co_simulation_notes"]
 
 _SAME_INSTANT_S = 0.5e-9
 """Simulated time has whole nanoseconds: times nearer than half a nanosecond are the same instant."""
 _MOST_EVENTS = 10_000
 """Most events in a step. An FMU with more events stands still (a Zeno point), and a session must not hang."""
+
+
+def co_simulation_notes(interface: CoSimulation) -> str:
+    """Return what is used of an FMU's event mode, early return and intermediate update, for the plan."""
+    notes: list[str] = []
+    if interface.hasEventMode:
+        notes.append("events at their time, inside a step")
+    elif interface.mightReturnEarlyFromDoStep:
+        notes.append("a step that returns early goes on to its end")
+    if interface.providesIntermediateUpdate:
+        notes.append("intermediate update is not used: values are exchanged at the ends of steps")
+    return f"FMI 3.0 co-simulation: {'; '.join(notes)}" if notes else ""
 
 
 class Fmi3Instance(Instance):

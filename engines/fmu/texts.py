@@ -71,16 +71,15 @@ class Text:
         """Return the FMU's value: UTF-8 or bytes."""
         self._call("Get")
         address, size = self._value[0], self._size[0]
-        if self._is_binary:
-            if address is None and size:
-                raise SessionError(f"'{self.name}' has {size} bytes and no address of them")
-            self._check_size(size)
-            return ctypes.string_at(address, size) if size else b""
+        if address is None and not (self._is_binary and size == 0):
+            what = f"{size} bytes" if self._is_binary else "a text"
+            raise SessionError(f"'{self.name}' has no value: the FMU returned a null pointer for {what}")
         if address is None:
-            raise SessionError(f"'{self.name}' is no text: the FMU returned a null pointer")
-        text = ctypes.string_at(address)
-        self._check_size(len(text))
-        return text
+            return b""
+        self._check_size(size if self._is_binary else 0)
+        value = ctypes.string_at(address, size) if self._is_binary else ctypes.string_at(address)
+        self._check_size(len(value))
+        return value
 
     def write(self, value: bytes) -> None:
         """Set the value: UTF-8 without a zero byte, or bytes."""

@@ -40,6 +40,8 @@ class CoSimulation(InterfaceType):
     canHandleVariableCommunicationStepSize: bool
     canInterpolateInputs: bool
     hasEventMode: bool
+    mightReturnEarlyFromDoStep: bool
+    providesIntermediateUpdate: bool
 
 class SourceFileSet:
     sourceFiles: list[str]

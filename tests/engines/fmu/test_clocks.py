@@ -7,9 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 from engines.fmu.engine import FmuEngine, FmuParams
-from hub.participant import Inputs, Setup
+from hub.command_line.app import app as command_line
+from hub.participant import Inputs, Outputs, Setup, Stepped, event_out
+from hub.planning.scenario_file import load
+from hub.recording.recording import Recording
+from hub.session.launch import launch
+from hub.verify import verify
 from schemas.errors import ScenarioError, SessionError
 from schemas.ros import EmptyMessage
 from tests.engines.fmu.driving import BALL, MS, Make, inputs_of, ports
@@ -115,6 +121,48 @@ def test_a_saved_state_has_ticks_and_held_outputs(metronome: Any) -> None:
     held = without_bell(engine._outputs)
     assert (held["beats"], held["hits"], held["sampled"]) == ([3.0], [26.0], [48.0])
     assert go_on() == expected
+
+
+class Tapper(Stepped):
+    """Taps in each fourth step."""
+
+    ports = (event_out("tap", EmptyMessage),)
+
+    def configure(self, setup: Setup) -> Outputs:
+        self._period = setup.period_ns
+        return {"tap": ()}
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
+        return {"tap": (EmptyMessage(),) if t // self._period % 4 == 0 else ()}
+
+    def state_hash(self) -> int:
+        return 0
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+@pytest.mark.parametrize("host", ["", ", host: fmu"])
+def test_clocks_tick_in_a_session_that_verifies(library: Path, tmp_path: Path, host: str) -> None:
+    """Taps tick the first metronome, whose bell ticks the second; both beat by themselves."""
+    build.pack(METRONOME, library, tmp_path / "metronome.fmu")
+    (tmp_path / "beats.yaml").write_text(
+        "name: beats\nstep: 10 ms\nduration: 800 ms\nparticipants:\n"
+        f'  tapper: {{kind: "{__name__}:Tapper"}}\n'
+        "  first: {kind: fmu, path: metronome.fmu}\n"
+        f"  second: {{kind: fmu, path: metronome.fmu{host}}}\n"
+        "connections: [tapper.tap -> first.hit, first.bell -> second.hit]\n"
+    )
+    checked = CliRunner().invoke(command_line, ["check", str(tmp_path / "beats.yaml")])
+    assert "FMI 3.0 co-simulation: events at their time, inside a step" in checked.output
+    summary = launch(load(str(tmp_path / "beats.yaml")), record=tmp_path / "recording").run()
+    assert summary.state == "done"
+    recording = Recording(tmp_path / "recording")
+    assert len(recording["tapper.tap"]) == 20
+    assert len(recording["first.bell"]) == 10
+    ends = {name: recording[name].values[-1, 0] for name in ("first.hits", "second.hits", "second.beats")}
+    assert ends == {"first.hits": 20, "second.hits": 10, "second.beats": 8}
+    assert verify(recording, trust=True).same
 
 
 class TestRefusals:

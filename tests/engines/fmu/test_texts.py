@@ -129,7 +129,7 @@ class TestBadValues:
             notes(start={"fault": NOT_UTF8})
 
     def test_no_address(self, notes: Any) -> None:
-        with pytest.raises(SessionError, match="'said' is no text: the FMU returned a null pointer"):
+        with pytest.raises(SessionError, match="'said' has no value: the FMU returned a null pointer"):
             notes(start={"fault": NO_ADDRESS})
 
     def test_an_error_of_the_fmu(self, notes: Any) -> None:

@@ -21,6 +21,7 @@ FOLDERS = {
     "hopper": "linux64",
     "metronome": "x86_64-linux",
     "notes": "linux64",
+    "flanges": "x86_64-linux",
 }
 """Platform folders of FMI 2.0 and 3.0."""
 
@@ -53,6 +54,8 @@ def pack(
         text = text.replace(old, new)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", text)
+        if (terminals := HERE / model / "terminalsAndIcons.xml").exists():
+            archive.write(terminals, f"terminalsAndIcons/{terminals.name}")
         if library:
             archive.write(library, f"binaries/{folder or FOLDERS[model]}/{library.name}")
     return path
