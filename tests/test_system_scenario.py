@@ -39,6 +39,21 @@ def test_styluses_lead_instruments_through_aligned_masters(tmp_path: Path) -> No
     assert summary.measures["rests"] < 1e-4
 
 
+@pytest.mark.parametrize(
+    "lead",
+    [
+        "{kind: browser-pair, host: remote}",
+        "{kind: touch, styluses: {right: {device: right}, left: {device: left}}}",
+    ],
+)
+def test_one_setting_lets_a_page_or_styluses_lead_both_hands(lead: str) -> None:
+    loaded = load("system", [f"participants.lead={lead}"])
+    plan, _ = plan_of(loaded.scenario, loaded.params)
+    led = {(one.source_port, one.target) for one in plan.from_devices if one.source == "lead"}
+    for side in ("right", "left"):
+        assert {(f"{side}/pose", f"{side}_hand"), (f"{side}/buttons", f"{side}_hand")} <= led
+
+
 def test_what_is_measured_of_a_master_reaches_the_drives_in_the_same_step() -> None:
     loaded = load("system")
     plan, _ = plan_of(loaded.scenario, loaded.params)

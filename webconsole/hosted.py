@@ -8,6 +8,7 @@ import threading
 from functools import partial
 
 from devices.browser import PageInput, hand_of
+from devices.browser.pair import BrowserPair
 from devices.keyboard.virtual_stylus import Wish
 from devices.vendor_axes import Quaternion, Vector3, quaternion, vector
 from hub.planning.plan import Plan
@@ -23,7 +24,7 @@ __all__ = ["HostedDevices"]
 
 log = logging.getLogger(__name__)
 
-_KIND = "browser"
+_KIND, _PAIR = "browser", "browser-pair"
 _PATIENCE_S = 2.0
 
 
@@ -32,7 +33,7 @@ class _StopError(Exception):
 
 
 class HostedDevices:
-    """Hosts the devices of kind `browser` of each session shown, and offers the devices to pilots."""
+    """Hosts the devices of kinds `browser` and `browser-pair` of each session shown, and their hands."""
 
     def __init__(self, pilots: Pilots) -> None:
         self._pilots = pilots
@@ -46,32 +47,35 @@ class HostedDevices:
 
         Each device is offered once the device takes part: a page's earlier input would wait until then.
         """
-        led = [
-            name
+        led = {
+            name: BrowserPair.led(name) if planned.kind == _PAIR else (name,)
             for name, planned in plan.participants.items()
-            if planned.kind == _KIND and planned.host.startswith("remote/")
-        ]
-        self._pilots.keep(led)
-        for name in led:
+            if planned.kind in (_KIND, _PAIR) and planned.host.startswith("remote/")
+        }
+        self._pilots.keep([hand for hands in led.values() for hand in hands])
+        for name, hands in led.items():
             self._endpoints[name] = endpoint
             held = self._threads.get(name)
             if held is None or not held.is_alive():
-                self._threads[name] = threading.Thread(target=self._host, args=(name,), daemon=True)
+                self._threads[name] = threading.Thread(target=self._host, args=(name, hands), daemon=True)
                 self._threads[name].start()
 
-    def _host(self, name: str) -> None:
-        hand_of(name).served = True
+    def _host(self, name: str, hands: tuple[str, ...]) -> None:
+        for hand in hands:
+            hand_of(hand).served = True
         request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
         host = DeviceHost(name, lambda: reach(self._endpoints[name], name), Keys("*"), request, None)
-        hand = hand_of(name)
-        offer = Offer(partial(_give_hand, name), lambda: hand.obedience, hand.ask_for)
-        host.joined = partial(self._pilots.offer, name, offer)
+        host.joined = partial(self._offer, hands)
         try:
             host.serve(self._check)
         except TrocarError as error:
             log.warning("'%s' cannot be led from pages of this server: %s", name, error)
         except _StopError:
             log.debug("'%s' is no longer hosted", name)
+
+    def _offer(self, hands: tuple[str, ...]) -> None:
+        for name in hands:
+            self._pilots.offer(name, _offer_of(name))
 
     def _check(self) -> None:
         if self._ending.is_set():
@@ -82,6 +86,11 @@ class HostedDevices:
         self._ending.set()
         for thread in self._threads.values():
             thread.join(_PATIENCE_S)
+
+
+def _offer_of(device: str) -> Offer:
+    hand = hand_of(device)
+    return Offer(partial(_give_hand, device), lambda: hand.obedience, hand.ask_for)
 
 
 def _give_hand(device: str, hand: Hand | None) -> None:

@@ -39,8 +39,8 @@ Everything = Annotated[
 OneHost = Annotated[bool, typer.Option("--one-host", help="Run every participant in the hub's process.")]
 
 
-_PAGE_DEVICE = "browser"
-"""Kind of a device led from a page."""
+_PAGE_DEVICES = ("browser", "browser-pair")
+"""Kinds of devices led from a page."""
 
 
 def require_complete(summary: Summary) -> None:
@@ -102,7 +102,7 @@ def run(
             profile=profile,
         )
         delete_earlier(directory)
-        led = any(spec.kind == _PAGE_DEVICE for spec in file.scenario.participants.values())
+        led = any(spec.kind in _PAGE_DEVICES for spec in file.scenario.participants.values())
         with page_of_this_process() if open_page or (led and open_page is None) else nullcontext():
             with RunProgress(session.scenario, name) as progress:
                 summary = session.run(progress)

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from devices.browser.device import Browser, BrowserParams
-from devices.browser.page_hand import Obedience, PageHand, PageInput
+from devices.browser.page_hand import Obedience, PageHand, PageInput, hand_of
+from devices.browser.pair import BrowserPair
 from devices.keyboard.virtual_stylus import Wish
 from hub.testing import check_device
 
@@ -213,3 +214,21 @@ def test_an_instrument_asked_for_is_forgotten_with_the_lead(page):
     page.hand.ask_for("ROUND_TIP_SCISSORS:400007[..]")
     page.hand.release()
     assert "set_tool_type" not in page.ask(100)
+
+
+def test_a_pair_is_a_device_with_the_ports_of_two_styluses():
+    check_device(lambda: BrowserPair("pair", BrowserParams()))
+    names = {port.name for port in BrowserPair("pair", BrowserParams()).ports}
+    assert {"right/pose", "right/buttons", "left/pose", "left/gripper"} <= names
+
+
+def test_each_hand_of_a_pair_is_led_by_itself():
+    with BrowserPair("two", BrowserParams()) as pair:
+        pair.open(Path())
+        pair.read(4 * MS)
+        hand_of("two/left").give(PageInput(Wish(linear=(0.0, 0.0, 1.0), dead_man=True)))
+        samples = pair.read(8 * MS)
+        ports = {sample.port for sample in samples}
+        assert {"left/pose", "left/buttons"} <= ports
+        assert not {"right/pose", "right/buttons"} & ports
+        hand_of("two/left").release()
