@@ -30,8 +30,8 @@ _EXTENSIONS = (
         [
             f"engines/fem/_{part}.c"
             for part in (
-                *("solid", "step", "elements", "elements_avx", "contact", "rigid", "topology", "cut"),
-                *("blade", "ties", "together", "touch", "pairs", "attach"),
+                *("solid", "step", "elements", "elements_avx", "elements_avx512", "contact", "rigid"),
+                *("topology", "cut", "blade", "ties", "together", "touch", "pairs", "attach"),
             )
         ],
         depends=[

@@ -27,10 +27,13 @@ typedef struct {
     int32_t node;
     const int32_t *face; /* nodes */
     int cycle; /* sub-steps */
+    int is_there;   /* in this step: it has not parted, and its tissue is there */
     int is_whole;
     int is_clamped; /* nodes of both sides cannot move, as an instrument holds them */
+    float *velocity, *against[3]; /* of the node, and of the nodes of the face */
+    double own, its[3]; /* inverse masses of these */
     double normal[3], turn[3][3]; /* how a motion of each node of the face along the normal turns the normal */
-    double mass[9], open[3], opening, most, pushed[3];
+    double mass[9], open[3], recovery[3], opening, most, pushed[3];
 } Tie;
 
 struct Attach {
@@ -80,24 +83,12 @@ static int find_nodes(const Attach *attach, int k)
         return 0;
     }
     tie->node = *corner_of(tie->body, place[1] / 4, place[1] % 4);
+    tie->velocity = tie->body->velocity + 4 * tie->node, tie->own = (double)tie->body->inverse_mass[tie->node];
+    for (int a = 0; a < 3; a++) {
+        tie->against[a] = tie->other->velocity + 4 * tie->face[a];
+        tie->its[a] = (double)tie->other->inverse_mass[tie->face[a]];
+    }
     return 1;
-}
-
-/* Mark the nodes of whole ties: between them there is no contact. */
-void begin_attach(Attach *attach, int bodies)
-{
-    memset(attach->force, 0, sizeof(double) * 3 * (size_t)attach->count);
-    for (int b = 0; b < bodies; b++)
-        for (int i = 0; i < attach->body[b]->nodes; i++)
-            attach->body[b]->flags[i] &= (uint8_t)~TIED;
-    for (int k = 0; k < attach->count; k++)
-        if (find_nodes(attach, k)) {
-            Tie *tie = attach->tie + k;
-            tie->body->flags[tie->node] |= TIED;
-            for (int a = 0; a < 3; a++)
-                tie->other->flags[tie->face[a]] |= TIED;
-            tie->cycle = tie->body->every > tie->other->every ? tie->body->every : tie->other->every;
-        }
 }
 
 /* Whether neither the node nor all of the face can move, and an instrument holds some of them. */
@@ -109,6 +100,26 @@ static int is_clamped(const Tie *tie)
         held |= tie->other->holder[tie->face[a]] >= 0;
     }
     return held && still && tie->body->inverse_mass[tie->node] == 0.0f;
+}
+
+/* Find the nodes of whole ties, which stay the same in a step, and mark them: between them there is no contact. */
+void begin_attach(Attach *attach, int bodies)
+{
+    memset(attach->force, 0, sizeof(double) * 3 * (size_t)attach->count);
+    for (int b = 0; b < bodies; b++)
+        for (int i = 0; i < attach->body[b]->nodes; i++)
+            attach->body[b]->flags[i] &= (uint8_t)~TIED;
+    for (int k = 0; k < attach->count; k++) {
+        Tie *tie = attach->tie + k;
+        tie->is_there = find_nodes(attach, k);
+        if (tie->is_there) {
+            tie->is_clamped = is_clamped(tie);
+            tie->body->flags[tie->node] |= TIED;
+            for (int a = 0; a < 3; a++)
+                tie->other->flags[tie->face[a]] |= TIED;
+            tie->cycle = tie->body->every > tie->other->every ? tie->body->every : tie->other->every;
+        }
+    }
 }
 
 static void place_of(const Attach *attach, int body, int32_t node, double x[3])
@@ -134,17 +145,17 @@ static int invert(const double m[9], double out[9])
 /* Set how the normal of a face turns, and the mass of a tie: a shear across a gap turns the face as well. */
 static int weigh(Tie *tie, const double *rest, double corner[3][3], double twice)
 {
-    double inverse[9] = {0.0}, own = (double)tie->body->inverse_mass[tie->node];
-    inverse[0] = inverse[4] = inverse[8] = own;
+    double inverse[9] = {0.0};
+    inverse[0] = inverse[4] = inverse[8] = tie->own;
     for (int a = 0; a < 3; a++) {
-        double edge[3], its = (double)tie->other->inverse_mass[tie->face[a]], *turn = tie->turn[a];
+        double edge[3], its = tie->its[a], *turn = tie->turn[a];
         for (int i = 0; i < 3; i++)
             edge[i] = (corner[(a + 2) % 3][i] - corner[(a + 1) % 3][i]) / twice;
         cross(tie->normal, edge, turn);
         for (int i = 0; i < 3; i++)
             turn[i] *= rest[3];
         for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++)
+            for (int j = i; j < 3; j++) /* `invert` reads no more */
                 inverse[3 * i + j] += its * ((i == j ? rest[a] * rest[a] : 0.0) + turn[i] * turn[j] -
                                              rest[a] * (turn[i] * tie->normal[j] + tie->normal[i] * turn[j]));
     }
@@ -158,9 +169,8 @@ static int open_tie(const Attach *attach, int k, double seconds)
     const double *rest = attach->rest + 4 * k;
     Tie *tie = attach->tie + k;
     double corner[3][3], x[3], u[3], v[3];
-    if (!find_nodes(attach, k))
+    if (!tie->is_there || isinf(attach->widest[k]))
         return 0;
-    tie->is_clamped = is_clamped(tie);
     place_of(attach, place[0], tie->node, x);
     for (int a = 0; a < 3; a++)
         place_of(attach, place[2], tie->face[a], corner[a]);
@@ -173,6 +183,8 @@ static int open_tie(const Attach *attach, int k, double seconds)
     for (int i = 0; i < 3; i++)
         tie->open[i] = x[i] - rest[0] * corner[0][i] - rest[1] * corner[1][i] - rest[2] * corner[2][i] -
                        rest[3] * tie->normal[i];
+    for (int i = 0; i < 3; i++)
+        tie->recovery[i] = tie->open[i] / RECOVERY;
     double push = dot(tie->open, tie->normal);
     tie->opening = sqrt(fmax(0.0, dot(tie->open, tie->open) - (push < 0.0 ? push * push : 0.0)));
     double last = attach->law[2 * k + 1], widest = attach->widest[k], bears = 1.0 - widest / last;
@@ -193,9 +205,9 @@ static double pull_of(const Tie *tie, const double impulse[3])
 static void opening_speed(const Tie *tie, const double *rest, double speed[3])
 {
     for (int i = 0; i < 3; i++)
-        speed[i] = (double)tie->body->velocity[4 * tie->node + i];
+        speed[i] = (double)tie->velocity[i];
     for (int a = 0; a < 3; a++) {
-        const float *v = tie->other->velocity + 4 * tie->face[a];
+        const float *v = tie->against[a];
         double along = (double)v[0] * tie->normal[0] + (double)v[1] * tie->normal[1] + (double)v[2] * tie->normal[2];
         for (int i = 0; i < 3; i++)
             speed[i] += along * tie->turn[a][i] - rest[a] * (double)v[i];
@@ -205,13 +217,11 @@ static void opening_speed(const Tie *tie, const double *rest, double speed[3])
 /* Change the velocities by an impulse on the node, and against it on the face. */
 static void strike(const Tie *tie, const double *rest, const double impulse[3])
 {
-    float *velocity = tie->body->velocity + 4 * tie->node;
-    double own = (double)tie->body->inverse_mass[tie->node];
     for (int i = 0; i < 3; i++)
-        velocity[i] = (float)((double)velocity[i] + own * impulse[i]);
+        tie->velocity[i] = (float)((double)tie->velocity[i] + tie->own * impulse[i]);
     for (int a = 0; a < 3; a++) {
-        float *against = tie->other->velocity + 4 * tie->face[a];
-        double its = (double)tie->other->inverse_mass[tie->face[a]], turning = dot(tie->turn[a], impulse);
+        float *against = tie->against[a];
+        double its = tie->its[a], turning = dot(tie->turn[a], impulse);
         for (int i = 0; i < 3; i++)
             against[i] = (float)((double)against[i] + its * (turning * tie->normal[i] - rest[a] * impulse[i]));
     }
@@ -225,7 +235,7 @@ static double resolve(const Attach *attach, int k)
     double wanted[3], change[3], speed[3];
     opening_speed(tie, rest, speed);
     for (int i = 0; i < 3; i++)
-        speed[i] += tie->open[i] / RECOVERY;
+        speed[i] += tie->recovery[i];
     for (int i = 0; i < 3; i++)
         wanted[i] = tie->pushed[i] - dot(tie->mass + 3 * i, speed);
     double along = dot(wanted, tie->normal), push = along > 0.0 ? along : 0.0, pull = pull_of(tie, wanted);

@@ -26,10 +26,9 @@ static inline void position(const Body *body, int32_t node, float x[3])
         x[i] = body->rest[4 * node + i] + body->displacement[4 * node + i];
 }
 
-/* Write the faces that a sphere may touch within a step; return how many. */
-int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_steps, int *near, int most)
+/* The box that a sphere may touch within a step. */
+static void sweep_box(const Spheres *spheres, int sphere, int sub_steps, float low[3], float high[3])
 {
-    float low[3], high[3];
     for (int i = 0; i < 3; i++) {
         double least = INFINITY, largest = -INFINITY;
         for (int k = 0; k <= sub_steps; k++) {
@@ -39,21 +38,75 @@ int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_step
         float reach = (float)spheres->radius[sphere] + 2.0f * AHEAD;
         low[i] = (float)least - reach, high[i] = (float)largest + reach;
     }
-    int found = 0;
-    for (int t = 0; t < body->faces && found < most; t++) {
-        if (body->surface[3 * t] < 0)
-            continue; /* its element has gone */
-        float x[3][3];
-        int is_near = 1;
-        for (int a = 0; a < 3; a++)
-            position(body, body->surface[3 * t + a], x[a]);
+}
+
+/* The box around all nodes. */
+static void body_box(const Body *body, float low[3], float high[3])
+{
+    low[0] = low[1] = low[2] = INFINITY, high[0] = high[1] = high[2] = -INFINITY;
+    for (int n = 0; n < body->nodes; n++) {
+        float x[3];
+        position(body, n, x);
         for (int i = 0; i < 3; i++)
-            is_near &= !(x[0][i] < low[i] && x[1][i] < low[i] && x[2][i] < low[i]) &
-                       !(x[0][i] > high[i] && x[1][i] > high[i] && x[2][i] > high[i]);
-        if (is_near)
-            near[found++] = t;
+            low[i] = x[i] < low[i] ? x[i] : low[i], high[i] = x[i] > high[i] ? x[i] : high[i];
     }
-    return found;
+}
+
+/* Write the lower and upper ends of each face, (6, faces); those of a face that has gone are beyond all boxes. */
+static void face_boxes(const Body *body, float *ends)
+{
+    for (int t = 0; t < body->faces; t++) {
+        const int32_t *node = body->surface + 3 * t;
+        float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+        for (int a = 0; a < 3 && node[0] >= 0; a++) {
+            float x[3];
+            position(body, node[a], x);
+            for (int i = 0; i < 3; i++)
+                low[i] = x[i] < low[i] ? x[i] : low[i], high[i] = x[i] > high[i] ? x[i] : high[i];
+        }
+        for (int i = 0; i < 3; i++)
+            ends[i * body->faces + t] = low[i], ends[(3 + i) * body->faces + t] = high[i];
+    }
+}
+
+/* Write the faces whose boxes meet a box, after their number. */
+static void meet_box(const Body *body, const float *ends, const float low[3], const float high[3], int *near)
+{
+    int found = 0, faces = body->faces;
+    const float *least = ends, *most = ends + 3 * faces;
+    for (int t = 0; t < faces; t++) {
+        near[1 + found] = t;
+        found += (least[t] <= high[0]) & (most[t] >= low[0]) & (least[faces + t] <= high[1]) &
+                 (most[faces + t] >= low[1]) & (least[2 * faces + t] <= high[2]) & (most[2 * faces + t] >= low[2]);
+    }
+    near[0] = found;
+}
+
+/* Write for each sphere the faces that it may touch within a step, after their number, `room` apart; return -1 without
+memory. */
+int find_all_near(const Body *body, const Spheres *spheres, int sub_steps, int *near, int room)
+{
+    float bottom[3], top[3], *ends = NULL;
+    body_box(body, bottom, top);
+    for (int s = 0; s < spheres->count; s++) {
+        float low[3], high[3];
+        int meets = spheres->free[s];
+        sweep_box(spheres, s, sub_steps, low, high);
+        for (int i = 0; i < 3; i++)
+            meets &= bottom[i] <= high[i] && top[i] >= low[i];
+        near[room * s] = 0;
+        if (!meets)
+            continue;
+        if (ends == NULL) {
+            ends = PyMem_RawMalloc(sizeof(float) * 6 * (size_t)(body->faces + 1));
+            if (ends == NULL)
+                return -1;
+            face_boxes(body, ends);
+        }
+        meet_box(body, ends, low, high, near + room * s);
+    }
+    PyMem_RawFree(ends);
+    return 0;
 }
 
 /* Fill in the contact of a face with a sphere at `centre`; return whether there is one. */

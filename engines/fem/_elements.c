@@ -11,15 +11,24 @@ own that follows E with the time constant of the branch.
 #include "_lanes.h"
 #include "_forces.h"
 
-/* Number of the first blocks that go two at a time. */
-static int paired_blocks(const Body *body)
+typedef struct {
+    void (*add_volumes)(const Body *, int, int);
+    void (*add_forces)(const Body *, float, int, int);
+    int blocks; /* at a time */
+} Kind;
+
+/* Kinds of lanes of this processor, the widest first. */
+static int kinds_here(Kind kinds[3])
 {
+    int count = 0;
 #ifdef HAS_AVX
-    return __builtin_cpu_supports("avx") ? body->blocks & ~1 : 0;
-#else
-    (void)body;
-    return 0;
+    if (__builtin_cpu_supports("avx512f"))
+        kinds[count++] = (Kind){add_volumes_avx512, add_forces_avx512, 4};
+    if (__builtin_cpu_supports("avx"))
+        kinds[count++] = (Kind){add_volumes_avx, add_forces_avx, 2};
 #endif
+    kinds[count++] = (Kind){add_volumes, add_forces, 1};
+    return count;
 }
 
 /* Set the pressure at every node by the volume around. */
@@ -35,15 +44,19 @@ static void set_pressures(const Body *body)
 /* Set the forces of all elements on the nodes; viscous strains advance by `seconds`. */
 void elastic_forces(const Body *body, float seconds)
 {
-    int paired = paired_blocks(body);
+    Kind kinds[3];
+    int count = kinds_here(kinds), first = 0;
     memset(body->force, 0, sizeof(float) * 4 * (size_t)body->nodes);
-#ifdef HAS_AVX
-    add_volumes_avx(body, 0, paired);
-#endif
-    add_volumes(body, paired, body->blocks);
+    for (int k = 0; k < count; k++) {
+        int last = body->blocks / kinds[k].blocks * kinds[k].blocks;
+        kinds[k].add_volumes(body, first, last);
+        first = last;
+    }
     set_pressures(body);
-#ifdef HAS_AVX
-    add_forces_avx(body, seconds, 0, paired);
-#endif
-    add_forces(body, seconds, paired, body->blocks);
+    first = 0;
+    for (int k = 0; k < count; k++) {
+        int last = body->blocks / kinds[k].blocks * kinds[k].blocks;
+        kinds[k].add_forces(body, seconds, first, last);
+        first = last;
+    }
 }

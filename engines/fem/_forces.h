@@ -5,13 +5,24 @@
 
 #define ROW(values, node) ((values) + 4u * (uint32_t)(node)) /* unsigned: one instruction less than with a sign */
 
+/* Rows of the nodes that a corner has in one lane of each block. */
+static inline Lanes rows_of(const float *values, const int32_t *node)
+{
+    return ROWS(ROW(values, node[0]), ROW(values, node[16]), ROW(values, node[32]), ROW(values, node[48]));
+}
+
 /* Gather the numbers of a corner's node, by lane. */
 static inline void gather(const float *values, const int32_t *node, Lanes out[4])
 {
-    Lanes a = ROWS(ROW(values, node[0]), ROW(values, node[16])), b = ROWS(ROW(values, node[1]), ROW(values, node[17]));
-    Lanes c = ROWS(ROW(values, node[2]), ROW(values, node[18])), d = ROWS(ROW(values, node[3]), ROW(values, node[19]));
-    TRANSPOSE(a, b, c, d);
-    out[0] = a, out[1] = b, out[2] = c, out[3] = d;
+    for (int l = 0; l < 4; l++)
+        out[l] = rows_of(values, node + l);
+    TRANSPOSE(out[0], out[1], out[2], out[3]);
+}
+
+/* Gather the last number of a corner's node, by lane. */
+static inline Lanes gather_last(const float *values, const int32_t *node)
+{
+    return LAST(rows_of(values, node), rows_of(values, node + 1), rows_of(values, node + 2), rows_of(values, node + 3));
 }
 
 /* Add the force on each corner to its node, one after the other: two lanes may have a node in common. */
@@ -35,39 +46,47 @@ static inline void scatter(float *values, const int32_t *corner, Lanes force[4][
             }
 }
 
-/* Deformation gradients of the blocks from `b` on, row by row; return the sum of the corners' pressures. */
-static inline Lanes deformation(const Body *body, int b, Lanes F[9])
+/* Where deformation gradients of the blocks from `b` on are kept, number by number for all of them. */
+static inline float *kept_of(const Body *body, int b)
+{
+    return body->deformation + 36 * (size_t)b;
+}
+
+/* Set the deformation gradients of the blocks from `b` on, row by row. */
+static inline void deform(const Body *body, int b, Lanes F[9])
 {
     const int32_t *corner = body->corners + 16 * b;
-    Lanes first[4], next[4], f[9];
+    Lanes first[4], next[4];
     gather(body->displacement, corner, first);
-    Lanes pressure = first[3];
     UNROLL
     for (int a = 0; a < 3; a++) {
         gather(body->displacement, corner + 4 * (a + 1), next);
-        pressure = ADD(pressure, next[3]);
         UNROLL
         for (int i = 0; i < 3; i++) {
             Lanes apart = SUB(next[i], first[i]);
             UNROLL
             for (int j = 0; j < 3; j++) {
                 Lanes part = MUL(apart, load(body->gradients, b, 9, 3 * a + j));
-                f[3 * i + j] = a == 0 ? part : ADD(f[3 * i + j], part);
+                F[3 * i + j] = a == 0 ? part : ADD(F[3 * i + j], part);
             }
         }
     }
-    for (int i = 0; i < 9; i++)
-        F[i] = i % 4 ? f[i] : ADD(f[i], ALL(1.0f));
-    return pressure;
+    UNROLL
+    for (int i = 0; i < 9; i += 4)
+        F[i] = ADD(F[i], ALL(1.0f));
 }
 
-/* Add the present volumes of elements to their nodes, from block `first` to before `last`. */
+/* Keep the deformation gradients, and add the present volumes of elements to their nodes, from block `first` to before
+`last`. */
 void add_volumes(const Body *body, int first, int last)
 {
     for (int b = first; b < last; b += BLOCKS) {
         const int32_t *corner = body->corners + 16 * b;
         Lanes F[9];
-        deformation(body, b, F);
+        deform(body, b, F);
+        UNROLL
+        for (int i = 0; i < 9; i++)
+            STORE_ALL(kept_of(body, b) + 4 * BLOCKS * i, F[i]);
         Lanes change = dot3(F[0], minor(F[4], F[8], F[5], F[7]), F[1], minor(F[5], F[6], F[3], F[8]), F[2],
                             minor(F[3], F[7], F[4], F[6]));
         change = MUL(load(body->volumes, b, 1, 0), change);
@@ -88,19 +107,25 @@ void add_volumes(const Body *body, int first, int last)
 
 /* A group of blocks on its way through the stages. */
 typedef struct {
-    Lanes F[9], P[9], pressures;
+    Lanes F[9], P[9];
 } Group;
 
-/* Set the stress of the energy, row by row, by the sum of the corners' pressures. */
-static inline void elastic_stress(Group *group, Lanes mu)
+/* Take up the kept deformation gradients; set the stress of the energy, row by row. */
+static inline void elastic_stress(const Body *body, int b, Group *group)
 {
-    const Lanes *F = group->F;
-    Lanes one = ALL(1.0f), square = one;
+    const int32_t *corner = body->corners + 16 * b;
+    Lanes *F = group->F, mu = load(body->shear, b, 1, 0), one = ALL(1.0f), square = one;
+    Lanes pressures = gather_last(body->displacement, corner);
     UNROLL
-    for (int i = 0; i < 9; i++)
+    for (int a = 4; a < 16; a += 4)
+        pressures = ADD(pressures, gather_last(body->displacement, corner + a));
+    UNROLL
+    for (int i = 0; i < 9; i++) {
+        F[i] = LOAD_ALL(kept_of(body, b) + 4 * BLOCKS * i);
         square = ADD(square, MUL(F[i], F[i]));
+    }
     Lanes stretch = MUL(mu, SUB(one, DIV(one, square)));
-    Lanes squeeze = SUB(MUL(group->pressures, ALL(0.25f)), MUL(ALL(0.75f), mu));
+    Lanes squeeze = SUB(MUL(pressures, ALL(0.25f)), MUL(ALL(0.75f), mu));
     Lanes cofactor[9] = {minor(F[4], F[8], F[5], F[7]), minor(F[5], F[6], F[3], F[8]), minor(F[3], F[7], F[4], F[6]),
                          minor(F[2], F[7], F[1], F[8]), minor(F[0], F[8], F[2], F[6]), minor(F[1], F[6], F[0], F[7]),
                          minor(F[1], F[5], F[2], F[4]), minor(F[2], F[3], F[0], F[5]), minor(F[0], F[4], F[1], F[3])};
@@ -173,9 +198,7 @@ void add_forces(const Body *body, float seconds, int first, int last)
     for (int start = first; start < last; start += SIDE_BY_SIDE * BLOCKS) {
         int end = start + SIDE_BY_SIDE * BLOCKS < last ? start + SIDE_BY_SIDE * BLOCKS : last;
         for (int b = start, k = 0; b < end; b += BLOCKS, k++)
-            group[k].pressures = deformation(body, b, group[k].F);
-        for (int b = start, k = 0; b < end; b += BLOCKS, k++)
-            elastic_stress(group + k, load(body->shear, b, 1, 0));
+            elastic_stress(body, b, group + k);
         for (int m = 0; m < body->branches; m++) {
             Lanes weight = ALL(1.5f * body->branch[2 * m]); /* 2 g times the shear modulus, 3/4 of the energy's mu */
             Lanes share = ALL(seconds / (seconds + body->branch[2 * m + 1])); /* implicit: stable for any time */

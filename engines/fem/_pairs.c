@@ -18,21 +18,25 @@ typedef struct {
 } Grid;
 
 /* Whether a vertex has moved so far that pairs are missing, or a mesh has changed. */
-int have_moved(const Pairs *pairs)
+int have_moved(Pairs *pairs)
 {
-    float most = 0.25f * (float)(pairs->skin * pairs->skin);
+    float most = 0.25f * (float)(pairs->skin * pairs->skin), largest = 0.0f;
     if (!pairs->are_known)
         return 1;
     for (int b = 0; b < pairs->bodies; b++)
         if (pairs->changes[b] != pairs->body[b]->changes)
             return 1;
+    if (pairs->moved < 0.499 * pairs->skin)
+        return 0;
     for (int k = 0; k < pairs->vertices; k++) {
         const float *now = pairs->body[pairs->vertex[k].body]->displacement + 4 * pairs->vertex[k].node;
         const float *before = pairs->before + 3 * k;
-        float x = now[0] - before[0], y = now[1] - before[1], z = now[2] - before[2];
-        if (!(x * x + y * y + z * z <= most))
+        float x = now[0] - before[0], y = now[1] - before[1], z = now[2] - before[2], square = x * x + y * y + z * z;
+        if (!(square <= most))
             return 1;
+        largest = square > largest ? square : largest;
     }
+    pairs->moved = sqrt((double)largest);
     return 0;
 }
 
@@ -326,6 +330,7 @@ int find_pairs(Pairs *pairs)
     for (int b = 0; b < pairs->bodies && !failed; b++)
         pairs->changes[b] = pairs->body[b]->changes;
     pairs->are_known = !failed;
+    pairs->moved = 0.0;
     for (int b = 0; b < pairs->bodies && stars; b++)
         free_stars(stars + b);
     PyMem_RawFree(stars);

@@ -17,6 +17,7 @@ typedef struct {
     int are_known, vertices, room, pair_room;
     int *changes;         /* (bodies,): of the meshes when the pairs were found */
     Vertex *vertex;       /* (room,) */
+    double moved;         /* m: bound of the way of all vertices since the pairs were found */
     double *place;        /* (room, 3): in the frame of all bodies */
     float *before;        /* (room, 3): displacements when the pairs were found */
     int32_t *start;       /* (room + 1,): first pair by vertex */
@@ -34,6 +35,6 @@ static inline void place_of(const Pairs *pairs, int body, int32_t node, double x
 }
 
 void place_used(Pairs *pairs);
-int have_moved(const Pairs *pairs);
+int have_moved(Pairs *pairs);
 int find_pairs(Pairs *pairs);
 void free_pairs(Pairs *pairs);

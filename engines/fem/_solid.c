@@ -6,6 +6,8 @@ See docs/decisions/0125-tissue-of-our-own.md; `_step.c` advances.
 
 #include "_solid.h"
 
+#define CACHE_LINE 64 /* bytes: what crosses the end of one costs twice */
+
 /* Read the arguments of `advance`: a way through a step, whose buffers are held until `release_way`. */
 int read_way(Solid *self, PyObject *args, Way *way, Course *course)
 {
@@ -227,6 +229,10 @@ static int initialise(Solid *self, PyObject *args, PyObject *Py_UNUSED(named))
     NEXT(box, 0);
     body->boxes = (int)(size / 128);
     NEXT(support, 1);
+    self->memory = PyMem_RawMalloc(sizeof(float) * 36 * (size_t)body->blocks + CACHE_LINE);
+    body->deformation = (float *)(((uintptr_t)self->memory + CACHE_LINE) & ~(uintptr_t)(CACHE_LINE - 1));
+    if (self->memory == NULL)
+        return PyErr_NoMemory(), -1;
     return 0;
 }
 
@@ -234,6 +240,7 @@ static void finish(Solid *self)
 {
     while (self->count)
         PyBuffer_Release(self->held + --self->count);
+    PyMem_RawFree(self->memory);
     Py_TYPE(self)->tp_free((PyObject *)self);
 }
 

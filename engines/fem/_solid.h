@@ -19,6 +19,7 @@ typedef struct {
     int nodes, blocks, faces, branches;
     int changes;                 /* of the mesh since the start */
     int every;                   /* sub-steps between its elastic forces in this step */
+    float fastest;               /* largest part of a velocity along an axis when the nodes moved last */
     int node_room;               /* a body that may be cut has room for a node of its own at every corner */
     int skin;                    /* faces of the uncut mesh */
     float *rest;                 /* (nodes, 4) */
@@ -38,6 +39,7 @@ typedef struct {
     float *element_mass;         /* (blocks, 4) */
     float *shear;                /* (blocks, 4): Lame's mu of the energy */
     float *strains;              /* (branches, blocks, 6, 4): viscous strains */
+    float *deformation;          /* (blocks, 9, 4): gradients, for the forces of a sub-step alone */
     const float *branch;         /* (branches, 2): share of the shear modulus, relaxation time */
     int32_t *across;             /* (4 blocks, 4): the face on the other side, or ~slot of a face of the surface */
     int32_t *surface;            /* (faces, 3): nodes by slot; -1 of a face that has gone */
@@ -91,7 +93,10 @@ typedef struct {
     int every;         /* sub-steps between the elastic forces */
     const double *middle; /* of the body, in the frame in which the path is given */
     double *path;      /* in the frame of the body */
-    int *near;         /* faces near the spheres */
+    int *near;         /* faces near the spheres: for each how many, and which */
+    int near_room;     /* of each sphere */
+    int32_t *carried;  /* nodes that spheres hold */
+    int carries;       /* how many */
     int32_t *beside;   /* boxes and nodes near them */
     int besides;       /* their pairs */
     double *begun;     /* fronts at the start, (edges, samples, 3) */
@@ -110,6 +115,7 @@ typedef struct {
     Body body;
     Py_buffer held[27];
     int count;
+    void *memory; /* of `deformation` */
 } Solid;
 
 typedef struct Touch Touch; /* of bodies among each other */
@@ -138,13 +144,16 @@ void tie(const Body *body);
 #if defined(__GNUC__) && defined(__x86_64__) && !defined(TROCAR_PLAIN_LANES) && !defined(TROCAR_NARROW_LANES)
 #define HAS_AVX /* in the compiler; the processor is asked */
 #endif
+
 void elastic_forces(const Body *body, float seconds);
 void add_volumes(const Body *body, int first, int last);
 void add_volumes_avx(const Body *body, int first, int last);
 void add_forces(const Body *body, float seconds, int first, int last);
 void add_forces_avx(const Body *body, float seconds, int first, int last);
+void add_volumes_avx512(const Body *body, int first, int last);
+void add_forces_avx512(const Body *body, float seconds, int first, int last);
 void press(const Body *body, const Spheres *spheres, int sphere, int sub_step, float seconds, const int *near, int count);
-int find_near(const Body *body, const Spheres *spheres, int sphere, int sub_steps, int *near, int most);
+int find_all_near(const Body *body, const Spheres *spheres, int sub_steps, int *near, int room);
 
 int find_beside(const Body *body, double seconds, int32_t *beside);
 void rest_on(const Body *body, const int32_t *beside, int count, double seconds);
@@ -159,6 +168,7 @@ void free_touch(Touch *touch);
 void forget_pairs(Touch *touch);
 void begin_touch(Touch *touch);
 int part_bodies(Touch *touch, double seconds, double share);
+void note_motion(Touch *touch, double seconds);
 
 Attach *new_attach(int count, Body *const *body, const double *middle, const int32_t *place, const double *rest,
                    const double *law, double *widest, double *force);

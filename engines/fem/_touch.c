@@ -21,6 +21,8 @@ and what a vertex meets does not depend on when they were found. So a restored b
 #define DEEPEST 0.3    /* of a vertex behind a face, over the height of the element there */
 #define INTERIOR 1e-4f /* least share of each node at a point inside a face */
 #define SAME_POINT 1e-7 /* m */
+#define DIAGONAL 1.7321 /* a bit more than a diagonal over its way along each axis */
+#define ROUNDING 1e-7  /* m: of a displacement in a sub-step */
 #define MOST_FACES 64  /* that a vertex may meet: the first of them */
 
 /* A vertex that meets a face. */
@@ -268,10 +270,20 @@ static double resolve(Meeting *meeting, double seconds)
     return dot(impulse, impulse);
 }
 
-/* Begin a step: no forces yet. */
+/* Begin a step: no forces yet, and all vertices may have moved, as a body may have been moved by hand. */
 void begin_touch(Touch *touch)
 {
+    touch->pairs.moved = INFINITY;
     memset(touch->force, 0, sizeof(double) * 3 * (size_t)touch->pairs.bodies);
+}
+
+/* Note how far a vertex has moved at most in a sub-step. */
+void note_motion(Touch *touch, double seconds)
+{
+    float fastest = 0.0f;
+    for (int b = 0; b < touch->pairs.bodies; b++)
+        fastest = touch->pairs.body[b]->fastest > fastest ? touch->pairs.body[b]->fastest : fastest;
+    touch->pairs.moved += DIAGONAL * (double)fastest * seconds + ROUNDING;
 }
 
 /* Stop the bodies at each other in a sub-step, a `share` of the step; return -1 without memory. */

@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.fem.arrays import aligned_integers
-from robots.vector3 import cross
-from schemas.plain_sum import plain_sum
 from schemas.vectors import Vector
 
 __all__ = ["NO_EDGES", "Edges", "Scissors", "closing_rates"]
@@ -109,15 +107,18 @@ def closing_rates(
 
 def _opening(pair: Scissors, ends: Sequence[tuple[int, int]], centres: Vector) -> float:
     """Return the sine of the angle between a pair of edges, negative once they have passed each other."""
-    (left, left_end), (right, right_end) = centres[[ends[pair.left], ends[pair.right]]]
-    u, v, axis = left_end - left, right_end - right, centres[pair.hinge] - 0.5 * (left + right)
-    normal = cross(v, u)
+    numbers = [*ends[pair.left], *ends[pair.right], pair.hinge]
+    left, left_end, right, right_end, hinge = centres.take(numbers, axis=0).tolist()
+    u = [end - start for start, end in zip(left, left_end, strict=True)]
+    v = [end - start for start, end in zip(right, right_end, strict=True)]
+    axis = [at - 0.5 * (one + other) for at, one, other in zip(hinge, left, right, strict=True)]
+    normal = (v[1] * u[2] - v[2] * u[1], v[2] * u[0] - v[0] * u[2], v[0] * u[1] - v[1] * u[0])
     size = sqrt(_dot(u, u) * _dot(v, v))
     return copysign(sqrt(_dot(normal, normal)) / size, _dot(normal, axis)) if size else 0.0
 
 
-def _dot(a: Vector, b: Vector) -> float:
-    return plain_sum((a * b).tolist())
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return 0.0 + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 NO_EDGES = Edges((), 0, 1.0)

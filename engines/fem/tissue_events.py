@@ -64,6 +64,8 @@ class TissueEvents:
         """Changes of the present step."""
         self._latest: NDArray[np.int64] = np.full(2, _NONE)
         """Kind and instrument of the latest change."""
+        self._is_open = False
+        """Whether a change is not over; else a step costs nothing."""
         self._said: list[tuple[str, str, Vector, float, str]] = []
         """Kind, instrument, place, size and unit of the single events of the present step."""
 
@@ -75,7 +77,7 @@ class TissueEvents:
         """
         row, instruments = _KINDS.index(kind), self._number[spheres]
         np.add.at(self._sums[row], instruments, np.column_stack([sizes, sizes[:, None] * places]))
-        self._is_fresh[row, instruments] = True
+        self._is_fresh[row, instruments] = self._is_open = True
         self._latest[:] = row, np.bincount(instruments, sizes).argmax()
 
     @property
@@ -90,6 +92,8 @@ class TissueEvents:
 
     def finish(self, time_ns: int) -> tuple[TissueEvent, ...]:
         """End the step at `time_ns`; return the events that are over."""
+        if not self._is_open and not self._said:
+            return ()
         first, last = self._times[..., 0], self._times[..., 1]
         if self._is_fresh.any():
             first[self._is_fresh & (first == _NONE)] = time_ns
@@ -102,6 +106,7 @@ class TissueEvents:
         single = tuple(_event(time_ns, *said) for said in self._said)
         self._sums[over], self._times[over] = 0.0, _NONE
         self._said.clear()
+        self._is_open = bool((first != _NONE).any())
         return gathered + single
 
     def _event(self, row: int, instrument: int) -> TissueEvent:
@@ -118,6 +123,7 @@ class TissueEvents:
         """Go back to a saved `state`."""
         for array in self.state:
             array[...] = np.frombuffer(next(parts), array.dtype).reshape(array.shape)
+        self._is_open = True
 
 
 def _event(time_ns: int, kind: str, instrument: str, place: Vector, size: float, unit: str) -> TissueEvent:
