@@ -11,7 +11,7 @@ import numpy as np
 
 from engines.fmu.blocks import WARNING
 from engines.fmu.description import Description
-from engines.fmu.instance import DISCARD, Instance
+from engines.fmu.instance import DISCARD, RETURNS, Instance
 from engines.fmu.linear_input import LinearInput
 from engines.fmu.log import fmi2_callbacks, log_everything
 from engines.fmu.start import Start
@@ -133,7 +133,7 @@ class Fmi2Instance(Instance):
             return super().take_step(t, h, inputs)
         dt = h / 1e9
         stop = compiled.step2(
-            outputs, self._step_address, values, rates, dt / 2, *self._interval(t, h), self.can_save
+            outputs, self._step_address, values, rates, dt / 2, *self._interval(t, h), RETURNS
         )
         if stop is None:
             return None
@@ -150,7 +150,7 @@ class Fmi2Instance(Instance):
     def advance(self, t: int, h: int) -> None:
         """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation."""
         now, size = self._interval(t, h)
-        status = self._do_step(self.component, now, size, not self.can_save)
+        status = self._do_step(self.component, now, size, not RETURNS)
         if status > WARNING:
             self._take_failure(status, t, h)
 

@@ -13,7 +13,7 @@ import numpy as np
 from engines.fmu.blocks import WARNING, Block
 from engines.fmu.clock import Clock
 from engines.fmu.description import Description
-from engines.fmu.instance import Instance
+from engines.fmu.instance import RETURNS, Instance
 from engines.fmu.log import log_everything, log_message
 from engines.fmu.start import Start
 from engines.fmu.texts import Text
@@ -201,7 +201,7 @@ class Fmi3Instance(Instance):
 
     def _step_to(self, now: float, target: float) -> float:
         """Step towards `target` and return the reached time."""
-        status, event, ends, early, reached = self._do_step(now, target - now, self.can_save)
+        status, event, ends, early, reached = self._do_step(now, target - now, RETURNS)
         if status > WARNING:
             raise self.failure("DoStep", status, f" for the step from {now:.9g} s to {target:.9g} s")
         self._needs_event = bool(event)
