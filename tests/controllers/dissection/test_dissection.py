@@ -7,7 +7,7 @@ from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.dissection.step import Failure, Step
 from hub.planning.scenario_file import load
 from robots.transform import pose_to_matrix
-from schemas.errors import ScenarioError
+from schemas.errors import MotionError, ScenarioError
 from tests.controllers.dissection.world import PERIOD, World
 
 
@@ -72,6 +72,37 @@ def test_a_refused_command_ends_with_its_reason():
     world.refused.append(("PSM1", "the arm is not homed"))
     world.step()
     assert world.routine.ended == "given up: command refused: PSM1: the arm is not homed"
+
+
+def test_the_hook_turns_little_from_a_place_to_the_next_and_stands_at_the_wall():
+    world, joints = World(), []
+    while len(joints) < 2:
+        world.step()
+        if world.state.step is Step.BURN and (len(world.ties) == 10 - len(joints)):
+            joints.append(world.joints["PSM1"].copy())
+            wall = np.linalg.norm(world.nodes - world.state.place, axis=1).min()
+            hook = np.linalg.norm(world.nodes - world.hands["PSM1"].bare_end, axis=1).min()
+            assert hook < wall
+    assert np.abs(np.delete(joints[1] - joints[0], 2)).max() < 1.0
+
+
+def test_a_place_out_of_reach_is_left_for_the_next():
+    world = World("attempts=1")
+    while world.state.step is not Step.PLAN:
+        world.step()
+    choose, refused = world.routine._hook.choose, []
+
+    def one_is_out_of_reach(place, *rest):
+        if not refused:
+            refused.append(place)
+            raise MotionError("too far")
+        return choose(place, *rest)
+
+    world.routine._hook.choose = one_is_out_of_reach
+    world.run(1.0)
+    assert len(refused) == 1
+    assert not world.state.failed
+    assert world.state.step in (Step.HOVER, Step.REACH)
 
 
 @pytest.mark.parametrize(
