@@ -18,6 +18,9 @@ static const double LARGEST_EXACT = 9007199254740992.0;
 
 typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
 typedef int (*Access3)(void *, const uint32_t *, size_t, void *, size_t);
+/* FMI's noSetFMUStatePriorToCurrentPoint: as engines/fmu/instance.py has it. */
+#define GOES_ON true
+
 typedef int (*Step2)(void *, double, double, int);
 typedef int (*Step3)(void *, double, double, bool, bool *, bool *, bool *, double *);
 typedef int (*GetState)(void *, void **);
@@ -198,26 +201,26 @@ static PyObject *get(Blocks *self, PyObject *Py_UNUSED(none))
     return stopped(self, at, status);
 }
 
-PyDoc_STRVAR(step2_doc, "step2(outputs, function, values, rates, tau, now, size, keeps)\n--\n\n\
-Set these inputs, call `fmi2DoStep` and get `outputs`; `keeps`: whether earlier states may be set.\n\n\
+PyDoc_STRVAR(step2_doc, "step2(outputs, function, values, rates, tau, now, size)\n--\n\n\
+Set these inputs, call `fmi2DoStep` and get `outputs`.\n\n\
 Return None, or the part at which it stopped (0: inputs, 1: step, 2: outputs) with its block and the FMU's status.");
 
 static PyObject *step2(Blocks *self, PyObject *const *args, Py_ssize_t count)
 {
-    if (count != 8 || !PyObject_TypeCheck(args[0], Py_TYPE(self))) {
-        PyErr_SetString(PyExc_TypeError, "expected outputs, function, values and rates by port, and four numbers");
+    if (count != 7 || !PyObject_TypeCheck(args[0], Py_TYPE(self))) {
+        PyErr_SetString(PyExc_TypeError, "expected outputs, function, values and rates by port, and three numbers");
         return NULL;
     }
     const Blocks *outputs = (const Blocks *)args[0];
     Step2 step = (Step2)PyLong_AsVoidPtr(args[1]);
     double tau = PyFloat_AsDouble(args[4]), now = PyFloat_AsDouble(args[5]), size = PyFloat_AsDouble(args[6]);
-    int keeps = PyObject_IsTrue(args[7]), status = 0, part = 0;
+    int status = 0, part = 0;
     Py_ssize_t end, at;
     if (PyErr_Occurred() || (end = take_all(self, args[2], args[3], tau, 0)) < 0)
         return NULL;
     Py_BEGIN_ALLOW_THREADS
     at = set_all(self, 0, end, &status);
-    if (at == self->count && (part = 1) && (status = step(self->component, now, size, !keeps)) <= WARNING) {
+    if (at == self->count && (part = 1) && (status = step(self->component, now, size, GOES_ON)) <= WARNING) {
         at = get_all(outputs, &status);
         part = at == outputs->count ? 3 : 2;
     }
@@ -324,19 +327,19 @@ static int read_arguments(PyObject *const *args, Py_ssize_t count, const char *f
     return !PyErr_Occurred();
 }
 
-PyDoc_STRVAR(step3_doc, "step3(function, component, now, size, keeps)\n--\n\n\
+PyDoc_STRVAR(step3_doc, "step3(function, component, now, size)\n--\n\n\
 Call `fmi3DoStep`. Return status, eventHandlingNeeded, terminateSimulation, earlyReturn and lastSuccessfulTime.");
 
 static PyObject *step3(PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t count)
 {
     void *address[2];
-    double given[3], reached = 0.0;
+    double given[2], reached = 0.0;
     bool event = false, terminate = false, early = false;
     int status;
-    if (!read_arguments(args, count, "aaddd", address, given))
+    if (!read_arguments(args, count, "aadd", address, given))
         return NULL;
     Py_BEGIN_ALLOW_THREADS
-    status = ((Step3)address[0])(address[1], given[0], given[1], given[2] == 0.0, &event, &terminate, &early, &reached);
+    status = ((Step3)address[0])(address[1], given[0], given[1], GOES_ON, &event, &terminate, &early, &reached);
     Py_END_ALLOW_THREADS
     return Py_BuildValue("iiiid", status, event, terminate, early, reached);
 }

@@ -11,7 +11,7 @@ import numpy as np
 
 from engines.fmu.blocks import WARNING
 from engines.fmu.description import Description
-from engines.fmu.instance import DISCARD, RETURNS, Instance
+from engines.fmu.instance import DISCARD, GOES_ON, Instance
 from engines.fmu.linear_input import LinearInput
 from engines.fmu.log import fmi2_callbacks, log_everything
 from engines.fmu.start import Start
@@ -132,9 +132,7 @@ class Fmi2Instance(Instance):
         if compiled is None or outputs is None or self.ended or is_moving or type(inputs) is not Inputs:
             return super().take_step(t, h, inputs)
         dt = h / 1e9
-        stop = compiled.step2(
-            outputs, self._step_address, values, rates, dt / 2, *self._interval(t, h), RETURNS
-        )
+        stop = compiled.step2(outputs, self._step_address, values, rates, dt / 2, *self._interval(t, h))
         if stop is None:
             return None
         part, at, status = stop
@@ -150,7 +148,7 @@ class Fmi2Instance(Instance):
     def advance(self, t: int, h: int) -> None:
         """Bring the FMU from `t` to `t + h` (ns), or to the FMU's end of the simulation."""
         now, size = self._interval(t, h)
-        status = self._do_step(self.component, now, size, not RETURNS)
+        status = self._do_step(self.component, now, size, GOES_ON)
         if status > WARNING:
             self._take_failure(status, t, h)
 

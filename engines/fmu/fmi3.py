@@ -13,7 +13,7 @@ import numpy as np
 from engines.fmu.blocks import WARNING, Block
 from engines.fmu.clock import Clock
 from engines.fmu.description import Description
-from engines.fmu.instance import RETURNS, Instance
+from engines.fmu.instance import GOES_ON, Instance
 from engines.fmu.log import log_everything, log_message
 from engines.fmu.start import Start
 from engines.fmu.texts import Text
@@ -103,8 +103,8 @@ class Fmi3Instance(Instance):
             for x in (self._again, self._terminate, self._nominals, self._states, self._scheduled, self._next)
         ]
 
-    def _prepare_step(self) -> Callable[[float, float, bool], tuple[int, int, int, int, float]]:
-        """Return a call of `fmi3DoStep`: time and size (s), and whether earlier states may be set.
+    def _prepare_step(self) -> Callable[[float, float], tuple[int, int, int, int, float]]:
+        """Return a call of `fmi3DoStep`: time and size (s).
 
         The call returns status, eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime.
         """
@@ -114,8 +114,8 @@ class Fmi3Instance(Instance):
         flags, reached = [ctypes.c_bool() for _ in range(3)], ctypes.c_double()
         results = [ctypes.byref(one) for one in (*flags, reached)]
 
-        def call(now: float, size: float, keeps: bool) -> tuple[int, int, int, int, float]:
-            status = function(self.component, now, size, not keeps, *results)
+        def call(now: float, size: float) -> tuple[int, int, int, int, float]:
+            status = function(self.component, now, size, GOES_ON, *results)
             event, ends, early = (flag.value for flag in flags)
             return status, event, ends, early, reached.value
 
@@ -201,7 +201,7 @@ class Fmi3Instance(Instance):
 
     def _step_to(self, now: float, target: float) -> float:
         """Step towards `target` and return the reached time."""
-        status, event, ends, early, reached = self._do_step(now, target - now, RETURNS)
+        status, event, ends, early, reached = self._do_step(now, target - now)
         if status > WARNING:
             raise self.failure("DoStep", status, f" for the step from {now:.9g} s to {target:.9g} s")
         self._needs_event = bool(event)

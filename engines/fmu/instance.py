@@ -31,17 +31,17 @@ from hub.participant import Inputs
 from schemas.errors import ScenarioError, SessionError
 from schemas.ros import EmptyMessage
 
-__all__ = ["DISCARD", "RETURNS", "Instance"]
+__all__ = ["DISCARD", "GOES_ON", "Instance"]
 
 _log = logging.getLogger(__name__)
 _STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 DISCARD, _ERROR, _FATAL = 2, 3, 4
 """FMI statuses (fmi2Status, fmi3Status)."""
-RETURNS = False
-"""Whether a step is told that states before it may be set in this run.
+GOES_ON = True
+"""FMI's noSetFMUStatePriorToCurrentPoint: whether a step is told that none before is set again.
 
 A run does not go back; a return to a saved state begins another one. It is said as other importers say it:
-a public FMU (`Wheel` of libcosim) stands still where it is True.
+a public FMU (`Wheel` of libcosim) stands still where it is False.
 """
 
 

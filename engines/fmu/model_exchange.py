@@ -17,7 +17,7 @@ import numpy as np
 from engines.fmu.blocks import WARNING, Block
 from engines.fmu.cvode import DiscardedError, Equations, Integrator
 from engines.fmu.description import Description
-from engines.fmu.instance import DISCARD, RETURNS, Instance
+from engines.fmu.instance import DISCARD, GOES_ON, Instance
 from engines.fmu.log import fmi2_callbacks, log_everything, log_message
 from engines.fmu.start import Start
 from engines.fmu.texts import Text
@@ -160,7 +160,7 @@ class ModelExchange(Instance):
         self.call("SetTime", now)
         if self._completes:
             results = ctypes.byref(self._enter), ctypes.byref(self._terminate)
-            self.call("CompletedIntegratorStep", not RETURNS, *results)
+            self.call("CompletedIntegratorStep", GOES_ON, *results)
             is_event |= bool(self._enter.value)
             if self._terminate.value:
                 self._end(now, f"terminateSimulation of {self.prefix}CompletedIntegratorStep")

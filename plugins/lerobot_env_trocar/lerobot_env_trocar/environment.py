@@ -93,6 +93,11 @@ class LeRobotEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
         observation, reward, terminated, truncated, info = self.env.step(action)
         return self._rename(observation), float(reward), terminated, truncated, info
 
+    def original(self, observation: dict[str, Any]) -> dict[str, Any]:
+        """Return an observation with Trocar's keys, as its oracles read them, without pictures."""
+        goal = observation["agent_pos"][self._hands :]
+        return {"observation": observation["environment_state"], "desired_goal": goal}
+
     def _rename(self, observation: dict[str, Any]) -> dict[str, Any]:
         state = observation["observation"]
         found = {
