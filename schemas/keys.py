@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["ROOT", "Keys", "topic", "valid_name"]
+__all__ = ["PLACE", "ROOT", "Keys", "topic", "valid_name"]
 
 ROOT = "trocar"
+PLACE = "place"
+"""Port of a gateway that says, once a second, where programs reach it."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 

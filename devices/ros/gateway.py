@@ -16,7 +16,7 @@ from typing import ClassVar, cast
 import numpy as np
 
 from devices.ros.params import GatewayParams
-from devices.ros.status import PLACE, StatusCounters
+from devices.ros.status import StatusCounters
 from devices.ros.topics.arbitration import CommandArbiter
 from devices.ros.topics.diagnostics import DIAGNOSTICS_PERIOD_NS, DIAGNOSTICS_ROW, Diagnostics
 from devices.ros.topics.dvrk_table import dvrk_table
@@ -49,6 +49,7 @@ from robots.dvrk.setup_joints import DrivenArm
 from robots.transform import matrix_to_pose
 from schemas.crtk import OperatingState
 from schemas.errors import MessageError, did_you_mean
+from schemas.keys import PLACE
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import StringMessage

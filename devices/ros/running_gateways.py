@@ -12,12 +12,11 @@ from typing import NamedTuple
 import zenoh
 from zenoh.handlers import Callback
 
-from devices.ros.status import PLACE
 from hub.transport.session_secret import secret_of
 from hub.transport.zenoh_session import open_session
 from schemas.codec import decode
 from schemas.errors import ConnectError, MessageError
-from schemas.keys import Keys
+from schemas.keys import PLACE, Keys
 from schemas.ros import StringMessage
 from schemas.trocar_msgs import GatewayStatus
 

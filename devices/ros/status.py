@@ -9,10 +9,7 @@ from devices.ros.topics.row import Row
 from devices.ros.transport import Client
 from schemas.trocar_msgs import GatewayClient, GatewayStatus, GatewayTopic
 
-__all__ = ["PLACE", "Count", "StatusCounters"]
-
-PLACE = "place"
-"""Port of a gateway that says where programs reach it."""
+__all__ = ["Count", "StatusCounters"]
 
 
 class Count:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,11 +20,12 @@ __all__ = ["ls"]
 _SESSION_COLUMNS = ("session", "state", "listens at", "pid", "run")
 _PARTICIPANT_COLUMNS = ("session", "state", "name", "role", "host", "pid", "step")
 _DEVICE_COLUMNS = ("session", "device", "clock offset", "within", "network link")
+_GATEWAY_COLUMNS = ("session", "gateway", "programs reach it at")
 _PROFILE_COLUMNS = ("session", "core-seconds per simulated second", "most of it")
 
 
 def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Json = False) -> None:
-    """List the running sessions: endpoints, participants, devices, latencies, and users of processor time."""
+    """List the running sessions: endpoints, participants, devices, gateways, latencies, processor time."""
     found = _find_sessions(connect, certs)
     if as_json:
         typer.echo(json.dumps([_session_row(session) for session in found], indent=2))
@@ -35,7 +36,10 @@ def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Jso
     sessions = [session.status for session in found]
     results.print(
         table(
-            ((s.session, s.state, ", ".join(endpoints), pid or "-", s.run) for s, endpoints, pid, _ in found),
+            (
+                (s.session, s.state, ", ".join(endpoints), pid or "-", s.run)
+                for s, endpoints, pid, *_ in found
+            ),
             *_SESSION_COLUMNS,
         )
     )
@@ -46,6 +50,7 @@ def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Jso
     tables = (
         (_PARTICIPANT_COLUMNS, participants),
         (_DEVICE_COLUMNS, [row for status in sessions for row in _device_rows(status)]),
+        (_GATEWAY_COLUMNS, [row for session in found for row in _gateway_rows(session)]),
         (_PROFILE_COLUMNS, [row for session in found for row in _profile_rows(session)]),
         (("session", *LATENCY_COLUMNS), latencies),
     )
@@ -62,11 +67,13 @@ class _Found(NamedTuple):
     """The hub's process, if run by this user on this machine."""
     profile: dict[str, Any] | None
     """Profile of a profiled session (`hub/recording/profiles.py`)."""
+    gateways: dict[str, str]
+    """Place of each gateway, where programs reach it: a master, a domain, an endpoint."""
 
 
 def _find_sessions(connect: Sequence[str] | None, certificates: Path | None) -> list[_Found]:
     """Return the sessions at the endpoints `connect`, by default all of this machine, sorted by name."""
-    from hub.remote.live_sessions import live_profiles, live_sessions
+    from hub.remote.live_sessions import live_places, live_profiles, live_sessions
     from hub.transport.hub_files import running_hubs
 
     at = {
@@ -74,6 +81,8 @@ def _find_sessions(connect: Sequence[str] | None, certificates: Path | None) -> 
         for endpoint in connect or [hub.endpoint for hub in running_hubs()]
     }
     profiles = live_profiles([endpoint for endpoint, statuses in at.items() if statuses], certificates)
+    with_devices = [one for one, statuses in at.items() if any(status.devices for status in statuses)]
+    places: Mapping[tuple[str, str], str] = live_places(with_devices, certificates) if with_devices else {}
     hubs = {hub.endpoint: hub for hub in running_hubs()}  # again, as some may have begun in between
     found: dict[tuple[str, int], _Found] = {}
     for endpoint, statuses in at.items():
@@ -86,7 +95,9 @@ def _find_sessions(connect: Sequence[str] | None, certificates: Path | None) -> 
         for status in statuses:
             profile = profiles.get(status.run)
             numbers = None if profile is None else profile_numbers(profile)
-            found.setdefault((status.session, status.run), _Found(status, (endpoint, *outside), pid, numbers))
+            gateways = {name: place for (session, name), place in places.items() if session == status.session}
+            row = _Found(status, (endpoint, *outside), pid, numbers, gateways)
+            found.setdefault((status.session, status.run), row)
     return [found[key] for key in sorted(found)]
 
 
@@ -98,8 +109,14 @@ def _session_row(session: _Found) -> dict[str, Any]:
         {"session": status.session}
         | where
         | {name: [one.model_dump() for one in rows] for name, rows in shown.items()}
-        | {"profile": session.profile}
+        | {"gateways": session.gateways, "profile": session.profile}
     )
+
+
+def _gateway_rows(session: _Found) -> Iterator[tuple[str, ...]]:
+    """Yield the rows of the gateways; a gateway over Zenoh is reached at the hub."""
+    for name, place in session.gateways.items():
+        yield session.status.session, name, place or session.endpoints[0]
 
 
 def _profile_rows(session: _Found) -> Iterator[tuple[str, ...]]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
+from time import sleep
 from typing import TypeVar
 
 import zenoh
 from pydantic import BaseModel
+from zenoh.handlers import Callback
 
 from hub.remote.hub_connection import is_listening, reach
 from hub.security.credentials import OBSERVER
@@ -16,17 +18,21 @@ from hub.transport.control_client import ask
 from hub.transport.endpoints import is_loopback
 from schemas.codec import decode
 from schemas.errors import ConnectError, MessageError
-from schemas.keys import Keys
+from schemas.keys import PLACE, Keys
 from schemas.message import Message
+from schemas.ros import StringMessage
 from schemas.trocar_msgs import Profile, SessionStatus
 
-__all__ = ["ask_about", "live_profiles", "live_sessions", "session_of"]
+__all__ = ["ask_about", "live_places", "live_profiles", "live_sessions", "session_of"]
 
 R = TypeVar("R", bound=BaseModel)
 M = TypeVar("M", bound=Message)
 
 _NO_HUB = ConnectError, MessageError, zenoh.ZError
 """The errors of a query to a server other than a hub."""
+
+_PLACES_S = 1.5
+"""Wait for the place of a gateway."""
 
 ANSWER_S = 2.0
 """Time for an answer: a hub answers within a step, a paused hub at once."""
@@ -50,6 +56,29 @@ def live_profiles(endpoints: Iterable[str], certificates: Path | None = None) ->
     """
     profiles = _query_sessions(endpoints, certificates, Keys("*").profile, Profile)
     return {profile.run: profile for profile in profiles}
+
+
+def live_places(endpoints: Iterable[str], certificates: Path | None = None) -> Mapping[tuple[str, str], str]:
+    """Return where programs reach gateways, by session and participant: master, domain or endpoint.
+
+    Arguments and errors are the same as for `live_sessions`.
+    """
+    found: dict[tuple[str, str], str] = {}
+
+    def receive(sample: zenoh.Sample) -> None:
+        _, session, _, name, *_ = str(sample.key_expr).split("/")
+        with suppress(MessageError):
+            found[session, name] = decode(StringMessage, sample.payload.to_bytes()).data
+
+    with ExitStack() as clients:
+        for endpoint in endpoints:
+            with suppress(*_NO_HUB) if is_loopback(endpoint) else nullcontext():
+                client = clients.enter_context(reach(endpoint, OBSERVER, certificates))
+                client.declare_subscriber(
+                    Keys("*").output("device", "*", PLACE), Callback(receive, indirect=True)
+                )
+        sleep(_PLACES_S)
+    return dict(sorted(found.items()))
 
 
 def _query_sessions(endpoints: Iterable[str], certificates: Path | None, key: str, model: type[M]) -> list[M]:

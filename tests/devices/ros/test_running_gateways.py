@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from devices.ros.command_line import app
+from hub.remote.live_sessions import live_places
 from hub.transport.loopback_port import LoopbackPort
 from hub.transport.session_secret import listen_with_secret
 from schemas.codec import encode
@@ -43,7 +44,8 @@ def endpoint() -> Generator[str]:
         while not over.wait(0.1):
             hub.put(Keys("surgery").output("device", "ros", "gateway"), encode(STATUS))
             hub.put(Keys("surgery").output("device", "ros", "place"), encode(StringMessage(data=PLACE)))
-            hub.put(Keys("surgery").output("device", "broken", "gateway"), b"nonsense")
+            for port in ("gateway", "place"):
+                hub.put(Keys("surgery").output("device", "broken", port), b"nonsense")
 
     with listen_with_secret(LoopbackPort(endpoint)) as hub:
         teller = threading.Thread(target=tell)
@@ -65,6 +67,10 @@ def test_people_see_who_is_connected_and_what_goes_through(endpoint: str) -> Non
 def test_programs_get_json(endpoint: str) -> None:
     (found,) = json.loads(CliRunner().invoke(app, ["--connect", endpoint, "--json"]).stdout)
     assert found == {"session": "surgery", "gateway": "ros", "place": PLACE} | STATUS.model_dump()
+
+
+def test_a_list_of_sessions_has_their_places(endpoint: str) -> None:
+    assert live_places([endpoint]) == {("surgery", "ros"): PLACE}
 
 
 def test_nobody_there() -> None:
