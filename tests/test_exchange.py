@@ -62,6 +62,7 @@ def test_an_arm_gets_scissors_for_its_hook_and_the_session_verifies(tmp_path):
     assert trocar.verify(tmp_path / "recording").same
 
 
+@pytest.mark.long
 def test_a_hand_puts_down_what_it_holds_before_it_gets_scissors_and_leads_on(tmp_path):
     """The scenario of the page, with a hand in the session: a grasped block, a refusal, an exchange."""
     text = LED.read_text().replace(

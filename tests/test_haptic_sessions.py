@@ -109,6 +109,7 @@ def test_a_hand_on_the_virtual_table_comes_to_rest_whatever_the_delay(file: Path
     assert felt.force[-1] == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.long
 def test_a_link_that_drops_ends_the_force_within_150_ms_and_the_arm_waits_for_the_button(file: Path) -> None:
     scenario = deepcopy(TABLE) | {"step": "1 ms"}
     felt = _run(scenario, file, {"preset": "70 ms", "outages": [{"at": "3 s", "duration": "300 ms"}]})

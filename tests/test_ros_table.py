@@ -19,6 +19,7 @@ CONNECTIONS = [
 ]
 
 
+@pytest.mark.long
 def test_psm1_turns_by_0_2_rad_above_the_table(tmp_path):
     """The norm of all joint positions at the end is that of the goal: no joint is held back."""
     scenario = yaml.safe_load(installed_scenarios()["ros"].read_text())

@@ -104,6 +104,7 @@ def test_what_is_said_of_every_arm_reaches_programs_and_back(name):
         assert heard >= {"dvrk/PSM2/state_joint_desired", "dvrk/ECM/state_joint_desired", "release_needle"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["masters", "real_arms"])
 def test_the_recordings_are_what_the_example_writes(name, tmp_path):
     root = Path(__file__).parents[1]

@@ -67,7 +67,7 @@ def running_hubs() -> list[HubFile]:
         except ConnectionRefusedError:
             file.unlink(missing_ok=True)
             continue
-        except TimeoutError:  # it listens, and is busy or stopped
+        except (TimeoutError, ConnectionResetError):  # it listens, and is busy, stopped, or about to end
             pass
         found.append(hub)
     return found

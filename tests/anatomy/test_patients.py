@@ -148,6 +148,7 @@ def check_fat(given):
         assert len(find_ties(organs["fat"], organs[bed.organs[1]], under, bed.within).areas) >= 4
 
 
+@pytest.mark.long
 @given(SEEDS, st.sampled_from(COURSES), st.booleans())
 @example(88, "cranial", True)  # a wide gallbladder, and the longest artery
 @example(4, "behind", True)

@@ -147,6 +147,7 @@ def test_a_line_that_misses_has_no_width():
     assert width_of_mesh(CORNERS[BOX], np.array([0.5, -1.0, 0.0]), np.array([0.5, 1.0, 0.0])) == 0.0
 
 
+@pytest.mark.long
 def test_a_block_is_measured_through_both_engines():
     """The scenario `caliper` in small: 40 mm of soft tissue, in one process."""
     scenario = {

@@ -46,6 +46,7 @@ def test_the_report_has_its_figures(servoed):
     ]
 
 
+@pytest.mark.long
 def test_the_needle_is_found_and_followed(tmp_path):
     record = tmp_path / "session"
     summary = trocar.run("needle-tracking", set={"duration": "1 s"}, one_host=True, record=record)

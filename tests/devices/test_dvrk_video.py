@@ -277,6 +277,7 @@ def running(tmp_path: Path) -> Generator[dict[str, str]]:
         thread.join()
 
 
+@pytest.mark.long
 def test_a_session_shows_its_pictures(running: dict[str, str]) -> None:
     for name in running.values():
         with closing(Reader(name)) as reader:

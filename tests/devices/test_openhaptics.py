@@ -166,6 +166,7 @@ def test_a_short_click_is_not_lost_while_the_host_is_busy(
     assert [joy.buttons.tolist() for joy in one.samples["right/buttons"]] == [[0, 0], [1, 0], [0, 0]]
 
 
+@pytest.mark.long
 def test_a_stylus_that_is_unplugged_and_plugged_in_again(world: HdWorld, hands: Callable[..., Hands]) -> None:
     one = hands()
     _press(world, one, "right", "left")

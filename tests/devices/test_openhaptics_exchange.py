@@ -4,6 +4,7 @@ import subprocess
 import sys
 from math import inf
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -81,6 +82,7 @@ def test_a_writer_that_dies_half_way_leaves_the_record_before() -> None:
     assert reader.read() == [(3.0,) * DOUBLES]
 
 
+@pytest.mark.long
 def test_no_torn_record_gets_through_while_another_process_writes_as_fast_as_it_can() -> None:
     shared, handle = exchange.create(ring_size(2, 40))
     assert isinstance(handle, int)

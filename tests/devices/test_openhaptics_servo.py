@@ -446,6 +446,7 @@ events = st.one_of(
 )
 
 
+@pytest.mark.long
 @settings(max_examples=10, phases=[HypothesisPhase.generate])
 @given(days=st.lists(st.tuples(events, st.integers(1, 60)), max_size=12))
 def test_whatever_happens_the_force_keeps_its_limits(

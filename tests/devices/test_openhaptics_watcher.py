@@ -202,6 +202,7 @@ def _recovers(held: Held, lost: int) -> None:
     held.press()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["stopped", "blocked before the force", "blocked after the force"])
 def test_a_servo_that_stands_still_loses_its_device_in_time(held: Held, how: str) -> None:
     """And as in all of this module, without any help of the device's process, which is stopped."""
@@ -246,6 +247,7 @@ def test_a_short_stop_comes_back_without_a_step(held: Held) -> None:
     assert force.min() > 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_watcher_that_is_lost_takes_the_force_with_it(held: Held, blow: signal.Signals) -> None:
     servo, watcher = held.servo, held.watcher

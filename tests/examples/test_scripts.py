@@ -22,6 +22,7 @@ def run(script: str, *arguments: str | Path) -> str:
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("script", "data"), [("palpation_hand.py", "palpation_hand"), ("head_motion.py", "head")]
 )

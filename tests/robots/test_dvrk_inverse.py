@@ -57,6 +57,7 @@ def test_the_solution_is_the_one_at_hand(arm, tool):
     assert np.allclose(inverse(chain, chain.forward(q), q), q, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.long
 @settings(max_examples=200)
 @given(configurations(PSM), configurations(PSM))
 def test_the_psm_comes_back_from_everywhere(q, near):

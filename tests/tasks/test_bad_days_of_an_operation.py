@@ -88,6 +88,7 @@ def test_an_artery_that_is_pulled_too_far_tears_and_bleeds():
         assert np.isfinite(organ.nodes).all()
 
 
+@pytest.mark.long
 def test_a_gallbladder_that_is_slit_is_perforated():
     with Theatre([GALLBLADDER], HANDS) as theatre:
         theatre.wait(0.05).cut(GALLBLADDER, 15e-3, reach=0.4)
@@ -98,6 +99,7 @@ def test_a_gallbladder_that_is_slit_is_perforated():
         assert theatre.failure == "gallbladder perforated"
 
 
+@pytest.mark.long
 def test_a_clip_that_does_not_reach_across_does_not_hold():
     with Theatre([DUCT], HANDS) as theatre:
         theatre.clip(DUCT, 15e-3, aside=4.5e-3)

@@ -31,6 +31,7 @@ def session(tmp_path_factory):
     return directory, run("hand-over", set={"duration": "2.6 s"}, record=directory, one_host=True)
 
 
+@pytest.mark.long
 def test_the_summary_has_the_card(session):
     card = session[1].scores["task"]
     assert (card["task"], card["goals"], card["reached"]) == ("hand-over-task", 1, 0)
@@ -49,6 +50,7 @@ def test_a_recording_has_the_same_scores_to_the_bit(session):
     ]
 
 
+@pytest.mark.long
 def test_a_re_simulation_has_the_same_state(session):
     # the sums behind every score are part of the task's state hash
     found = verify(session[0])
@@ -71,6 +73,7 @@ def test_a_recording_without_what_the_task_reads_says_what_it_lacks(session, mon
         score_session(Recording(session[0]), [])
 
 
+@pytest.mark.long
 def test_the_report_shows_card_events_and_paths(session, tmp_path):
     report(Recording(session[0]), tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text()

@@ -47,6 +47,7 @@ def compare(name, directory, **changes):
     return summary
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", QUICK)
 def test_the_beginning_of_a_scenario(name, tmp_path):
     compare(name, tmp_path, duration="1 s")

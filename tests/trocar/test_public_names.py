@@ -150,6 +150,7 @@ def test_the_messages_are_all_there_once() -> None:
         assert issubclass(getattr(trocar.messages, name), Message)
 
 
+@pytest.mark.long
 def test_the_module_is_the_command_line(tmp_path: Path) -> None:
     command = [sys.executable, "-P", "-m", "trocar", "--help"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)

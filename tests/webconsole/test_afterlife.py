@@ -66,6 +66,7 @@ async def closed(socket):
         return error.rcvd.code
 
 
+@pytest.mark.long
 def test_the_page_shows_the_recording_and_goes_with_ctrl_c(tmp_path):
     async def body(page):
         async with page() as socket:
@@ -88,6 +89,7 @@ def test_the_page_shows_the_recording_and_goes_with_ctrl_c(tmp_path):
     assert "Traceback" not in said.read_text()
 
 
+@pytest.mark.long
 def test_without_a_recording_the_last_values_stay(tmp_path):
     async def body(page, said):
         async with page() as socket:
@@ -102,6 +104,7 @@ def test_without_a_recording_the_last_values_stay(tmp_path):
         assert run.wait(60) == 0
 
 
+@pytest.mark.long
 def test_where_no_page_is_open_the_command_ends_with_the_session(tmp_path):
     with running(tmp_path, "4 s", "--record", "one") as (run, _, _):
         assert run.wait(120) == 0

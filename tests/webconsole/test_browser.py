@@ -509,6 +509,7 @@ class Looker:
         await self.socket.send(json.dumps(command))
 
 
+@pytest.mark.long
 def test_a_viewer_who_looks_at_the_past_leaves_the_leading_page_in_the_present(session):
     """The viewer moves through the past as fast as it may; the other page leads on, and sees the present."""
     _, invite = session

@@ -183,6 +183,7 @@ def test_a_client_can_send_nothing(served):
     finish(body())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("link", "headers"),
     [
@@ -233,6 +234,7 @@ def test_a_recording_is_opened_by_foxglove_itself(tmp_path):
         view(tmp_path, foxglove=True)
 
 
+@pytest.mark.long
 def test_the_layout_names_topics_that_sessions_have():
     text = (files("webconsole.foxglove") / "layout.json").read_text(encoding="utf-8")
     layout = json.loads(text)

@@ -13,6 +13,7 @@ def lengths(far=FAR):
     return np.linalg.norm(far - NECK, axis=1)
 
 
+@pytest.mark.long
 def test_the_17_sub_tasks_follow_each_other_and_clips_and_cuts_are_where_they_should_be():
     world = World()
     assert world.run() is SubTask.DONE
@@ -32,6 +33,7 @@ def test_the_17_sub_tasks_follow_each_other_and_clips_and_cuts_are_where_they_sh
         assert length - first > 5e-3
 
 
+@pytest.mark.long
 def test_a_tube_in_front_of_the_other_is_clipped_and_cut_first():
     world = World(far=[FAR[0], [30e-3, -22e-3, 8e-3]])
     assert world.run() is SubTask.DONE
@@ -55,6 +57,7 @@ def test_the_gallbladder_is_pulled_away_from_the_ducts_within_the_limits():
     assert 0.3 <= 60.0 * float(np.linalg.norm(world.shift)) < 1.1
 
 
+@pytest.mark.long
 def test_missed_grasps_are_tried_again_elsewhere_and_deeper():
     world = World()
     world.misses = 2
@@ -67,6 +70,7 @@ def test_missed_grasps_are_tried_again_elsewhere_and_deeper():
     assert "given up in sub-task 1, grasp gallbladder: grasp missed: nothing is held" in world.routine.ended
 
 
+@pytest.mark.long
 def test_a_grasp_that_slips_is_taken_again_before_the_work_goes_on():
     world = World()
     world.run(lambda world: world.is_at(SubTask.CLIP_2_LEFT))
@@ -86,6 +90,7 @@ def test_a_grasp_that_slips_again_and_again_is_given_up():
     assert world.state.failure is Failure.GRASP_SLIPPED
 
 
+@pytest.mark.long
 def test_a_clip_that_slips_is_set_beside_its_place_or_given_up():
     world = World()
     world.slips = 1
@@ -98,6 +103,7 @@ def test_a_clip_that_slips_is_set_beside_its_place_or_given_up():
     assert "clip 1 left: clip slipped" in world.routine.ended
 
 
+@pytest.mark.long
 def test_a_clip_that_comes_off_later_is_replaced():
     world = World()
     world.run(lambda world: world.is_at(SubTask.BACK_FROM_CLIP_2_LEFT))
@@ -119,6 +125,7 @@ def test_a_cut_that_leaves_the_tube_together_is_made_again():
     assert world.state.failure is Failure.NOT_PARTED
 
 
+@pytest.mark.long
 def test_the_cut_goes_between_the_clips_as_they_lie_and_a_further_clip_makes_room():
     world = World()
     world.astray[0, 1], world.astray[1, 2] = -1.9e-3, 3.2e-3
@@ -131,6 +138,7 @@ def test_the_cut_goes_between_the_clips_as_they_lie_and_a_further_clip_makes_roo
         assert (np.abs(apart) > 1.5e-3).all()
 
 
+@pytest.mark.long
 def test_a_stump_that_bleeds_after_the_cut_is_clipped_again():
     world = World()
     world.leaks[0] = 2e-3
@@ -139,6 +147,7 @@ def test_a_stump_that_bleeds_after_the_cut_is_clipped_again():
     assert world.clips[0][3] > world.cuts[0] + 1.5e-3
 
 
+@pytest.mark.long
 def test_a_tube_parted_beyond_its_second_clip_gets_another_or_is_given_up_without_room():
     world = World()
     world.run(lambda world: world.cuts[0] is not None)
@@ -167,6 +176,7 @@ def test_the_gallbladder_is_pulled_elsewhere_where_no_way_leads_past_an_organ():
     assert world.run() is SubTask.DONE
 
 
+@pytest.mark.long
 def test_scissors_do_not_close_on_an_organ_to_be_spared():
     world = World("avoid=[wall]")
     world.run(lambda world: world.is_at(SubTask.CUT_LEFT) and world.state.step is Step.REACH)
@@ -178,6 +188,7 @@ def test_scissors_do_not_close_on_an_organ_to_be_spared():
     assert world.run() is SubTask.DONE
 
 
+@pytest.mark.long
 def test_a_tube_that_moves_is_aimed_at_anew():
     world = World()
     world.run(lambda world: world.is_at(SubTask.CLIP_1_LEFT) and world.state.step is Step.HOVER)
@@ -194,6 +205,7 @@ def test_a_tube_without_room_is_named():
     assert "a tube of 7.5 mm has no room for three clips and a cut: 8.2 mm at least" in world.routine.ended
 
 
+@pytest.mark.long
 def test_a_tube_out_of_reach_is_named():
     world = World()
     world.run(lambda world: world.is_at(SubTask.BACK_FROM_CUT_LEFT))
@@ -212,6 +224,7 @@ def test_a_refused_command_ends_the_routine_with_its_text():
     assert world.routine.ended.endswith("command refused: PSM1: servo_cp refused")
 
 
+@pytest.mark.long
 def test_a_saved_routine_goes_on_to_the_bit():
     world, other = World(), World()
     for each in (world, other):

@@ -11,6 +11,7 @@ from schemas.errors import MotionError, ScenarioError
 from tests.controllers.dissection.world import PERIOD, World
 
 
+@pytest.mark.long
 def test_the_whole_plate_is_freed_from_the_free_end_on_and_power_is_on_at_tissue_alone():
     world = World().run(80.0)
     assert world.state.done
@@ -33,6 +34,7 @@ def test_a_lower_third_is_enough_where_it_is_all_that_is_wanted():
     assert (world.ties[:, 1] > 0.035).all()
 
 
+@pytest.mark.long
 def test_a_missed_grasp_is_tried_again_and_then_given_up():
     world = World()
     world.misses = 1

@@ -88,6 +88,7 @@ def test_masters_hold_and_state_what_carries_them():
     assert 0.9 < weight[1] < 1.3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", [{"MTML__free": EmptyMessage()}, {"MTML__body__servo_cf": WrenchStamped()}])
 def test_a_free_master_stays_where_it_is(order):
     masters = Masters().step(1, **order).step(200)
@@ -139,6 +140,7 @@ def test_a_lock_that_is_no_rotation_is_refused():
     assert masters.said("MTML/orientation_locked") == []
 
 
+@pytest.mark.long
 def test_move_cp_arrives():
     masters = Masters().step(10)
     goal = masters.pose("MTML")
@@ -208,6 +210,7 @@ def test_a_hand_moves_a_free_master_and_feels_what_is_commanded_to_it():
     assert np.abs(felt[1:3]).max() < 0.5
 
 
+@pytest.mark.long
 def test_a_hand_that_lets_go_leaves_the_master_hanging():
     masters = Masters().step(1, MTML__body__servo_cf=WrenchStamped())
     masters.hold("MTML", masters.pose("MTML"))

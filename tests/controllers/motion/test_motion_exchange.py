@@ -88,6 +88,7 @@ def test_a_jaw_that_something_keeps_open_is_not_exchanged():
     assert one.outputs["drive/PSM1/instrument"][0] == 0.0
 
 
+@pytest.mark.long
 def test_an_instrument_without_a_jaw_refuses_commands_to_the_jaw():
     one = until(rig().step(1, set_tool_type=give(HOOK)), "exchange done")
     one.step(1, jaw__move_jp=JointState(position=np.array([0.3])))

@@ -96,6 +96,7 @@ def test_move_jp_ends_within_a_tenth_of_a_millimetre_and_of_a_degree():
     assert np.degrees(np.linalg.norm(turn)) < 0.1
 
 
+@pytest.mark.long
 def test_servo_cp_tracks_a_circle_of_40_mm_at_a_quarter_of_a_hertz_within_a_millimetre():
     bench, errors = Bench(), []
     start = CHAIN.forward(HOME)

@@ -140,6 +140,7 @@ def test_a_wire_that_is_always_seen_aside_does_not_make_it_too_sure():
     assert means[0.0] > 3.0 * means[0.04]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("camera", [OURS, AUTHORS], ids=["ours", "theirs"])
 def test_a_slip_of_20_degrees_is_found_within_a_second(camera):
     for seed in range(4):

@@ -87,6 +87,7 @@ class Guided(World):
         return self.run(seconds, until=lambda world: world.phase.name == phase)
 
 
+@pytest.mark.long
 def test_a_person_picks_sees_the_path_consents_and_gets_a_stitch_through_both_points():
     world = Guided()
     world.pick(0.008, 0.018)
@@ -144,6 +145,7 @@ def test_words_about_points_of_one_step_come_in_the_order_of_the_points():
     assert refused.startswith("refused: entry and exit are 0.0 mm apart")
 
 
+@pytest.mark.long
 def test_a_needle_that_lies_the_wrong_way_up_is_turned_over_by_the_other_hand():
     world = Guided()
     world.needle = world.needle @ np.diag([1.0, -1.0, -1.0, 1.0])
@@ -153,6 +155,7 @@ def test_a_needle_that_lies_the_wrong_way_up_is_turned_over_by_the_other_hand():
     assert world.phase is StitchPhase.PULL, world.said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "phases",
     [("LIFT", "PRESENT", "TAKE_BACK", "LEAVE_BACK", "LET_GO"), ("STEP_BACK", "TAKE", "PULL")],

@@ -97,6 +97,7 @@ class World:
         return self
 
 
+@pytest.mark.long
 def test_two_stitches_are_made_through_their_holes_one_after_the_other():
     world, tips = World(stitches=2), []
     while not world.lead.ended and world.t < 90e9:

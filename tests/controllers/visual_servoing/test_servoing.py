@@ -122,6 +122,7 @@ def test_an_arm_that_is_not_ready_is_left_where_it_is():
     assert session.step(65).states[-1] == "reached"
 
 
+@pytest.mark.long
 def test_a_goal_out_of_reach_ends_in_a_sentence_with_the_residual():
     goal = features(CHAIN.forward(REACHED), TARGET) * [1.0, 1.4]
     session = Session(goal=goal.tolist()).step(120)

@@ -31,6 +31,7 @@ def run(scenario, record=None, **values):
     return trocar.run(str(scenario), set={"duration": "0.3 s", **values}, record=record, one_host=True)
 
 
+@pytest.mark.long
 def test_a_recording_verifies_and_forks_without_its_policy(scenario, tmp_path):
     summary = run(scenario, tmp_path / "parent")
     assert summary.measures["answers"] > 1

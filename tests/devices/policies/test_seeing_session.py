@@ -65,6 +65,7 @@ def ahead(endpoint, data):
     return [{"psm1_pose": pose, "psm1_gripper": jaw, "psm2_pose": pose, "psm2_gripper": jaw}, {}]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("opengl")
 def test_two_arms_are_led_by_what_a_policy_sees_in_the_camera_frame(tmp_path):
     with groot_server(ahead) as (address, seen):

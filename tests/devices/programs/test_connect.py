@@ -97,6 +97,7 @@ def test_an_arm_moves_and_its_pose_is_that_of_the_kinematics(program):
     assert arm.body.measured_cf().force.shape == (3,)
 
 
+@pytest.mark.long
 def test_an_arm_follows_isaac_teleop(program):
     lead = IsaacTeleopPsm(program.PSM1)
     home = program.PSM1.setpoint_cp()
@@ -248,6 +249,7 @@ def alone(monkeypatch, tmp_path):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
+@pytest.mark.long
 def test_without_a_session_it_is_said_how_to_start_one(alone):
     with pytest.raises(ConnectError, match=r"no session of this user runs .* trocar run psm"):
         trocar.connect(timeout_s=0.0)
@@ -262,6 +264,7 @@ def endpoints():
         yield [f"tcp/127.0.0.1:{hub.getsockname()[1]}" for hub in (one, two)]
 
 
+@pytest.mark.long
 def test_of_a_session_closed_to_programs_it_is_said_what_opens_it(alone, endpoints):
     with (
         hub_file(endpoints[0], [], session="peg_board"),

@@ -70,6 +70,7 @@ def program(peer, rows):
     return said, peer.heard(rows["/kalmanOutput"], 60.0), peer.heard(rows["/Tcn_hat"], 60.0)
 
 
+@pytest.mark.long
 def test_a_program_shows_stitches_and_hears_the_filter(middleware):
     said, pose, matrix = middleware.run(scenario(), {"stereo", "suture_planner", ""}, program)
     assert "1 rejected: marker 'mine' 0: frame_id 'PSM7' is no frame of this scene" in said

@@ -61,6 +61,7 @@ def test_same_inputs_give_the_same_hashes_in_another_process_and_beside_another_
     assert len(set(expected)) == len(expected)
 
 
+@pytest.mark.long
 def test_no_force_before_contact_a_rising_force_in_it_and_none_after():
     with Rig() as rig:
         assert np.abs(rig.hold(0.2)[:, :3]).max() < 1e-3

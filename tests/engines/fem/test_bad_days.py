@@ -95,6 +95,7 @@ def test_an_organ_cut_to_single_elements_goes_on():
         assert np.isfinite(rig.nodes).all()
 
 
+@pytest.mark.long
 def test_power_without_contact_heats_nothing():
     with CauteryRig(start=(0.0, 0.0, 0.02), power=60.0) as rig:
         rig.watts[0] = 60.0
@@ -113,6 +114,7 @@ def go_on(saved):
         return rig.hashes
 
 
+@pytest.mark.long
 def test_a_cut_goes_on_in_another_process_with_the_same_bits(tmp_path):
     with engine_in_mid_cut() as rig:
         (tmp_path / "state").write_bytes(rig.engine.save())

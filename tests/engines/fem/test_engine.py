@@ -50,6 +50,7 @@ def test_the_force_is_that_of_converged_elements(radius, place):
         assert np.std([wrench[2] for wrench in rig.wrenches[-50:]]) < 1e-4 * rig.force[2]
 
 
+@pytest.mark.long
 def test_the_force_of_a_fine_mesh_is_corrected_too():
     with FemRig(params({**BLOCK, "nodes": 1500}), start=(0.0, 0.0, 6e-3)) as rig:
         rig.move((0.0, 0.0, 2e-3), 0.05)

@@ -79,6 +79,7 @@ def test_opening_blades_leave_the_tissue():
         assert np.abs(rig.force[:4]).max() == 0.0
 
 
+@pytest.mark.long
 def test_wild_scissors_leave_no_nan():
     random = np.random.default_rng(1)
     with rig_of() as rig:

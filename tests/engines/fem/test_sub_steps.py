@@ -110,6 +110,7 @@ def test_momentum_of_a_stiff_and_a_soft_organ_is_kept():
         assert np.abs(spinning - turning).max() < 2e-3 * np.abs(turning).max()
 
 
+@pytest.mark.long
 def test_strength_and_work_of_ties_hold_for_organs_with_other_sub_steps():
     with PlateRig(**STIFF) as rig:
         assert rig.engine._organs[0].every > 1

@@ -48,6 +48,7 @@ class JawRig(TubeRig):
         return np.stack([forces.mean(axis=0), forces.std(axis=0)])
 
 
+@pytest.mark.long
 def test_closing_jaws_flatten_a_tube_with_equal_forces_by_its_modulus():
     found = {}
     for modulus, inertia in (("100 kPa", 1.0), ("300 kPa", 25.0)):

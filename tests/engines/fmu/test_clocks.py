@@ -142,6 +142,7 @@ class Tapper(Stepped):
         """Nothing to close."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("host", ["", ", host: fmu"])
 def test_clocks_tick_in_a_session_that_verifies(library: Path, tmp_path: Path, host: str) -> None:
     """Taps tick the first metronome, whose bell ticks the second; both beat by themselves."""

@@ -119,6 +119,7 @@ class TestFailures:
         with pytest.raises(SessionError, match=r"Get\w*Derivatives returned 'error'"):
             run(engine, 500)
 
+    @pytest.mark.long
     @BOTH
     def test_a_discard_lets_the_solver_try_shorter_steps_first(self, hop: Make, fmi: int) -> None:
         engine = hop(fmi, start={"low": 0.5, "fault": DISCARD_BELOW_LOW})
@@ -136,6 +137,7 @@ class TestFailures:
             _ = make(SPRING, period=0, solver="cvode").ports
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("host", ["", ", host: fmu"])
 def test_a_session_verifies(hoppers: dict[int, Path], tmp_path: Path, host: str) -> None:
     pack(3, hoppers[3], tmp_path / "hopper.fmu")

@@ -114,6 +114,7 @@ def test_a_number_of_the_other_side(fmu: Path) -> None:
         _ = bonded(fmu, "rotor.flange", stiffness=1.0).ports
 
 
+@pytest.mark.long
 def test_a_rotor_swings_on_a_spring_with_a_book_of_energy(fmu: Path, tmp_path: Path) -> None:
     """Both are FMUs of FMI 3.0: the period is that of theory, and the book closes."""
     (tmp_path / "swing.yaml").write_text(

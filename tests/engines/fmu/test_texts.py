@@ -148,6 +148,7 @@ class TestBadValues:
         assert "output 'image' stays empty: the FMU does not give its value" in caplog.text
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("host", ["", ", host: other"])
 def test_a_session_carries_records_and_verifies(
     notes_libraries: dict[int, Path], tmp_path: Path, host: str

@@ -125,6 +125,7 @@ def in_session(params: MujocoParams, given: list[dict[str, np.ndarray]]) -> list
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fmi", ["2", "3"])
 def test_fmpy_finds_no_problem(fmus: dict[str, Path], fmi: str) -> None:
     from fmpy.validation import validate_fmu
@@ -186,6 +187,7 @@ class Swing(Stepped):
         pass
 
 
+@pytest.mark.long
 def test_it_follows_a_recording_to_the_last_bit(fmus: dict[str, Path], tmp_path: Path) -> None:
     scenario = tmp_path / "swing.yaml"
     scenario.write_text(f"""
@@ -229,6 +231,7 @@ def test_fmpy_simulates_it(fmus: dict[str, Path], fmi: str) -> None:
     assert found["PSM1.jaw.measured_js.position.jaw"][-1] == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fmi", ["2", "3"])
 def test_a_state_is_taken_back_and_comes_from_another_instance(fmus: dict[str, Path], fmi: str) -> None:
     word, deserialize = {"2": ("FMUstate", "deSerialize"), "3": ("FMUState", "deserialize")}[fmi]

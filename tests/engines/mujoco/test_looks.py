@@ -158,6 +158,7 @@ def test_what_collides_is_convex_and_belongs_to_a_body_with_a_look(what: str) ->
                 np.testing.assert_allclose(shape.pose[:3, :3] @ shape.pose[:3, :3].T, np.eye(3), atol=1e-12)
 
 
+@pytest.mark.long
 def test_the_same_bytes_in_another_process() -> None:
     """Meshes do not depend on what was built before, nor on the process."""
     script = (

@@ -111,6 +111,7 @@ def test_mjcf_gives_the_same_jaw(tmp_path):
         }
 
 
+@pytest.mark.long
 def test_a_session_has_the_jaw_and_verifies(tmp_path):
     done = CliRunner().invoke(
         app, ["import", str(model(tmp_path)), "-o", str(tmp_path / "own-tip.yaml"), "--opening", "50"]

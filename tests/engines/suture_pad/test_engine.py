@@ -79,6 +79,7 @@ def test_with_a_thread_it_keeps_the_contract_too():
     assert not [port.name for port in pad().ports if "thread" in port.name or port.name == "passages"]
 
 
+@pytest.mark.long
 def test_the_needle_draws_its_thread_into_its_channel_and_feels_it():
     engine = with_thread(node_period="1 ms")
     first = engine.configure(Setup(MS, None, {"needle": IMPULSE}))["thread/nodes"]

@@ -53,6 +53,7 @@ def test_every_ugly_surface_is_usable_or_refused():
     assert {*USABLE, *REFUSED} == set(UGLY)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", USABLE)
 def test_a_usable_surface_gives_a_sound_mesh_of_about_as_many_nodes(tmp_path, name):
     volume, said = USABLE[name]
@@ -71,6 +72,7 @@ def test_an_unusable_surface_is_refused_with_reason_and_remedy(tmp_path, name):
         import_organ([file])
 
 
+@pytest.mark.long
 def test_a_part_of_several_is_chosen(tmp_path):
     organ = import_organ([written(tmp_path, "two_parts")], part=2)
     assert organ.mesh.volume * 1e6 == pytest.approx(179, rel=0.1)
@@ -78,6 +80,7 @@ def test_a_part_of_several_is_chosen(tmp_path):
         import_organ([written(tmp_path, "two_parts")], part=3)
 
 
+@pytest.mark.long
 def test_the_command_writes_an_organ_for_scenarios_and_a_picture(tmp_path):
     file, output = written(tmp_path, "millimetres"), tmp_path / "mine.yaml"
     arguments = ["import", str(file), "-o", str(output), "--material", "liver", "--anchor", "bed"]
@@ -96,6 +99,7 @@ def test_the_command_writes_an_organ_for_scenarios_and_a_picture(tmp_path):
         OrganParams.model_validate({"mesh": "broken.yaml"}, context=Files(tmp_path).context)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".stl", ".obj", ".ply", ".glb"])
 def test_a_scenario_names_a_surface_of_any_kind(tmp_path, suffix):
     file = tmp_path / f"organ{suffix}"
@@ -183,6 +187,7 @@ def test_a_surface_opens_no_second_file(tmp_path):
     assert len(mesh_file.read_surface(tmp_path / "organ.obj").triangles) == 32
 
 
+@pytest.mark.long
 def test_the_unit_is_stated_where_no_guess_makes_an_organ(tmp_path):
     file = tmp_path / "organ.stl"
     surface = ellipsoid()

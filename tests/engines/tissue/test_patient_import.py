@@ -128,6 +128,7 @@ def test_organs_have_the_volume_of_their_voxels_and_a_sound_mesh(patient):
     ]
 
 
+@pytest.mark.long
 def test_all_organs_are_in_one_frame_of_an_operation(patient):
     """The example lies as in an operation: the fundus cranial of the duct, both anterior of the liver."""
     middles = {name: organ.mesh.nodes.mean(axis=0) for name, organ in patient.organs.items()}
@@ -139,6 +140,7 @@ def test_all_organs_are_in_one_frame_of_an_operation(patient):
     assert nodes.min(axis=0)[:2] + nodes.max(axis=0)[:2] == pytest.approx([0.0, 0.0], abs=4e-3)
 
 
+@pytest.mark.long
 def test_organs_that_touch_have_surfaces_there_and_hang_together(patient):
     bed, neck = patient.contacts
     assert set(bed.organs) == {"gallbladder", "liver"}

@@ -99,6 +99,7 @@ def test_every_installed_scenario_is_valid(trocar):
         assert code == 0, f"{name}: {err}"
 
 
+@pytest.mark.long
 def test_a_log_that_is_no_terminal_has_one_line_for_each_message():
     old = ["--set", "participants.stylus.link.delay=3 ms"]
     command = [sys.executable, "-P", "-m", "hub.command_line", "check", "palpation", *old]

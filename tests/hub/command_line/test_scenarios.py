@@ -24,6 +24,7 @@ def test_every_installed_scenario_is_in_one_family():
     assert sorted(chain.from_iterable(scenario_families().values())) == sorted(installed_scenarios())
 
 
+@pytest.mark.long
 def test_they_are_listed_a_line_each(trocar):
     code, out, err = trocar("list")
     assert (code, err) == (0, "")

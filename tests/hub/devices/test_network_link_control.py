@@ -124,6 +124,7 @@ def test_the_arm_holds_in_an_outage_and_continues_after_it(prepare):
     assert fresh[1] - fresh[0] < 50
 
 
+@pytest.mark.long
 def test_on_the_command_line(prepare, monkeypatch, capfd):
     monkeypatch.setenv("COLUMNS", "160")
     session = prepare(SCENARIO)

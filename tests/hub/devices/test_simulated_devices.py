@@ -48,12 +48,14 @@ LINK = (
 )
 
 
+@pytest.mark.long
 def test_a_network_link_gives_the_same_bits_too(prepare):
     first = run(prepare, LINK)
     assert run(prepare, LINK, *PLACEMENTS[-1]) == first
     assert run(prepare, LINK.replace("seed: 3", "seed: 4")) != first
 
 
+@pytest.mark.long
 def test_a_session_with_a_link_is_re_simulated(prepare, tmp_path):
     summary = prepare(SCENARIO, LINK, "participants.mixer.host=far", record=tmp_path / "recording").run()
     assert summary.recording_complete

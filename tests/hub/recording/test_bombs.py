@@ -98,6 +98,7 @@ def test_a_series_of_frames_is_whole_only_to_the_end_of_the_last(checksum: bool)
         unpack("zstd", packed[:first_block])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stated", [1000 * MiB, 1000], ids=["true size", "false size"])
 @pytest.mark.parametrize("compression", PACKERS)
 def test_a_bomb_in_a_recording(tmp_path: Path, compression: str, stated: int) -> None:

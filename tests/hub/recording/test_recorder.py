@@ -402,6 +402,7 @@ def test_nothing_is_recorded_after_an_error(tmp_path: Path, monkeypatch: pytest.
     assert (summary.messages, summary.dropped, summary.error) == (0, 1010, "No space left on device")
 
 
+@pytest.mark.long
 def test_sigkill_loses_at_most_what_was_queued(tmp_path: Path) -> None:
     code = """
 import sys

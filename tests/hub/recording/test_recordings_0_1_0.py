@@ -80,6 +80,7 @@ def test_an_old_recording_is_read(recorded: tuple[str, Recording]) -> None:
         assert np.array_equal(series.values, values)
 
 
+@pytest.mark.long
 def test_an_old_recording_is_verified(recorded: tuple[str, Recording]) -> None:
     _, recording = recorded
     summary = verify(recording)

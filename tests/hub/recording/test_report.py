@@ -95,6 +95,7 @@ def test_it_follows_the_readers_theme(text: str) -> None:
     assert not re.findall(r"#c0000\d|#101112|#d0d1d2", text)
 
 
+@pytest.mark.long
 def test_words_of_a_scenario_are_no_markup(text: str) -> None:
     assert "PSM1 &lt;and&gt; retreats" in text
     assert "<and>" not in text
@@ -204,6 +205,7 @@ def test_nothing_in_a_strangers_recording_is_markup(tmp_path: Path, text: str) -
     assert "<script" not in Recording(tmp_path / "<img src=x onerror=alert(3)>")._repr_html_()
 
 
+@pytest.mark.long
 def test_a_browser_runs_and_loads_nothing_of_the_page(text: str) -> None:
     page = Page(text)
     policy = {

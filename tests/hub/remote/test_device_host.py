@@ -101,6 +101,7 @@ def port(endpoint):
     return int(endpoint.rpartition(":")[2])
 
 
+@pytest.mark.long
 def test_a_host_outlives_the_hub_and_joins_the_next_session_of_its_name(prepare, tmp_path):
     first = Running(prepare(SCENARIO))
     until(lambda: first.status)

@@ -51,6 +51,7 @@ ALONE = (
 )
 
 
+@pytest.mark.long
 def test_its_hashes_are_the_same(loaded, tmp_path):
     expected = launch(loaded(text=ALONE), endpoint="tcp/127.0.0.1:0").run()
     authority, endpoint = Authority.founded(tmp_path / "certs"), f"tls/127.0.0.1:{free_port()}"
@@ -179,6 +180,7 @@ connections:
 """
 
 
+@pytest.mark.long
 def test_a_camera_elsewhere_that_is_lost_joins_again_and_gets_the_surface_again(loaded, tmp_path, caplog):
     file, endpoint = tmp_path / "shown.txt", f"tcp/127.0.0.1:{free_port()}"
     session = launch(loaded(text=LOOKED_AT.replace("FILE", str(file))), endpoint=endpoint)

@@ -71,6 +71,7 @@ def test_the_session_never_waits_for_it(prepare):
     assert summary.observers["camera"].states <= summary.wall_time_s / 4.0
 
 
+@pytest.mark.long
 def test_a_device_is_shown_what_it_shows(prepare, tmp_path):
     file = tmp_path / "pad.txt"
     pad = f"""  pad: {{kind: "toys:Pad", host: pad, file: "{file}"}}\n"""

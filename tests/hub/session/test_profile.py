@@ -84,6 +84,7 @@ def test_late_steps_have_their_cause(prepare, overrides: Iterable[str], cause):
     assert all(row["took_s"] >= 0.005 for row in profile["worst_steps"])
 
 
+@pytest.mark.long
 def test_a_profile_changes_no_state(prepare):
     there = "participants.light.host=other"
     assert prepare(WORK, there, profile=True).run().state_hash == prepare(WORK, there).run().state_hash
@@ -122,6 +123,7 @@ def test_a_host_that_fails_leaves_a_profile_in_the_recording(prepare, tmp_path):
     assert Recording(tmp_path / "run").profile() is not None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("profiled", [True, False])
 def test_ls_shows_who_takes_most_of_a_running_session(prepare, capfd, profiled):
     session = prepare(

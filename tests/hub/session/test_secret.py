@@ -83,6 +83,7 @@ def listening(pid):
     ]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="finds the ports of a process in /proc")
 def test_without_the_secret_neither_the_hub_nor_a_host_lets_anybody_in(prepare):
     expected = prepare(SCENARIO).run()
@@ -145,6 +146,7 @@ def test_what_listens_without_a_session_of_this_user_is_named():
             reach(endpoint, "console")
 
 
+@pytest.mark.long
 def test_a_host_that_the_same_user_starts_by_hand_joins(prepare):
     session = prepare(SCENARIO, "participants.there.host=remote", "join_limit=60 s")
     command = [
@@ -162,6 +164,7 @@ def test_a_host_that_the_same_user_starts_by_hand_joins(prepare):
         assert process().wait(LIMIT_S) == 0
 
 
+@pytest.mark.long
 def test_a_host_with_a_link_and_one_that_joins_by_hand_step_together(prepare):
     text = SCENARIO.replace("connections:", '  far: {kind: "toys:Mixer", host: remote}\nconnections:')
     text += "  - there.out -> far.a\n  - far.out -> there.b\norder: [here, there, far]\n"
@@ -266,6 +269,7 @@ def test_an_ack_that_is_only_repeated_is_refused_and_counted(acks):
     assert refusals.total == 1
 
 
+@pytest.mark.long
 def test_control_messages_that_are_nested_long_or_many_are_refused_unread(prepare, caplog):
     nested = SetRequest(participant="there", port="b", value=0).model_dump_json()
     nested = nested.replace('"value":0', '"value":' + "[" * 180 + "]" * 180)

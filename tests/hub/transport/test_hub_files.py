@@ -39,6 +39,16 @@ def test_the_file_of_a_hub_that_was_killed_is_deleted_when_it_is_met(home, liste
         assert not list(home.rglob("*.json"))
 
 
+@pytest.mark.parametrize("error", [TimeoutError, ConnectionResetError])
+def test_a_hub_that_is_busy_or_about_to_end_is_still_one(home, listener, monkeypatch, error):
+    def refuse(*_):
+        raise error
+
+    with hub_file(_endpoint(listener), []):
+        monkeypatch.setattr(socket, "create_connection", refuse)
+        assert [hub.endpoint for hub in running_hubs()] == [_endpoint(listener)]
+
+
 def test_something_else_among_the_files_is_ignored(home, listener):
     with hub_file(_endpoint(listener), []):
         (file,) = home.rglob("*.json")

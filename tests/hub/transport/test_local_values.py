@@ -109,6 +109,7 @@ connections:
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("reader", ["hub", "third"])
 def test_a_reader_that_seldom_steps_makes_room(prepare: Prepare, reader: str) -> None:
     apart = prepare(SELDOM.replace("READER", reader)).run()
@@ -123,6 +124,7 @@ def test_the_sockets_have_no_name_and_no_other_process_inherits_them(prepare: Pr
     assert all(end.fileno() == -1 for end in inboxes.ends("hub").values())
 
 
+@pytest.mark.long
 def test_hosts_of_a_machine_publish_nothing_for_each_other_on_zenoh(prepare: Prepare, monkeypatch) -> None:
     keys = []
     monkeypatch.setattr("hub.transport.publisher.Publisher.put", lambda self, *_: keys.append(self))

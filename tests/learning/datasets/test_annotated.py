@@ -80,6 +80,7 @@ def test_run_lengths_are_those_of_a_mask() -> None:
     assert run_lengths(np.zeros((2, 3), np.bool_)) == [6]
 
 
+@pytest.mark.long
 def test_coco_has_a_mask_and_keypoints_of_each_instance(recording: Path) -> None:
     made = make(recording, "coco")
     content = read_json(made / "annotations.json")

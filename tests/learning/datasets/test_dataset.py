@@ -216,6 +216,7 @@ def test_what_cannot_be_used_is_left_out_and_the_rest_is_whole(recordings: Path,
     assert info(tmp_path / "set")["total_frames"] == rows(tmp_path / "set").num_rows
 
 
+@pytest.mark.long
 def test_a_scene_of_a_changed_file_is_drawn_with_trust_alone(recordings: Path, tmp_path: Path) -> None:
     bodies = {
         name: BodyInertia(mass=body.mass, centre=body.centre, tensor=body.tensor)

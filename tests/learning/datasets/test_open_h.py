@@ -76,6 +76,7 @@ def test_it_has_what_open_h_asks_for(made: Path) -> None:
     assert statistics[1]["stats"]["action"]["count"] == [episodes[1]["length"]]
 
 
+@pytest.mark.long
 def test_each_feature_is_a_column_of_each_episode_or_a_video(made: Path) -> None:
     info = json.loads((made / "meta/info.json").read_text())
     for episode in (0, 1):

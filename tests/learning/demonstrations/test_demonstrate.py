@@ -46,6 +46,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+@pytest.mark.long
 def test_the_data_set_has_all_episodes_once(made: Path) -> None:
     info = json.loads((made / "meta/info.json").read_text())
     episodes = lines(made, "episodes")

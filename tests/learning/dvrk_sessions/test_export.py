@@ -129,6 +129,7 @@ def test_documents_have_the_fields_of_dvrk_data(session: Path) -> None:
     assert tags["stages"][0]["name"] == "pick_and_place"
 
 
+@pytest.mark.long
 def test_times_of_pictures_are_exact(recording: Path, session: Path) -> None:
     original = trocar.Recording(recording)
     for eye in ("left", "right"):
@@ -170,6 +171,7 @@ def test_an_export_is_the_same_again(recording: Path, session: Path, tmp_path: P
     assert first == second
 
 
+@pytest.mark.long
 def test_a_session_is_scored_and_relived(recording: Path, session: Path, tmp_path: Path) -> None:
     again, original = (
         {metric.name: metric.value for metric in card.metrics}

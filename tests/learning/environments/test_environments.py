@@ -249,6 +249,7 @@ def test_without_gymnasium_the_sentence_says_what_mends_it():
     assert "pip install 'trocar[gym]'" in done.stdout
 
 
+@pytest.mark.long
 def test_a_fresh_process_needs_no_import_of_ours():
     program = (
         "import gymnasium; made = gymnasium.make('trocar.environments:trocar/Reach-v0'); made.reset(seed=1);"
@@ -290,6 +291,7 @@ def test_after_close_a_sentence():
     env.close()
 
 
+@pytest.mark.long
 def test_gymnasium_records_a_film(tmp_path):
     pytest.importorskip("moviepy")
     if not (found := opengl.find()).name:

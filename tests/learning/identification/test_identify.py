@@ -94,6 +94,7 @@ def test_whose_states_count_is_an_option(tmp_path):
     assert "no topics that end in 'real/PSM1/measured_js'" in failed
 
 
+@pytest.mark.long
 def test_the_command_computes_alike_on_every_machine():
     """Threads and kernels are set before numpy is imported; what imports it later cannot change them."""
     script = """

@@ -35,6 +35,7 @@ def test_a_tip_goes_where_the_rows_say(judged):
     env.close()
 
 
+@pytest.mark.long
 def test_frames_are_those_of_the_contract():
     """In the base's frame the same rows lead to another place: 200 mm lower, and turned."""
     rows = [judge_trials(PolicyAddress(f"python:{FILE}:Reach", given), [TRIAL], None)[0]
@@ -43,6 +44,7 @@ def test_frames_are_those_of_the_contract():
     assert [row["error"] for row in rows] == [None, None]
 
 
+@pytest.mark.long
 def test_answers_are_actions_that_entered(tmp_path):
     (row,) = judge_trials(PolicyAddress(f"python:{FILE}:Reach"), [TRIAL], str(tmp_path))
     assert row["steps"] == 250  # 10 s in rows of 40 ms

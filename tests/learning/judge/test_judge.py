@@ -113,6 +113,7 @@ def test_a_policy_that_is_held_is_entered_and_left():
     assert import_module(OWN).Held.said == ["entered", "left"]
 
 
+@pytest.mark.long
 def test_two_policies_on_the_same_seeds(expert, tmp_path):
     other = tmp_path / "random"
     code, _ = judge("--policy", "random", "--suite", "NeedlePick", "--seeds", 2, "--jobs", 1, "-o", other)

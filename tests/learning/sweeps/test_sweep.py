@@ -132,6 +132,7 @@ def test_a_cluster_that_is_not_there_is_named(begun, command):
     assert (code, "no Ray cluster at 'nowhere': Invalid address" in said) == (1, True)
 
 
+@pytest.mark.long
 def test_an_edited_scenario_is_noticed(scenario, tmp_path):
     def sweep():
         return Sweep(str(scenario), (parse("part.value=0,0.5"),), tmp_path / "results", recorded=False)
@@ -224,6 +225,7 @@ def test_a_damaged_row_is_named(begun, command, row):
     assert (code, "00001.json'" in said, "delete it" in said) == (2, True, True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "values",
     [

@@ -173,6 +173,7 @@ def test_the_endoscope_arm_is_identified(monkeypatch):
     own_dynamics(found, CUTOFF, ["sim.csv"])
 
 
+@pytest.mark.long
 def test_friction_that_is_larger_at_rest_is_found():
     shape = FrictionShape(
         np.full(7, 200.0), 0.03 * np.abs(MODEL.shares) @ [joint.velocity for joint in ARM.joints]

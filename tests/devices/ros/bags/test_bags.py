@@ -187,6 +187,7 @@ def test_a_bag_of_a_session_drives_another_one_to_the_same_bits(driven, bag):
     assert verify(replayed).same
 
 
+@pytest.mark.long
 def test_it_has_the_names_the_pace_and_the_quality_that_programs_expect(driven, bag):
     with AnyReader([bag]) as reader:
         quality = {

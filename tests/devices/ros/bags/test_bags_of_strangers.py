@@ -98,6 +98,7 @@ def test_a_description_with_other_contents_is_not_read(place: Path) -> None:
     export(recording, place / "bag", trust=True)
 
 
+@pytest.mark.long
 def test_a_time_that_would_fill_the_disk(place: Path) -> None:
     """A gateway's transforms are written in each of its periods up to the time of the last message."""
     recording = stranger(place, ros={**INSTALLED, "arms": {"PSM1": {"instrument": "400006"}}}, hours=[1, 3])

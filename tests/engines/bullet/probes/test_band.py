@@ -16,6 +16,7 @@ def of_block(nodes, radius):
     return band(OrganParams.model_validate({**BLOCK, "nodes": nodes}), radius)
 
 
+@pytest.mark.long
 def test_a_finer_mesh_and_a_larger_sphere_need_less():
     coarse, fine = of_block(250, 5e-3), of_block(600, 5e-3)
     assert coarse.stiffer[1] > fine.stiffer[1] > 1.5
@@ -27,6 +28,7 @@ def test_without_anchors_or_with_too_many_nodes_there_is_none():
     assert of_block(1500, 5e-3) is None
 
 
+@pytest.mark.long
 def test_trocar_organs_shows_it():
     shown = " ".join(CliRunner().invoke(app, []).output.split())
     assert "times too stiff under a sphere of 5 mm" in shown

@@ -32,6 +32,7 @@ def presses(model, at, depths):
             yield centres(depth), rig.force, rig.nodes
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "at", [(0.0, 0.0), (5e-3, 0.0), (4e-3, 3e-3), (2e-3, 1e-3)], ids=["node", "edge", "face", "off-node"]
 )
@@ -90,6 +91,7 @@ def test_the_force_follows_that_of_finite_elements_at_5_hz():
     assert np.corrcoef(forces, truth)[0, 1] > 0.999
 
 
+@pytest.mark.long
 def test_a_drag_is_felt_as_much_by_the_tissue():
     model = params(BLOCK)
     body = Body(model.organs["block"])

@@ -52,11 +52,13 @@ def test_a_finer_mesh_has_the_same_force():
     np.testing.assert_allclose(forces, CONVERGED_N[[1, 4]], rtol=0.06)
 
 
+@pytest.mark.long
 def test_without_it_the_mesh_is_some_times_too_stiff():
     forces = list(pressed(params(BLOCK), PLACES["face"], DEPTHS_M))
     assert min(forces / CONVERGED_N) > 2.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("at", [PLACES["node"], PLACES["face"]], ids=["node", "face"])
 @pytest.mark.parametrize(("radius", "young_modulus"), [(2e-3, 10e3), (3e-3, 25e3)])
 def test_spheres_of_other_sizes_and_stiffer_tissue(radius, young_modulus, at):
@@ -71,6 +73,7 @@ def test_a_small_sphere_two_and_a_half_radii_deep():
     assert force == pytest.approx(0.1743, rel=0.05)  # bench/tissue_truth.json
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("at", [PLACES["node"], PLACES["face"]], ids=["node", "face"])
 def test_it_follows_at_5_hz(at):
     w = 10 * np.pi
@@ -113,6 +116,7 @@ def test_several_spheres_and_fingers_feel_the_mesh():
     assert params(BLOCK, sub_grid=True).has_sub_grid("probe")
 
 
+@pytest.mark.long
 def test_beyond_the_depths_that_are_known_it_says_so(caplog):
     radius = 1.5e-3
     with caplog.at_level(logging.WARNING):

@@ -98,6 +98,7 @@ def test_a_cut_bleeds_by_its_area_and_perfusion():
         assert rig.bleeding.imbalance == 0
 
 
+@pytest.mark.long
 @over(st.integers(0, 2**32 - 1))
 def test_no_blood_is_lost_on_a_mesh_that_is_opened_and_taken_away(seed):
     random = np.random.default_rng(seed)
@@ -124,6 +125,7 @@ def test_an_uncut_organ_is_dry():
         assert rig.outputs["block/film"].nodes.size == 0
 
 
+@pytest.mark.long
 def test_blood_runs_over_the_surface_and_drips_off_the_lower_edge():
     with BloodRig() as rig:
         rig.open()

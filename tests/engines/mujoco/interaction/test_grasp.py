@@ -83,6 +83,7 @@ class Rig:
         return self.run(seconds, move)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["needle", "ring"])
 def test_friction_alone_holds_through_lift_and_shake(kind):
     rig = Rig(kind).pick_up()

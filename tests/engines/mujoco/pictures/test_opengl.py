@@ -74,6 +74,7 @@ def test_mujoco_is_imported_whatever_mujoco_gl_asks_for(asked: str | None) -> No
     assert done.stdout.endswith(f"MjData'> {asked}\n")
 
 
+@pytest.mark.long
 def test_a_session_runs_where_mujoco_gl_names_what_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUJOCO_GL", "none-such")
     what = [

@@ -59,6 +59,7 @@ def test_coats_and_kinds_of_faces_have_tiles(abdomen):
         assert pixels(coat.texture.colour).shape == (256, 256, 3)
 
 
+@pytest.mark.long
 def test_the_place_is_the_one_of_the_scene(abdomen):
     assert abdomen.place == "abdomen"
     assert len(abdomen.surroundings) > 2

@@ -107,6 +107,7 @@ def test_the_camera_sees_the_tissue_wherever_that_runs(recordings: dict[str, Rec
     assert (one[0] != one[-1]).any()  # the probe starts in the tissue and pushes it away
 
 
+@pytest.mark.long
 def test_a_recording_shows_what_the_camera_saw(recordings: dict[str, Recording]) -> None:
     scene = RecordedScene(recordings["tissue"])
     shown = scene.picture(160_000_000, "overview", (120, 90), (0.09, -0.11, 0.07), (0.0, 0.0, -0.005))

@@ -86,6 +86,7 @@ def cast_scene(scene: TruthScene, instant: Instant, sight: Sight) -> tuple[NDArr
     return body.reshape(sight.hit.shape), depth.reshape(sight.hit.shape)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["tissue", "objects", "distorted"])
 def test_segmentation_and_depth_are_those_of_rays(gl: str, tissue: Tissue, what: str) -> None:
     chosen = TISSUE if what == "tissue" else OBJECTS

@@ -47,6 +47,7 @@ def test_the_surface_is_closed_and_faces_outwards(size, nodes):
     )
 
 
+@pytest.mark.long
 @given(SIZES, NODES, st.sampled_from([0, 1]))
 def test_a_block_is_its_own_mirror_image(size, nodes, axis):
     mesh = block(size, nodes)

@@ -87,6 +87,7 @@ def hashes(engine, steps=64):
     return found
 
 
+@pytest.mark.long
 def test_several_organs_in_several_engines_repeat_bit_for_bit():
     organs = {
         "kidney": {"shape": "kidney-with-adrenal", "nodes": 150},

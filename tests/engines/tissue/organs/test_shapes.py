@@ -405,6 +405,7 @@ def test_a_mesh_that_is_not_there_and_one_that_nothing_holds(tmp_path):
         organ(**given, nodes=100)
 
 
+@pytest.mark.long
 def test_the_command_prints_shapes_and_materials():
     text = CliRunner().invoke(app, ["--nodes", "150"]).output
     assert "kidney-with-adrenal" in text

@@ -98,6 +98,7 @@ def test_pictures_of_tissue(shown: Shown) -> None:
     assert dry[HEIGHT // 2, -WIDTH // 8, 1] > 2.0 * right[1]
 
 
+@pytest.mark.long
 def test_a_camera_that_was_inside_an_organ_sees_it_again(shown: Shown) -> None:
     nodes = shown.block.part(0.0)
     shown.draw(nodes + np.array([0.02, 0.0, DISTANCE]))
