@@ -125,6 +125,7 @@ class ModelExchange(Instance):
             return
         for block in self._event_blocks:
             block.store(inputs, tau)
+        # the empty part is for an FMU with texts and no discrete numbers
         values = np.concatenate([self.memory[:0], *(block.values for block in self._event_blocks)])
         if texts or not np.array_equal(values, self.memory[1:]):
             self.memory[1:] = values

@@ -36,7 +36,6 @@ from schemas.errors import CutShortError, MessageError, RecordingError, did_you_
 
 __all__ = ["Bag", "BagMessage", "message_errors"]
 
-
 _MAX_TOPIC_RATIO, _FREE_TOPIC_BYTES = 32, 2**29
 """Bytes of a single topic in memory at once: a multiple of the file's size, or the second number if greater.
 """

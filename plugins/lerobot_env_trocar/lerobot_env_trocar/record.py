@@ -27,12 +27,12 @@ _PUSHED, _PUSH = 0.2, 0.3
 """Share of steps with noise, and its standard deviation: episodes hold ways back from errors."""
 
 
-def record(env: LeRobotEnvironment, dataset: LeRobotDataset, episodes: int, first_seed: int) -> int:
-    """Add successful episodes to a data set; return the seed after the last.
+def record(env: LeRobotEnvironment, dataset: LeRobotDataset, episodes: int) -> None:
+    """Add episodes with success to a data set, seeds from `FIRST_SEED` on, until it has so many.
 
     A pushed step has the oracle's own action, though another was executed (DART, Laskey et al., CoRL 2017).
     """
-    seed = first_seed
+    seed = FIRST_SEED
     while dataset.num_episodes < episodes:
         rng, expert = np.random.default_rng(seed), oracle(env.unwrapped)
         observation, info = env.reset(seed=seed)
@@ -50,7 +50,6 @@ def record(env: LeRobotEnvironment, dataset: LeRobotDataset, episodes: int, firs
         else:
             dataset.clear_episode_buffer()
         seed += 1
-    return seed
 
 
 def _frame(observation: dict[str, Any], action: Any) -> dict[str, Any]:
@@ -94,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         root=given.root,
         robot_type="dvrk",
     )
-    record(env, dataset, given.episodes, FIRST_SEED)
+    record(env, dataset, given.episodes)
     dataset.finalize()
     env.close()
 

@@ -9,14 +9,7 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from robots import rotation
 from robots.dvrk.drive import Disc, Drive
@@ -25,9 +18,7 @@ from robots.dvrk.end_effectors.end_effector import EndEffector, Mount
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.link import Link
 from robots.dvrk.own_dynamics import JAW, OwnDynamics
-from robots.dvrk.parameters import (
-    UnitQuaternion,
-)
+from robots.dvrk.parameters import UnitQuaternion
 from robots.serial_chain import SerialChain
 from robots.transform import rigid_transform
 from schemas.errors import MotionError

@@ -5,17 +5,11 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Self
 
-from pydantic import (
-    Field,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
 from robots.dvrk import arm_bodies, drives, ecm, si
 from robots.dvrk.mounted.mounted_arm import MountedArm, Published
-from robots.dvrk.parameters import (
-    EcmPositions,
-    check_start,
-)
+from robots.dvrk.parameters import EcmPositions, check_start
 from robots.serial_chain import SerialChain
 
 __all__ = ["MountedEcm"]

@@ -6,20 +6,13 @@ from functools import cached_property
 from math import radians
 from typing import ClassVar, Self
 
-from pydantic import (
-    Field,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
 from robots.dvrk import arm_bodies, drives, mtm
 from robots.dvrk.end_effectors.master_gripper import MasterGripper
 from robots.dvrk.hand_on_master import HandOnMaster
 from robots.dvrk.mounted.mounted_arm import MountedArm, Published
-from robots.dvrk.parameters import (
-    MtmPositions,
-    UnitQuaternion,
-    check_start,
-)
+from robots.dvrk.parameters import MtmPositions, UnitQuaternion, check_start
 from robots.serial_chain import SerialChain
 from schemas.quantity import Angle, Length
 from schemas.vectors import Vector

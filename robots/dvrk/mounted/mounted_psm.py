@@ -8,10 +8,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from pydantic import (
-    Field,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
 from robots.dvrk import arm_bodies, drives
 from robots.dvrk.end_effectors.electrode import Electrode
@@ -24,11 +21,7 @@ from robots.dvrk.instruments import Instrument, instrument
 from robots.dvrk.mounted.mounted_arm import MountedArm, Published
 from robots.dvrk.mounted.psm_tool import PsmTool
 from robots.dvrk.own_dynamics import JAW
-from robots.dvrk.parameters import (
-    FOLDED,
-    HandPositions,
-    InstrumentName,
-)
+from robots.dvrk.parameters import FOLDED, HandPositions, InstrumentName
 from robots.transform import inverse_transform
 from schemas.errors import MotionError
 from schemas.quantity import Length

@@ -7,27 +7,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from robots.dvrk import psm, si
 from robots.dvrk.end_effectors.contact_sphere import ContactSphere
 from robots.dvrk.end_effectors.end_effector import EndEffector
 from robots.dvrk.end_effectors.own_jaw import JawFile, with_own_jaw
 from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import (
-    InstrumentName,
-    MountedPositions,
-    check_start,
-    home,
-    start_positions,
-)
+from robots.dvrk.parameters import InstrumentName, MountedPositions, check_start, home, start_positions
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
 from schemas.files import find_file
