@@ -14,20 +14,27 @@ __all__ = ["Interrupt"]
 class Interrupt:
     """Within this context, SIGTERM raises KeyboardInterrupt in the main thread, and so does a call.
 
-    Calls from any thread are allowed. SIGINT would not work: programs started by a shell in the background
-    ignore SIGINT. Outside the main thread the context does nothing.
+    Calls from any thread are allowed; they send SIGTERM, as programs started by a shell in the background
+    ignore SIGINT. Ctrl-C raises as ever, and is noted. Outside the main thread the context does nothing.
     """
 
     def __init__(self) -> None:
         self._armed = self._raised = False
         self._sending = threading.Lock()
-        self._before: Any = None
+        self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGTERM, self._raise)
+            self._before[signal.SIGTERM] = signal.signal(signal.SIGTERM, self._raise)
+            if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+                self._before[signal.SIGINT] = signal.signal(signal.SIGINT, self._raise)
             self._armed = True
         return self
+
+    @property
+    def raised(self) -> bool:
+        """Whether an interrupt has been raised since the context was entered, and before `disarm`."""
+        return self._raised
 
     def disarm(self) -> None:
         """Raise nothing any more: the main thread closes all open resources.
@@ -47,10 +54,12 @@ class Interrupt:
             else:
                 interrupt_main(signal.SIGTERM)
 
-    def _raise(self, _number: int, _frame: FrameType | None) -> None:
-        """Handle SIGTERM, between two instructions of the main thread; after `disarm` do nothing."""
+    def _raise(self, number: int, _frame: FrameType | None) -> None:
+        """Handle a signal, between two instructions of the main thread; after `disarm` only Ctrl-C."""
         if self._armed:
             self._armed, self._raised = False, True
+            raise KeyboardInterrupt
+        if number == signal.SIGINT:
             raise KeyboardInterrupt
 
     def check(self) -> None:
@@ -61,6 +70,7 @@ class Interrupt:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._before is not None:
+        if self._before:
             self.disarm()
-            signal.signal(signal.SIGTERM, self._before)
+        for number, handler in self._before.items():
+            signal.signal(number, handler)

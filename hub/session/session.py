@@ -24,7 +24,7 @@ from hub.session.step_loop import OnAck, StepLoop
 from hub.transport.hub_files import hub_file
 from hub.transport.loopback_port import LoopbackPort
 from hub.transport.session_secret import listen_with_secret
-from schemas.errors import ScenarioError, SessionError
+from schemas.errors import ParticipantError, ScenarioError, SessionError
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import Profile
 
@@ -179,8 +179,10 @@ def _start_and_step(
 ) -> None:
     """Start and step; nothing interrupts the code after this call.
 
-    A failure brings others, reported at any moment: only the first one is raised.
+    A failure brings others, reported at any moment: only the first one is raised. ctypes turns an interrupt
+    in the conversion of an argument into an error of the participant.
     """
+    interrupted = False
     try:
         try:
             start(run)
@@ -188,9 +190,12 @@ def _start_and_step(
                 run.profile.start()
             steps.step_to_end(progress)
         finally:
+            interrupted = interrupt.raised
             interrupt.disarm()
-    except KeyboardInterrupt as interruption:
-        if isinstance(interruption.__context__, SessionError | ScenarioError):  # it was raised just before
-            raise interruption.__context__ from None
+    except (KeyboardInterrupt, ParticipantError) as ending:
+        if isinstance(ending, ParticipantError) and not interrupted:
+            raise
+        if isinstance(ending.__context__, SessionError | ScenarioError):  # it was raised just before
+            raise ending.__context__ from None
         run.failure.check()
         raise SessionError(f"interrupted at step {run.clock.step}") from None

@@ -6,6 +6,7 @@ or not at all, changes every state hash from there on.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import time
@@ -395,9 +396,20 @@ class Slow(Device):
 
 class FaultParams(Params):
     at: int = 5
-    how: Literal["configure", "raise", "nan", "shape", "hang", "exit", "kill"] = "raise"
+    how: Literal["configure", "raise", "nan", "shape", "hang", "exit", "kill", "interrupt"] = "raise"
     stamp: str = ""
     """File that gets the time (ns, monotonic) just before `kill`."""
+
+
+class InterruptedArgument(ctypes.c_int):
+    """An argument of C that is converted as the process is interrupted."""
+
+    @classmethod
+    def from_param(cls, value):
+        os.kill(os.getpid(), signal.SIGTERM)
+        for _ in range(1000):
+            time.sleep(0.001)  # the signal is handled here
+        return value
 
 
 class Fault(Bare):
@@ -429,6 +441,8 @@ class Fault(Bare):
                 time.sleep(1000.0)
         if how == "exit":
             os._exit(7)
+        if how == "interrupt":
+            ctypes.CFUNCTYPE(None, InterruptedArgument)()(0)
         if how == "kill":
             Path(self.params.stamp).write_text(str(time.monotonic_ns()))
             os.kill(os.getpid(), signal.SIGKILL)

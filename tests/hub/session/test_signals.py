@@ -155,3 +155,9 @@ def test_an_interrupt_that_is_lost_in_a_callback_is_raised_again():
             interrupt.check()
         interrupt.disarm()
         interrupt.check()
+
+
+def test_an_interrupt_that_ctypes_has_turned_into_an_error_is_an_interrupt(hub):
+    code, errors = hub(FAILING.replace("host: other, how: raise", "how: interrupt")).end()
+    assert code == 1, errors
+    assert "error: interrupted at step" in errors
