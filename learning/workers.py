@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, Literal, TypeVar
 
 from schemas.errors import ConnectError, SessionError
@@ -10,6 +12,9 @@ from schemas.errors import ConnectError, SessionError
 __all__ = ["run_calls"]
 
 T = TypeVar("T")
+
+_DRAWING_THREADS = "LP_NUM_THREADS"
+"""Threads of Mesa's software renderers, by default one for each core (https://docs.mesa3d.org/envvars.html)."""
 
 
 def run_calls(
@@ -21,6 +26,8 @@ def run_calls(
     workers: Literal["threading", "loky"] = "loky",
 ) -> Iterator[tuple[int, T]]:
     """Yield the number of each call, from 0, and its result, in the order in which they end.
+
+    Worker processes share the cores: pictures drawn without a GPU take no more threads than a worker's part.
 
     Args:
         function: a function of a module.
@@ -37,7 +44,10 @@ def run_calls(
     from joblib import Parallel, delayed
 
     parallel = Parallel(n_jobs=jobs, backend=workers, return_as="generator_unordered", batch_size=1)
-    yield from parallel(delayed(_numbered)(number, function, call) for number, call in enumerate(calls))
+    run = (
+        _numbered if workers == "threading" else partial(_numbered_on, max(1, (os.cpu_count() or 1) // jobs))
+    )
+    yield from parallel(delayed(run)(number, function, call) for number, call in enumerate(calls))
 
 
 def _on_ray(
@@ -55,8 +65,8 @@ def _on_ray(
             " the HOST:PORT of `ray status`"
         ) from error
     try:
-        run = ray.remote(num_cpus=1)(_numbered)
-        pending = [run.remote(number, function, call) for number, call in enumerate(calls)]
+        run = ray.remote(num_cpus=1)(_numbered_on)
+        pending = [run.remote(1, number, function, call) for number, call in enumerate(calls)]
         while pending:
             done, pending = ray.wait(pending)
             yield ray.get(done[0])
@@ -66,6 +76,12 @@ def _on_ray(
         ) from error
     finally:
         ray.shutdown()
+
+
+def _numbered_on(cores: int, number: int, function: Callable[..., T], call: tuple[Any, ...]) -> tuple[int, T]:
+    """Call in a worker process; its software renderer takes as many threads as `cores`."""
+    os.environ.setdefault(_DRAWING_THREADS, str(cores))
+    return _numbered(number, function, call)
 
 
 def _numbered(number: int, function: Callable[..., T], call: tuple[Any, ...]) -> tuple[int, T]:
