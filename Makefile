@@ -14,7 +14,7 @@ demo: $(VENV)/.all ## run the palpation scenario, record it and write a report
 	trocar run palpation --record $(RECORDING)
 	trocar report $(RECORDING) -o $(RECORDING).html
 
-test: check ## the behaviour of the code: tests that need Python, a C compiler and two cores, and nothing else
+test: $(VENV)/.dev ## the behaviour of the code: tests that need Python, a C compiler and two cores, and nothing else
 	$(PYTEST) -m "not ($(NEEDS)) and not alone"
 
 test-all: test ## everything: also tests with ROS, a browser, fresh environments, seconds or minutes of simulation, all cores
@@ -27,7 +27,7 @@ docs: $(VENV)/.dev ## the documentation, in build/site
 gallery: $(VENV)/.dev ## the pictures and films of docs/gallery.md, drawn from the scenarios
 	python docs/tools/gallery.py
 
-check: $(VENV)/.dev
+check: $(VENV)/.dev ## form, types, rules of imports, prose
 	ruff check .
 	ruff format --check .
 	pyright

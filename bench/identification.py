@@ -5,8 +5,9 @@
 
 Without files: an arm unlike the published one (bodies changed at random by a tenth, losses by factors of 0.5
 to 2), its efforts with noise of 5 percent; and the simulated arm in `configs/identify.yaml`. With two files
-of WPI-AIM/dvrk_dynamics_identification (data/psm_simplified/measured_trajectory; no licence is stated, so
-none is here), or two CSV files as `trocar identify` reads them: fitted on one and judged on the other.
+of WPI-AIM/dvrk_dynamics_identification (data/psm/measured_trajectory, whose residuals main_psm.ipynb prints;
+no licence is stated, so none is here), or two CSV files as `trocar identify` reads them: fitted on one and
+judged on the other.
 
 Results: docs/decisions/0094-excitation.md. Only the times depend on the machine.
 """
@@ -43,7 +44,9 @@ CUTOFF, RATE = 6.0, 200.0
 MATTERS = 0.05
 """Share of a joint's effort from which a base parameter matters."""
 WPI = np.array([0.09, 0.18, 0.19, 0.13, 0.24, 0.21, 0.26])
-"""What that repository's own fit leaves on its test file, joints 1 to 4, then motors 5 to 7."""
+"""Residual of that repository's own fit on the first period of `two`: joints 1 to 4, then motors 5 to 7."""
+WPI_PERIOD = 1.0 / 0.18
+"""Period of that repository's trajectories, s."""
 MOTOR_TO_JOINT = np.array([[1.0186, 0.0, 0.0], [-0.8306, 0.6089, 0.6089], [0.0, -1.2177, 1.2177]])
 """Wrist pitch, wrist yaw and jaw of the last three motors."""
 
@@ -180,6 +183,8 @@ def compared(train: Path, test: Path, rate: float) -> dict[str, Any]:
             "published_percent": (100.0 * relative_residual(published, measured)).round(1).tolist(),
         }
         if not ours:
+            first = slice(round(WPI_PERIOD * 100.0))  # samples a second
+            left = relative_residual(predicted[first], measured[first])
             result["stribeck" if stribeck else "coulomb"]["against_wpi"] = (left / WPI).round(2).tolist()
     return result
 

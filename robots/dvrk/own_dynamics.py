@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from robots.dvrk.drive import SMOOTHING, Disc, Drive
-from robots.dvrk.end_effectors.jaw import FINGERS
+from robots.dvrk.end_effectors.jaw import FINGER_PAIRS, FINGERS
 from robots.dvrk.inertia import Inertia
 from schemas.errors import MotionError
 from schemas.yaml_model import load_yaml_model, yaml_text
@@ -105,6 +105,8 @@ class OwnDynamics(_Part):
     bodies: dict[str, BodyInertia]
     joints: dict[str, JointLosses]
     discs: list[DiscLosses]
+    fingers: list[DiscLosses] = Field(default_factory=list[DiscLosses], max_length=len(FINGER_PAIRS))
+    """Friction of `FINGER_PAIRS`; empty if the jaw was at rest."""
     fit: dict[str, Any] = Field(default_factory=dict[str, Any])
     """Method and quality of the fit; for the reader."""
 
@@ -137,5 +139,6 @@ class OwnDynamics(_Part):
         return drives
 
     def discs_of(self, published: tuple[Disc, ...]) -> tuple[Disc, ...]:
-        """Return `published` with the friction identified."""
-        return tuple(own.of(disc) for disc, own in zip(published, self.discs, strict=True))
+        """Return `published` with the friction identified, then the rubbing pairs of the fingers."""
+        discs = zip(published, self.discs, strict=True)
+        return tuple(own.of(disc) for disc, own in (*discs, *zip(FINGER_PAIRS, self.fingers, strict=False)))

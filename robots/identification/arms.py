@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from robots.dvrk import arm_bodies, drives, ecm, linkage, psm
 from robots.dvrk.drive import Disc, Drive
-from robots.dvrk.end_effectors.jaw import FINGERS
+from robots.dvrk.end_effectors.jaw import FINGER_PAIRS, FINGERS
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import Instrument
 from robots.dvrk.linkage import Linkage
@@ -47,6 +47,8 @@ class IdentifiedArm(NamedTuple):
     """Published, by joint."""
     discs: tuple[Disc, ...]
     """Published; the shares are of these joints."""
+    fingers: tuple[Disc, ...]
+    """Rubbing pairs of the fingers where the jaw is a joint; the shares are of these joints."""
     start: tuple[float, ...]
     """Home position of the arm, jaw half open; rad and m, shape (n,)."""
 
@@ -55,15 +57,14 @@ def of_psm(tool: Instrument, *, jaw: bool = False) -> IdentifiedArm:
     """Return a PSM with `tool`; `jaw`: the jaw is a joint too, otherwise at rest."""
     chain, bodies, driven = psm.chain(tool), arm_bodies.psm(tool), dict(drives.psm(tool))
     joints, discs, start = chain.joints, drives.discs(tool), psm.home(tool)
+    fingers = ()
     if jaw and tool.jaw is not None:
         # below 0 the fingers press on each other
         joints, start = (*joints, replace(tool.jaw.joint, lower=0.0)), (*start, tool.jaw.upper / 2.0)
         # two fingers that turn by half the angle, each with the torque of the whole
         finger = driven[FINGERS[0]]
         driven[JAW] = replace(finger, armature=finger.armature / 2.0, elasticity=finger.elasticity / 2.0)
-        discs = tuple(
-            replace(disc, shares={**disc.shares, JAW: disc.shares.get(FINGERS[0], 0.0)}) for disc in discs
-        )
+        discs, fingers = (tuple(map(_with_jaw, pairs)) for pairs in (discs, FINGER_PAIRS))
     return IdentifiedArm(
         tool=tool.name,
         chain=chain,
@@ -73,8 +74,14 @@ def of_psm(tool: Instrument, *, jaw: bool = False) -> IdentifiedArm:
         joints=joints,
         drives={joint.name: driven[joint.name] for joint in joints},
         discs=discs,
+        fingers=fingers,
         start=start,
     )
+
+
+def _with_jaw(pair: Disc) -> Disc:
+    """Return a rubbing pair with a share of the jaw: each finger turns by half the angle."""
+    return replace(pair, shares={**pair.shares, JAW: sum(pair.shares.get(one, 0.0) for one in FINGERS) / 2.0})
 
 
 def of_ecm() -> IdentifiedArm:
@@ -89,5 +96,6 @@ def of_ecm() -> IdentifiedArm:
         joints=chain.joints,
         drives=drives.ECM,
         discs=(),
+        fingers=(),
         start=ecm.HOME,
     )

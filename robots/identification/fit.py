@@ -47,7 +47,7 @@ _SCALES = {
 }
 """kg m^2 and kg, N m/rad and N/m, N m and N, N m s/rad and N s/m: the order of the published values."""
 _SCALE_OF_DISC = 0.1
-"""Scale of the friction of a disc, relative to the friction of a joint."""
+"""Scale of the friction of a disc or a pair of fingers, relative to the friction of a joint."""
 _LEAST = 1e-6
 """Least friction, springs and rotors."""
 _FARTHEST = 5.0
@@ -253,7 +253,7 @@ def _feasible(model: LinearModel, rows: Vector, goal: Vector) -> Vector:
     nominal = model.nominal[body.stop :]
     scales = np.array(
         [
-            _SCALES[kind] * (_SCALE_OF_DISC if what.startswith("disc_") else 1.0)
+            _SCALES[kind] * (_SCALE_OF_DISC if what.startswith(("disc_", "finger_")) else 1.0)
             for kind, what in (name.split(".") for name in model.names[body.stop :])
         ]
     )

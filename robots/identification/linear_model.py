@@ -68,12 +68,17 @@ class LinearModel:
         self.gravity, moving = gravity, len(arm.chain.joints)
         self._dynamics = Dynamics(arm.chain, arm.bars, {**arm.bodies, **arm.carried}, np.zeros(moving))
         self._carried = np.array([body.pseudo_inertia for body in arm.carried.values()]).reshape(-1, 4, 4)
+        pairs = (*arm.discs, *arm.fingers)
         turned = {name for disc in arm.discs for name in disc.shares}
         own = [name for name in self.joints if name not in turned]
-        self.rubbing = (*own, *(f"disc_{i + 1}" for i in range(len(arm.discs))))
+        self.rubbing = (
+            *own,
+            *(f"disc_{i + 1}" for i in range(len(arm.discs))),
+            *(f"finger_pair_{i + 1}" for i in range(len(arm.fingers))),
+        )
         self.shares = np.array(
             [[float(name == joint) for joint in self.joints] for name in own]
-            + [[disc.shares.get(joint, 0.0) for joint in self.joints] for disc in arm.discs]
+            + [[disc.shares.get(joint, 0.0) for joint in self.joints] for disc in pairs]
         )
         self.shape = shape or FrictionShape(np.full(len(self.rubbing), SMOOTHING))
         of_joints, losses = [arm.drives[name] for name in self.joints], [arm.drives[name] for name in own]
@@ -82,8 +87,8 @@ class LinearModel:
             "armature": np.array([drive.armature for drive in of_joints]),
             "stiffness": np.array([drive.elasticity for drive in of_joints]),
             "offset": np.array([drive.offset for drive in of_joints]),
-            "viscous": np.array([one.viscous_friction for one in (*losses, *arm.discs)]),
-            "coulomb": np.array([one.coulomb_friction for one in (*losses, *arm.discs)]),
+            "viscous": np.array([one.viscous_friction for one in (*losses, *pairs)]),
+            "coulomb": np.array([one.coulomb_friction for one in (*losses, *pairs)]),
         }
         if self.shape.stribeck is not None:
             values["static"] = np.zeros(len(self.rubbing))

@@ -35,7 +35,8 @@ def own_dynamics(found: Fit, cutoff: float, recordings: Sequence[str]) -> OwnDyn
                 model.joints, values["armature"], values["stiffness"], values["offset"], strict=True
             )
         },
-        discs=[losses for name, losses in friction.items() if name not in model.joints],
+        discs=[losses for name, losses in friction.items() if name.startswith("disc_")],
+        fingers=[losses for name, losses in friction.items() if name.startswith("finger_")],
         fit=_fit_provenance(found, cutoff, recordings),
     )
 

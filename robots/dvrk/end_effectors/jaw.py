@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from robots.dvrk.drive import Drive
+from robots.dvrk.drive import Disc, Drive
 from robots.dvrk.end_effectors.contact_sphere import FINGER_HALF_WIDTH, ContactSphere, on_jaw
 from robots.dvrk.end_effectors.end_effector import EndEffector, Motor, Mount
 from robots.dvrk.inertia import Inertia
@@ -17,10 +17,19 @@ from robots.dvrk.link import Link
 from robots.serial_chain import Joint, jerk_limit
 from schemas.vectors import Vector
 
-__all__ = ["FINGERS", "WRIST_ACCELERATION", "WRIST_VELOCITY", "Jaw"]
+__all__ = ["FINGERS", "FINGER_PAIRS", "WRIST_ACCELERATION", "WRIST_VELOCITY", "Jaw"]
 
 FINGERS = ("jaw_left", "jaw_right")
 """Links: the left one turns towards the tip's +y, the right one towards -y."""
+FINGER_PAIRS = (
+    Disc({"wrist_yaw": 1.0, FINGERS[0]: 1.0}, 0.0, 0.0),
+    Disc({"wrist_yaw": 1.0, FINGERS[1]: -1.0}, 0.0, 0.0),
+    Disc({FINGERS[0]: 1.0, FINGERS[1]: 1.0}, 0.0, 0.0),
+)
+"""Rubbing pairs beside the discs: left finger and right finger on the pin, and both on each other.
+
+No friction is published; identification finds it (WPI-AIM/dvrk_dynamics_identification has these pairs).
+"""
 
 WRIST_VELOCITY, WRIST_ACCELERATION = radians(1080.0), radians(720.0)
 """rad/s and rad/s^2, of roll, wrist and jaw (jhu-dvrk/sawIntuitiveResearchKit,

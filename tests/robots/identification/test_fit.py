@@ -144,14 +144,19 @@ def test_the_jaw_is_a_joint_that_shares_the_discs_of_the_wrist():
     arm = of_psm(TOOL, jaw=True)
     model = LinearModel(arm)
     truth = another_arm(model)
+    dry = model.parts["coulomb"].start + 3 + np.arange(7)
+    assert not model.nominal[dry[4:]].any(), "no friction of the fingers is published"
+    truth[dry[4:]] = 0.004, 0.006, 0.012
     found = fit([recorded(model, truth)], arm)
-    discs = model.parts["coulomb"].start + 3 + np.arange(4)
-    assert found.parameters[discs] == pytest.approx(truth[discs], rel=0.1)
+    assert found.parameters[dry] == pytest.approx(truth[dry], rel=0.1)
     assert (found.residual < 0.02).all()
     own = own_dynamics(found, CUTOFF, ["sim.csv"])
     assert own.joints["jaw"].armature == pytest.approx(found.parameters[model.parts["armature"]][-1])
     closed = dict(own.drives_of(drives.psm(TOOL)))
     assert closed["jaw_left"].armature == 2.0 * own.joints["jaw"].armature
+    pairs = own.discs_of(drives.discs(TOOL))
+    assert [pair.coulomb_friction for pair in pairs] == pytest.approx(found.parameters[dry])
+    assert pairs[6].shares == {"jaw_left": 1.0, "jaw_right": 1.0}
 
 
 def test_a_base_that_is_turned_is_identified_with_its_gravity():

@@ -14,11 +14,11 @@ from engines.mujoco.model.dynamics import dynamics
 from engines.mujoco.params import MujocoParams, SceneParams
 from hub.participant import Inputs, Setup
 from robots import rotation
-from robots.dvrk import arm_bodies, ecm, linkage, setup_joints
+from robots.dvrk import arm_bodies, ecm, linkage, psm, setup_joints
 from robots.dvrk.dynamics import Dynamics, of_ecm, of_psm
 from robots.dvrk.ecm import JOINT_NAMES as ECM_JOINTS
 from robots.dvrk.instruments import instrument
-from robots.dvrk.own_dynamics import BodyInertia, JointLosses, OwnDynamics
+from robots.dvrk.own_dynamics import BodyInertia, DiscLosses, JointLosses, OwnDynamics
 
 REFERENCE = json.loads(
     (Path(__file__).parents[3] / "robots" / "data" / "reference_dynamics.json").read_text()
@@ -67,6 +67,24 @@ def test_an_endoscope_arm_has_the_dynamics_of_its_file(tmp_path):
     assert np.allclose(found.gravity, closed.gravity(q), atol=1e-5)
     assert not np.allclose(found.gravity, of_ecm().gravity(q), atol=0.1)
     assert np.allclose(found.viscous_friction, 0.3)
+
+
+def test_fingers_rub_on_their_pin_as_the_file_says(tmp_path):
+    tool, q = instrument(NEEDLE_DRIVER), [0.4, -0.5, 0.13, 0.7, 0.3, -0.6]
+    chain, bodies = psm.chain(tool), arm_bodies.psm(tool)
+    losses = {one.name: JointLosses(armature=0.0, stiffness=1e-3, offset=0.0) for one in chain.joints}
+    own = OwnDynamics(
+        instrument=NEEDLE_DRIVER,
+        bodies={
+            name: BodyInertia(mass=b.mass, centre=b.centre, tensor=b.tensor) for name, b in bodies.items()
+        },
+        joints=losses,
+        discs=[DiscLosses()] * 4,
+        fingers=[DiscLosses(coulomb=0.004), DiscLosses(coulomb=0.006), DiscLosses(coulomb=0.012)],
+    )
+    (tmp_path / "psm.yaml").write_text(own.text(), "utf-8")
+    found = dynamics("PSM1", NEEDLE_DRIVER, q, [0.0] * 6, tmp_path / "psm.yaml")
+    assert np.allclose(found.coulomb_friction, [0.0, 0.0, 0.0, 0.0, 0.0, 0.01])
 
 
 @pytest.mark.parametrize("arm", ["PSM2", "ECM"])
