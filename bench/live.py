@@ -33,6 +33,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bench.live_table import redraw, table
 from bench.ros_figures import cpu_s
 from hub.observation.summary import Progress
 from hub.participant import Inputs, Outputs, Setup, Stepped
@@ -56,8 +57,6 @@ LEFT_OUT = {
 LONGEST_S = 20.0
 """Simulated time of a run where a scenario is longer, or has no end."""
 
-DOCS = Path(__file__).parent.parent / "docs" / "live.md"
-BEGIN, END = "<!-- bench/live.py -->", "<!-- end -->"
 ENDPOINT = "tcp/127.0.0.1:0"
 WALL_CLOCK = "waiting for the wall clock"
 """The phase of a profile in which a session waits for nothing else."""
@@ -303,47 +302,10 @@ def measure(case: Case, captured: Capture, seconds: float, runs: int) -> dict[st
     }
 
 
-def table(result: Mapping[str, Any]) -> str:
-    """Return the table of a result, in markdown."""
-    lines = [
-        "| scenario | s | real time | attainable | bare | wall, of bare | processor, of bare"
-        " | core-seconds per s | bare |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
-    for row in result["rows"]:
-        attainable = row["attainable_real_time_factor"]
-        cells = (
-            row["name"],
-            f"{row['seconds']:g}",
-            f"{row['real_time_factor']:.2f}",
-            "" if attainable is None else f"{attainable:.2f}",
-            *(f"{row[name]:.2f}" for name in ("bare_real_time_factor", "wall_ratio", "core_ratio")),
-            *(f"{row[name]:.3f}" for name in ("core_s_per_sim_s", "bare_core_s_per_sim_s")),
-        )
-        lines.append(f"| {' | '.join(cells)} |")
-    begin, end = (" ".join(f"{load:.1f}" for load in result[name]) for name in ("load_begin", "load_end"))
-    facts = (
-        f"- {result['cores']} cores",
-        f"- medians of {result['runs']} runs",
-        f"- load (1, 5, 15 min) at the begin {begin}, at the end {end}",
-        *(f"- left out: `{name}`: {why}" for name, why in result["left_out"].items()),
-    )
-    return "\n".join([*lines, "", *facts])
-
-
-def redraw(result: Mapping[str, Any]) -> None:
-    """Put the table into the page, between its marks."""
-    text = DOCS.read_text(encoding="utf-8")
-    head, _, rest = text.partition(BEGIN)
-    _, mark, tail = rest.partition(END)
-    if not mark:
-        raise ValueError(f"'{DOCS}' has no '{BEGIN}' with '{END}' after it, where the table goes")
-    DOCS.write_text(f"{head}{BEGIN}\n{table(result)}\n\n{END}{tail}", encoding="utf-8")
-
-
 def measured(scenarios: Sequence[str], seconds: float | None, runs: int) -> dict[str, Any]:
     """Measure scenarios, and return all figures."""
     result: dict[str, Any] = {
+        "whole": not scenarios,
         "runs": runs,
         "cores": len(os.sched_getaffinity(0)),
         "load_begin": os.getloadavg(),
@@ -374,7 +336,9 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--output", type=Path, metavar="FILE", help="write all figures as JSON")
     parser.add_argument("--input", type=Path, metavar="FILE", help="measure nothing; read such figures")
-    parser.add_argument("--docs", action="store_true", help="redraw the table of docs/live.md")
+    parser.add_argument(
+        "--docs", action="store_true", help="redraw the table of docs/live.md, or the rows of SCENARIO in it"
+    )
     options = parser.parse_args()
     if options.input:
         result = json.loads(options.input.read_text(encoding="utf-8"))

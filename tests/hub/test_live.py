@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from bench import live
+from bench import live, live_table
+from bench.live_table import redrawn
 
 TEXT = """\
 name: short
@@ -86,7 +87,7 @@ def test_every_scenario_has_a_row_or_a_reason():
 
 
 def test_the_table_is_redrawn_from_the_figures(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(live, "DOCS", tmp_path / "live.md")
+    monkeypatch.setattr(live_table, "DOCS", tmp_path / "live.md")
     row = {
         f"{of}{name}": 1.25
         for of in ("", "bare_", "attainable_")
@@ -94,6 +95,7 @@ def test_the_table_is_redrawn_from_the_figures(tmp_path, monkeypatch, capsys):
     }
     unwatched = {**row, "attainable_real_time_factor": None}
     figures = {
+        "whole": True,
         "runs": 3,
         "cores": 2,
         "load_begin": [1.0, 2.0, 3.0],
@@ -102,14 +104,40 @@ def test_the_table_is_redrawn_from_the_figures(tmp_path, monkeypatch, capsys):
         "rows": [{"name": "short", "seconds": 2.0, **row}, {"name": "blind", "seconds": 20.0, **unwatched}],
     }
     (tmp_path / "live.json").write_text(json.dumps(figures))
-    live.DOCS.write_text(f"before\n{live.BEGIN}\nold\n{live.END}\nafter\n")
+    live_table.DOCS.write_text(f"before\n{live_table.BEGIN}\nold\n{live_table.END}\nafter\n")
     monkeypatch.setattr("sys.argv", ["live", "--input", str(tmp_path / "live.json"), "--docs"])
     live.main()
-    page = live.DOCS.read_text()
+    page = live_table.DOCS.read_text()
     assert page.startswith("before\n")
-    assert page.endswith(f"{live.END}\nafter\n")
+    assert page.endswith(f"{live_table.END}\nafter\n")
     assert "| short | 2 | 1.25 | 1.25 | 1.25 | 1.25 | 1.25 | 1.250 | 1.250 |" in page
     assert "| blind | 20 | 1.25 |  | 1.25 |" in page
-    assert "at the end 4.0 5.0 6.0" in page
+    assert "4.0 5.0 6.0 at the end" in page
     assert "old" not in page
     assert "| short |" in capsys.readouterr().out
+
+
+def test_rows_of_some_scenarios_join_the_table():
+    def result(whole, *names):
+        numbers = ("real_time_factor", "bare_real_time_factor", "wall_ratio", "core_ratio")
+        row = dict.fromkeys((*numbers, "seconds", "core_s_per_sim_s", "bare_core_s_per_sim_s"), 2.0 - whole)
+        return {
+            "whole": whole,
+            "runs": 3,
+            "cores": 2,
+            "load_begin": (0.1, 0.2, 0.3),
+            "load_end": (1.0, 1.0, 1.0),
+            "left_out": {"keys": "a person"},
+            "rows": [{"name": name, "attainable_real_time_factor": None, **row} for name in names],
+        }
+
+    page = redrawn("before\n<!-- bench/live.py --><!-- end -->\nafter\n", result(True, "a", "d", "p, apart"))
+    for _ in range(2):  # the second time nothing is added
+        page = redrawn(page, result(False, "d", "c"))
+    rows = [line.split("|")[1:3] for line in page.splitlines() if line.startswith("|")][2:]
+    assert rows == [[" a ", " 1 "], [" c ", " 2 "], [" d ", " 2 "], [" p, apart ", " 1 "]]
+    facts = [line for line in page.splitlines() if line.startswith("- ")]
+    how = "medians of 3 runs, load 0.1 0.2 0.3 at the begin, 1.0 1.0 1.0 at the end"
+    assert facts == ["- 2 cores", f"- {how}", "- left out: `keys`: a person", f"- d: {how}", f"- c: {how}"]
+    assert page.startswith("before\n")
+    assert page.endswith("\nafter\n")
