@@ -31,11 +31,10 @@ _LOOPBACK_ONLY = (
 
 _SPDP = (
     "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
-    "<SPDPInterval>1s</SPDPInterval>"
+    "<SPDPInterval>1s</SPDPInterval><InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
 )
 """Number of participants per machine announced to without multicast, as with rmw_fastrtps and rmw_cyclonedds,
-and period of announcements: a program with the default range announces itself by multicast only, and waits
-for these announcements.
+and period of announcements, which Cyclone DDS otherwise ends after 30 s where no program has answered.
 """
 
 _NEVER_WAIT = (

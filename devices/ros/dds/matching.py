@@ -83,7 +83,7 @@ class Matching:
             (PUBLICATIONS_WRITER, PUBLICATIONS_READER),
             (SUBSCRIPTIONS_WRITER, SUBSCRIPTIONS_READER),
         ):
-            proxy.writers[writer_id, reader_id] = StatefulWriter(send, writer_id, reader_id)
+            proxy.writers[writer_id, reader_id] = StatefulWriter(send, writer_id, reader_id, keeps_all=True)
 
     def announce_all(self, proxy: ParticipantProxy) -> None:
         """Announce all endpoints to a program."""

@@ -13,6 +13,7 @@ import logging
 import os
 import struct
 import threading
+from collections import deque
 from collections.abc import Sequence
 from time import monotonic
 
@@ -46,6 +47,8 @@ _ANNOUNCE_S, _FORGET_S = 1.0, 3600.0
 """Period of our announcements, and time until a silent participant is forgotten, s: a participant stopped for
 longer than its lease, as in a debugger, goes on with the known sequence numbers.
 """
+_INTRODUCE_AGAIN_S = (0.005, 0.02)
+"""Delays after the first answer to a program, s: Fast DDS announces a program before it receives anything."""
 _MOST_PARTICIPANTS = 512
 """Most participants of a domain: memory is limited, whatever is sent on the domain."""
 
@@ -62,8 +65,10 @@ class ServiceParticipant:
             hosts: addresses of machines for announcements. With 127.0.0.1 alone, without multicast, the
                 socket receives from this machine only.
         """
-        self._gateway = b""
+        self._gateway = self._gateway_announcement = b""
         self._domain = domain
+        self._introductions: deque[tuple[float, bytes]] = deque()
+        """Times at which new programs, by GUID prefix, are told again of us."""
         self._guid_prefix = _NO_VENDOR + os.urandom(10)
         self._socket = RtpsSocket(domain, multicast=multicast, hosts=hosts)
         self._matching = Matching(self._guid_prefix, self._socket.send)
@@ -73,7 +78,10 @@ class ServiceParticipant:
         self._thread.start()
 
     def ignore(self, guid: bytes) -> None:
-        """Ignore the participant with this GUID: the same gateway's on Cyclone DDS, without clients."""
+        """Ignore the participant with this GUID: the same gateway's on Cyclone DDS, without clients.
+
+        Its announcement is passed on to new programs.
+        """
         with self._changing:
             self._gateway = guid[:12]
             self._matching.proxies.pop(self._gateway, None)  # it may be discovered already
@@ -143,12 +151,18 @@ class ServiceParticipant:
                 due = now + _ANNOUNCE_S
                 self._announce_participant(self._socket.targets)
                 self._maintain(now)
+            self._introduce_again(now)
+            waking = min(due, self._introductions[0][0]) if self._introductions else due
             try:
-                datagram, host = self._socket.receive(max(due - monotonic(), 0.001))
+                datagram, host = self._socket.receive(max(waking - monotonic(), 0.001))
             except OSError:  # nothing has arrived, or an earlier datagram did not reach its target
                 continue
             try:
-                self._receive(parse_message(datagram, self._guid_prefix), host)
+                message = parse_message(datagram, self._guid_prefix)
+                if message.guid_prefix == self._gateway:
+                    self._note_gateway(message, datagram)
+                else:
+                    self._receive(message, host)
             except (MessageError, struct.error) as error:
                 log.debug("a datagram from %s is dropped: %s", host, error)
             # an unforeseen error must not end the service for other programs
@@ -168,7 +182,7 @@ class ServiceParticipant:
 
     def _receive(self, message: Message, host: str) -> None:
         prefix = message.guid_prefix
-        if prefix[:2] not in (FAST_DDS, CYCLONE_DDS) or prefix == self._gateway:
+        if prefix[:2] not in (FAST_DDS, CYCLONE_DDS):
             return
         with self._changing:
             for part in message.submessages:
@@ -193,8 +207,32 @@ class ServiceParticipant:
         metatraffic, default = ((host, port) for port in announced_participant(announcement))
         proxy = ParticipantProxy(metatraffic, default, monotonic())
         self._matching.add_program(prefix, proxy)
-        self._announce_participant([metatraffic])
+        self._introduce(proxy)
         self._matching.announce_all(proxy)
+        self._introductions.extend((proxy.announced_s + delay, prefix) for delay in _INTRODUCE_AGAIN_S)
+
+    def _introduce(self, proxy: ParticipantProxy) -> None:
+        """Announce both participants of the gateway to a program."""
+        self._announce_participant([proxy.metatraffic])
+        if self._gateway_announcement:
+            self._socket.send(self._gateway_announcement, [proxy.metatraffic])
+
+    def _introduce_again(self, now: float) -> None:
+        with self._changing:
+            while self._introductions and self._introductions[0][0] <= now:
+                proxy = self._matching.proxies.get(self._introductions.popleft()[1])
+                if proxy is not None:
+                    self._introduce(proxy)
+                    for writer in proxy.writers.values():
+                        writer.send_heartbeat()
+
+    def _note_gateway(self, message: Message, datagram: bytes) -> None:
+        """Keep the announcement of the same gateway's participant on Cyclone DDS, if it is for everybody."""
+        if self._guid_prefix in datagram:
+            return
+        for part in message.submessages:
+            if isinstance(part, Data) and part.writer_id == SPDP_WRITER:
+                self._gateway_announcement = b"" if is_disposed(part) else datagram
 
     def _announce_participant(self, targets: Sequence[tuple[str, int]]) -> None:
         """SPDP: announce ourselves."""

@@ -31,6 +31,8 @@ SendSubmessages = Callable[[Sequence[bytes]], None]
 
 _HISTORY = 64
 """Most samples kept by a writer for retransmission, and by a reader while earlier samples are missing."""
+_AT_ONCE = 32
+"""Most samples sent again in a datagram."""
 _MOST_PARTIAL = 4
 """Most samples of a writer assembled from fragments at a time; further samples are requested again."""
 
@@ -41,10 +43,14 @@ class StatefulWriter:
     The writer has sequence numbers of its own: otherwise samples for other readers would be gaps here.
     """
 
-    def __init__(self, send: SendSubmessages, writer_id: bytes, reader_id: bytes) -> None:
-        """`writer_id` and `reader_id`: EntityIds, 4 bytes."""
+    def __init__(
+        self, send: SendSubmessages, writer_id: bytes, reader_id: bytes, *, keeps_all: bool = False
+    ) -> None:
+        """`writer_id` and `reader_id`: EntityIds, 4 bytes; `keeps_all`: no sample is forgotten."""
         self._send, self._writer_id, self._reader_id = send, writer_id, reader_id
-        self._history: deque[tuple[int, bytes, Mapping[int, bytes]]] = deque(maxlen=_HISTORY)
+        self._history: deque[tuple[int, bytes, Mapping[int, bytes]]] = deque(
+            maxlen=None if keeps_all else _HISTORY
+        )
         self._last = self._acknowledged = self._heartbeats = 0
 
     def write(self, payload: bytes, inline_qos: Mapping[int, bytes]) -> None:
@@ -73,8 +79,10 @@ class StatefulWriter:
             for number, payload, inline_qos in self._history
             if number in missing
         ]
+        for first in range(0, len(again), _AT_ONCE):
+            self._send(again[first : first + _AT_ONCE])
         if again or not acknack.base:  # 0: a reader that has had no HEARTBEAT yet
-            self._send([*again, self._next_heartbeat()])
+            self._send([self._next_heartbeat()])
 
 
 class StatefulReader:

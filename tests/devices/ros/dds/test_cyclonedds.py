@@ -235,6 +235,10 @@ def test_only_what_was_asked_for_opens_it_to_the_network():
     assert "<AllowMulticast>true" in configuration("subnet", ())
 
 
+def test_it_announces_itself_however_long_no_program_answers():
+    assert "<InitialLocatorPruneDelay>inf<" in configuration("localhost", ())
+
+
 def test_settings_that_make_no_domain_are_told():
     with pytest.raises(DeviceError, match="cannot take part in domain"):
         domain(101, "<CycloneDDS><Domain><General><Nonsense/></General></Domain></CycloneDDS>")

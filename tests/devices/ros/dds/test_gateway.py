@@ -114,9 +114,11 @@ def test_a_state_is_wanted_while_a_program_subscribes(rclpy_python, psm):
 
 
 def test_a_program_with_the_default_range_finds_it(rclpy_python, psm):
-    with console(rclpy_python, psm, COMMAND, discovery="SUBNET") as program:
+    with console(rclpy_python, psm, COMMAND, STATE, discovery="SUBNET") as program:
         program.send(row(psm, COMMAND), joints())
         assert until(lambda: received(psm, COMMAND))
+        psm.write(STATE[1:], np.zeros(18))
+        assert program.heard(row(psm, STATE), 60.0)
 
 
 def test_another_domain_is_another_graph(rclpy_python, psm):
