@@ -27,7 +27,8 @@ class ClockSync:
     def __init__(self, session: zenoh.Session, keys: Keys) -> None:
         self.offset = ClockOffset()
         self._session, self._key = session, keys.control("clock")
-        self._ending = threading.Event()
+        self._ending, self._ended = threading.Event(), threading.Event()
+        """Not a join: interrupted, it takes a running thread for ended (CPython 3.11)."""
         self._thread = threading.Thread(target=self._run, name="clock", daemon=True)
 
     def __enter__(self) -> Self:
@@ -38,9 +39,18 @@ class ClockSync:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._ending.set()
-        self._thread.join()
+        try:
+            self._ended.wait()
+        finally:  # interrupted by Ctrl-C; the session is closed next, and Zenoh allows no query beside that
+            self._ended.wait()
 
     def _run(self) -> None:
+        try:
+            self._ask_repeatedly()
+        finally:
+            self._ended.set()
+
+    def _ask_repeatedly(self) -> None:
         asked = 0
         while not self._ending.wait(_FIRST_PERIOD_S if asked < _FIRST else _PERIOD_S):
             asked += 1

@@ -87,6 +87,7 @@ class HostRun:
         )
         self._hub = self._channel(bytes.fromhex(reply.ack_key), link)
         self._stack = ExitStack()
+        self._clock: ClockSync | None = None
         if self._profile is not None:
             self._stack.callback(self._profile.undeclare)
             self._profile.attach(self._host, self._acknowledge)
@@ -117,7 +118,7 @@ class HostRun:
         if not devices:
             return []
         threads: list[DeviceThread] = []
-        clock = self._stack.enter_context(ClockSync(self._run.session, self._run.keys))
+        self._clock = clock = ClockSync(self._run.session, self._run.keys)
         for name, device in devices.items():
             if isinstance(device, RouterClient):
                 device.learn_hub(connect if device.demands_secret else _to_programs(reply) or connect)
@@ -131,6 +132,8 @@ class HostRun:
 
     def serve(self) -> None:
         """Configure, report ready, and step as the hub grants, or look on, until interrupted."""
+        if self._clock is not None:
+            self._stack.enter_context(self._clock)
         try:
             bonds = self._host.configure(self._directory)
             for thread in self._threads:
@@ -231,9 +234,9 @@ class HostRun:
 
     def close(self) -> None:
         """Close devices, participants and publishers."""
-        for thread in self._threads:
-            thread.close()
-        self._stack.close()
+        with self._stack:  # closed even if Ctrl-C interrupts a device
+            for thread in self._threads:
+                thread.close()
         self._host.close()
         for token in self._tokens:
             token.undeclare()
