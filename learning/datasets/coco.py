@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from engines.mujoco.truth.files import camera_json, instance_picture
+from engines.mujoco.truth.keypoints import InstrumentView
 from engines.mujoco.truth.labels import Body
-from engines.mujoco.truth.recorded_truth import InstrumentView, RecordedTruth, TruthFrame
+from engines.mujoco.truth.recorded_truth import RecordedTruth, TruthFrame
 from engines.mujoco.truth.scene_class import INSTRUMENT_CLASSES, SceneClass
 from learning.datasets.annotations import Annotations, rounded
 from learning.datasets.truth import Stereo

@@ -25,6 +25,7 @@ from robots.dvrk.console_topics import PARTS, PEDALS, TELEOPERATION
 from robots.dvrk.mounted.mounted_arms import AnyArm
 from robots.dvrk.mounted.mounted_mtm import MountedMtm
 from robots.dvrk.setup_joints import CartArm, DrivenArm, joint_names
+from schemas.crtk import StringStamped
 from schemas.ros import (
     CameraInfo,
     CompressedImage,
@@ -55,8 +56,13 @@ _SERVICES = {
 }
 _CARTESIAN_STATES = {name: type_ for name, type_ in crtk.CARTESIAN_STATES.items() if name not in NOT_SERVED}
 _PICTURES = {"image_raw": Image.ros_type, "image_raw/compressed": CompressedImage.ros_type}
-_TRUTH = ("depth", "segmentation", "instances", "normals", "flow", "scene_flow")
-"""Names of pictures of truth, where a camera publishes them; no real camera does."""
+_TRUTH = {
+    **dict.fromkeys(
+        ("depth", "segmentation", "instances", "normals", "flow", "scene_flow", "occlusion"), Image.ros_type
+    ),
+    "keypoints": StringStamped.ros_type,
+}
+"""Names and types of truth beside pictures, where a camera publishes it; no real camera does."""
 _REAL_MAX_AGE_NS = 100_000_000
 """Age of a stale state of a real arm: ten periods of 10 ms."""
 
@@ -189,9 +195,9 @@ def _setup_joints(arm: CartArm, reference: str) -> Iterator[Row]:
 def _camera(camera: str) -> Iterator[Row]:
     for eye in ("left", "right"):
         yield from (
-            _event(camera, f"{eye}/{name}", type_, latched=False) for name, type_ in _PICTURES.items()
+            _event(camera, f"{eye}/{name}", type_, latched=False)
+            for name, type_ in (_PICTURES | _TRUTH).items()
         )
-        yield from (_event(camera, f"{eye}/{name}", Image.ros_type, latched=False) for name in _TRUTH)
         yield _event(camera, f"{eye}/camera_info", CameraInfo.ros_type, latched=False)
     yield _command(camera, "markers", MarkerArray.ros_type)
     yield _event(camera, "error", StringMessage.ros_type)

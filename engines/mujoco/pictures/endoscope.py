@@ -25,6 +25,7 @@ from engines.mujoco.ports import position_count
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, event_out, signal_in, state_hash
 from robots.dvrk.endoscope import EYES, Eye, StereoCamera
 from schemas.codec import decode, encode
+from schemas.crtk import StringStamped
 from schemas.errors import MessageError, MissingExtraError, StateError
 from schemas.message import Message
 from schemas.ports import Port
@@ -59,7 +60,7 @@ class Endoscope(Stepped):
         if params.images in ("compressed", "both"):
             kinds["image_raw/compressed"] = CompressedImage
         if kinds:
-            kinds |= dict.fromkeys(params.truth, Image)
+            kinds |= {name: StringStamped if name == "keypoints" else Image for name in params.truth}
         self._pictures = tuple(
             event_out(f"{eye}/{kind}", model, frame=self._frame)
             for eye in EYES

@@ -26,7 +26,9 @@ _MOST_PIXELS = 2048
 """Most pixels of a side: an uncompressed picture of 2048 x 2048 is the largest in a message."""
 _MOST_BYTES = 3 * _MOST_PIXELS**2
 """Most bytes of pixels in a message."""
-Truth = Literal["depth", "segmentation", "instances", "normals", "flow", "scene_flow"]
+Truth = Literal[
+    "depth", "segmentation", "instances", "normals", "flow", "scene_flow", "occlusion", "keypoints"
+]
 _TRUTH_BYTES: Mapping[Truth, int] = {
     "depth": 4,
     "segmentation": 2,
@@ -34,8 +36,10 @@ _TRUTH_BYTES: Mapping[Truth, int] = {
     "normals": 12,
     "flow": 8,
     "scene_flow": 12,
+    "occlusion": 1,
+    "keypoints": 0,
 }
-"""Bytes of a pixel."""
+"""Bytes of a pixel; keypoints are a text."""
 
 
 class ViewParams(Params):
@@ -105,7 +109,9 @@ class EndoscopeParams(SceneParams):
         description=(
             "published beside the pictures, from the geometry and free of noise: depth (m, 32FC1),"
             " segmentation by class and instances (mono16), normals (32FC3); flow (px, 32FC2) and scene flow"
-            " (m, 32FC3) from the picture before to this one, with the stamp of the picture before"
+            " (m, 32FC3) from the picture before to this one, and occlusion (mono8, 255: a point of the"
+            " picture before that is hidden or outside now), with the stamp of the picture before; keypoints"
+            " (JSON): tip pose, joints, ends and shaft edges of instruments, and which are hidden"
         ),
     )
     format: Literal["jpeg", "png"] = Field(default="jpeg", description="of the compressed picture")

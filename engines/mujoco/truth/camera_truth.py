@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -10,17 +11,18 @@ from numpy.typing import NDArray
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.soft_body import SoftBody
-from engines.mujoco.truth.files import instance_picture
-from engines.mujoco.truth.sight import Sight
+from engines.mujoco.truth.files import instance_picture, instruments_json
+from engines.mujoco.truth.sight import Motion, Sight
 from engines.mujoco.truth.truth_scene import Instant, TruthScene
 from robots.dvrk.endoscope import EYES
+from schemas.crtk import StringStamped
 from schemas.message import Message
 from schemas.ros import Header, Image
 from schemas.vectors import Vector
 
 __all__ = ["CameraTruth"]
 
-_MOTIONS = "flow", "scene_flow"
+_MOTIONS = "flow", "scene_flow", "occlusion"
 """Truth that needs two pictures."""
 
 
@@ -41,35 +43,49 @@ class CameraTruth:
         now = self._scene.look(positions, EYES)
         for eye, sight in now.sights.items():
             for name in self._asked:
-                encoding, pixels = self._picture(name, sight)
-                yield f"{eye}/{name}", _image(header, encoding, pixels)
+                yield f"{eye}/{name}", self._message(name, sight, header)
             if self._motions and self._before is not None:
                 before, stamped = self._before
                 motion = self._scene.motion(before, eye, now)
                 for name in self._motions:
-                    encoding, pixels = (
-                        ("32FC2", motion.flow) if name == "flow" else ("32FC3", motion.scene_flow)
-                    )
-                    yield f"{eye}/{name}", _image(stamped, encoding, pixels)
+                    yield f"{eye}/{name}", _motion_message(name, before.sights[eye], motion, stamped)
         self._before = now, header
 
-    def _picture(self, name: str, sight: Sight) -> tuple[str, NDArray[np.float32] | NDArray[np.uint16]]:
+    def _message(self, name: str, sight: Sight, header: Header) -> Message:
         match name:
             case "depth":
-                return "32FC1", sight.depth
+                return _image(header, "32FC1", sight.depth)
             case "normals":
-                return "32FC3", sight.normals
+                return _image(header, "32FC3", sight.normals)
             case "segmentation":
-                return "mono16", sight.classes
+                return _image(header, "mono16", sight.classes)
+            case "keypoints":
+                views = self._scene.instrument_views(sight)
+                return StringStamped(
+                    header=header, string=json.dumps(instruments_json(views, keypoints=True))
+                )
             case _:
-                return "mono16", instance_picture(sight.bodies, self._scene.bodies)
+                return _image(header, "mono16", instance_picture(sight.bodies, self._scene.bodies))
 
     def close(self) -> None:
         """Free the OpenGL context. May be called twice."""
         self._scene.close()
 
 
-def _image(header: Header, encoding: str, pixels: NDArray[np.float32] | NDArray[np.uint16]) -> Image:
+def _motion_message(name: str, sight: Sight, motion: Motion, header: Header) -> Image:
+    """Return a message about the points that `sight` shows."""
+    match name:
+        case "flow":
+            return _image(header, "32FC2", motion.flow)
+        case "scene_flow":
+            return _image(header, "32FC3", motion.scene_flow)
+        case _:
+            return _image(header, "mono8", np.uint8(255) * (sight.hit & ~motion.is_visible))
+
+
+def _image(
+    header: Header, encoding: str, pixels: NDArray[np.float32] | NDArray[np.uint16] | NDArray[np.uint8]
+) -> Image:
     """Return a message for pixels of shape (height, width), or (height, width, channels)."""
     height, width = pixels.shape[:2]
     data = np.ascontiguousarray(pixels, pixels.dtype.newbyteorder("<")).view(np.uint8).reshape(-1)

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from engines.mujoco.truth.keypoints import InstrumentView
 from engines.mujoco.truth.labels import Body
 from engines.mujoco.truth.modality import Modality
-from engines.mujoco.truth.recorded_truth import InstrumentView, TruthFrame
+from engines.mujoco.truth.recorded_truth import TruthFrame
 from engines.mujoco.truth.scene_class import SceneClass
 from engines.mujoco.truth.sight import Viewpoint
 
@@ -30,6 +31,7 @@ __all__ = [
     "depth_steps",
     "frame_json",
     "instance_picture",
+    "instruments_json",
     "scene_json",
     "write_frame",
     "write_png",
@@ -97,10 +99,13 @@ def frame_json(frame: TruthFrame, *, keypoints: bool) -> dict[str, Any]:
     """Return the camera and the poses of a frame and, if asked for, keypoints and shaft edges."""
     content: dict[str, Any] = {"time_s": frame.time_ns * 1e-9, "camera": camera_json(frame.sight.view)}
     content["camera_from_body"] = {name: pose.tolist() for name, pose in frame.poses.items()}
-    content["instruments"] = {
-        arm: _instrument_json(view, keypoints=keypoints) for arm, view in frame.instruments.items()
-    }
+    content["instruments"] = instruments_json(frame.instruments, keypoints=keypoints)
     return content
+
+
+def instruments_json(views: Mapping[str, InstrumentView], *, keypoints: bool) -> dict[str, Any]:
+    """Return the poses of instruments by arm and, if asked for, keypoints and shaft edges."""
+    return {arm: _instrument_json(view, keypoints=keypoints) for arm, view in views.items()}
 
 
 def camera_json(view: Viewpoint) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from robots.dvrk.mounted.mounted_psm import MountedPsm
 from robots.transform import inverse_transform, rigid_transform
 from schemas.vectors import Vector
 
-__all__ = ["Instrument", "Keypoint", "instruments"]
+__all__ = ["Instrument", "InstrumentView", "Keypoint", "instruments"]
 
 _INSIDE_M = 1.3 * SHAFT_RADIUS
 """A keypoint within an instrument is seen if the surface before it is that near, m."""
@@ -36,6 +36,17 @@ class Keypoint(NamedTuple):
     """Place in the optical frame, shape (3,), m."""
     visibility: int
     """COCO's number: 0 outside the picture, 1 hidden, 2 seen."""
+
+
+class InstrumentView(NamedTuple):
+    """An instrument in a picture."""
+
+    tool: str
+    keypoints: Mapping[str, Keypoint]
+    tip_pose: Vector
+    """Tip frame in the optical frame, shape (4, 4)."""
+    shaft_edges: Sequence[Vector]
+    """Outlines of the shaft inside the picture, shape (2, 2) each, px."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +70,15 @@ class Instrument:
     def is_in_arm(self, data: mujoco.MjData) -> bool:
         """Return whether the arm holds this one of its instruments."""
         return is_engaged(data, self.seat)
+
+    def view(self, data: mujoco.MjData, sight: Sight, bodies: tuple[Body, ...]) -> InstrumentView:
+        """Return the instrument in what a camera sees; `bodies`: of the scene."""
+        return InstrumentView(
+            self.tool,
+            self.keypoints(data, sight, bodies),
+            self.tip_pose(data, sight.view),
+            self.shaft_edges(data, sight.view),
+        )
 
     def keypoints(self, data: mujoco.MjData, sight: Sight, bodies: tuple[Body, ...]) -> dict[str, Keypoint]:
         """Return the keypoints in what a camera sees; `bodies`: of the scene."""

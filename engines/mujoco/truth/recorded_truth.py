@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.recorded_states import RecordedStates
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.solid_meshes import Triangles
-from engines.mujoco.truth.keypoints import Keypoint
+from engines.mujoco.truth.keypoints import InstrumentView
 from engines.mujoco.truth.labels import Body
 from engines.mujoco.truth.projection import Projection
 from engines.mujoco.truth.sight import Motion, Sight, Viewpoint
@@ -26,18 +26,7 @@ from robots.dvrk.endoscope import Eye
 from schemas.errors import TrocarError
 from schemas.vectors import Vector
 
-__all__ = ["InstrumentView", "RecordedTruth", "TruthFrame"]
-
-
-class InstrumentView(NamedTuple):
-    """An instrument in a picture."""
-
-    tool: str
-    keypoints: Mapping[str, Keypoint]
-    tip_pose: Vector
-    """Tip frame in the optical frame, shape (4, 4)."""
-    shaft_edges: Sequence[Vector]
-    """Outlines of the shaft inside the picture, shape (2, 2) each, px."""
+__all__ = ["RecordedTruth", "TruthFrame"]
 
 
 @dataclass(frozen=True)
@@ -120,23 +109,10 @@ class RecordedTruth:
         for time_ns, positions, _ in self._states.instants(times_ns, self._soft):
             instant = self.scene.look(positions, eyes)
             known: dict[Eye, dict[str, Any]] = {
-                eye: {"instruments": self._instruments(sight), "poses": self._poses(sight.view)}
+                eye: {"instruments": self.scene.instrument_views(sight), "poses": self._poses(sight.view)}
                 for eye, sight in instant.sights.items()
             }
             yield time_ns, instant, known
-
-    def _instruments(self, sight: Sight) -> dict[str, InstrumentView]:
-        data, view = self.scene.data, sight.view
-        return {
-            one.arm: InstrumentView(
-                one.tool,
-                one.keypoints(data, sight, self.bodies),
-                one.tip_pose(data, view),
-                one.shaft_edges(data, view),
-            )
-            for one in self.scene.instruments
-            if one.is_in_arm(data)
-        }
 
     def _poses(self, view: Viewpoint) -> dict[str, Vector]:
         data, model = self.scene.data, self.scene.model

@@ -19,7 +19,7 @@ from engines.mujoco.pictures.surroundings import make_place
 from engines.mujoco.pictures.variation import Variation
 from engines.mujoco.place.part import PlacePart
 from engines.mujoco.truth.id_buffer import IdBuffer
-from engines.mujoco.truth.keypoints import instruments
+from engines.mujoco.truth.keypoints import InstrumentView, instruments
 from engines.mujoco.truth.labels import Body, label_bodies, rigid_class
 from engines.mujoco.truth.projection import Projection
 from engines.mujoco.truth.scene_class import SceneClass, tissue_class
@@ -114,6 +114,14 @@ class TruthScene:
         later = before.surfaces.vertices()
         sight = now.sights[eye]
         return before.sights[eye].motion(later, sight.view, sight)
+
+    def instrument_views(self, sight: Sight) -> dict[str, InstrumentView]:
+        """Return the instruments in the arms, by arm, as a camera sees them at the state looked at last."""
+        return {
+            one.arm: one.view(self.data, sight, self.bodies)
+            for one in self.instruments
+            if one.is_in_arm(self.data)
+        }
 
     def view(self, eye: Eye) -> Viewpoint:
         """Return the camera of an eye at the state looked at last."""
