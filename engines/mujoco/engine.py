@@ -7,20 +7,17 @@ the same work as `mj_step`, in an order with every output at the end of the step
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
 import numpy as np
 
-from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.pictures.opengl import import_mujoco
-from engines.mujoco.ports import GRAVITY, WIRE, bond_sides, bonded_joints, scene_ports
+from engines.mujoco.ports import GRAVITY, bond_sides, bonded_joints, scene_ports
 from hub.participant import (
-    BondPlan,
     Inputs,
-    MotionSide,
     Outputs,
     Params,
     Setup,
@@ -30,7 +27,6 @@ from hub.participant import (
     state_hash,
 )
 from robots.dvrk.mounted.mounted_psm import MountedPsm
-from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
 from schemas.ports import BondSide, Port
 from schemas.ros import PoseStamped
@@ -38,10 +34,6 @@ from schemas.vectors import Vector
 
 if TYPE_CHECKING:
     from engines.mujoco.arms.ahead import Ahead
-    from engines.mujoco.interaction.contact_spheres_bond import ContactSpheresBond
-    from engines.mujoco.interaction.joint_bond import JointBond
-    from engines.mujoco.interaction.probe_bond import ProbeBond
-    from engines.mujoco.interaction.wire_bond import WireBond
 
 __all__ = ["MujocoEngine"]
 
@@ -64,12 +56,8 @@ class MujocoEngine(Stepped):
 
     def __init__(self, name: str, params: MujocoParams) -> None:
         super().__init__(name, params)
-        self._touching: list[ProbeBond | ContactSpheresBond | WireBond | JointBond] = []
-        self._wires: list[WireBond] = []
-        self._felt_by_spares: list[tuple[Vector, ProbeBond | ContactSpheresBond]] = []
-        """`tip_wrench` of an arm with spares, and one of the bonds that it sums."""
         self._keepers: list[_Keeper] = []
-        self._effective_mass: dict[str, float] = {}
+        self._effective_mass: Mapping[str, float] = {}
         self._outputs: dict[str, Value] = {}
         self._ahead: Ahead | None = None
 
@@ -102,7 +90,9 @@ class MujocoEngine(Stepped):
         self._build_parts(setup.period_ns * 1e-9, self._build_model())
         self._build_contacts(setup.period_ns)
         self._tunables = Tunables(self.ports)
-        self._couple_bonds(setup)
+        self._coupling.couple(self.bonds, setup.bonds)
+        self._effective_mass = self._coupling.effective_mass
+        self._outputs.update(self._coupling.outputs)
         self._readings.refresh()
         self._holding.refresh()
         self._allocate_state()
@@ -157,6 +147,7 @@ class MujocoEngine(Stepped):
         from engines.mujoco.arms.hands import Hands
         from engines.mujoco.arms.readings import Readings
         from engines.mujoco.arms.servos import Servos
+        from engines.mujoco.interaction.coupling import Coupling
         from engines.mujoco.interaction.holding import Holding
 
         model, data, params = self._model, self._data, self.params
@@ -177,6 +168,7 @@ class MujocoEngine(Stepped):
         self._brakes = Brakes(model, data, params)
         self._hands = Hands(model, data, params.arms, period)
         self._holding = Holding(model, data, params, params.publish_period * 1e-9)
+        self._coupling = Coupling(self.name, params, model, data, self._servos, self._exchange)
         self._outputs.update({**self._readings.outputs, **self._holding.outputs, **self._hands.outputs})
 
     def _build_contacts(self, period_ns: int) -> None:
@@ -200,7 +192,7 @@ class MujocoEngine(Stepped):
             self._brakes,
             self._holding,
             *([self._hands] if self._hands.outputs else []),
-            *(touching.motion for touching in self._touching),
+            *(touching.motion for touching in self._coupling.touching),
             *([] if self._rigid is None or self._rigid.collisions is None else [self._rigid.collisions]),
         ]
         self._no_sensors = int(self._mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -210,91 +202,6 @@ class MujocoEngine(Stepped):
         self._size = self._mujoco.mj_stateSize(self._model, self._signature)
         self._state = np.empty(self._size + sum(keeper.state.size for keeper in self._keepers))
 
-    def _couple_bonds(self, setup: Setup) -> None:
-        from engines.mujoco.interaction.contact_spheres_bond import ContactSpheresBond
-        from engines.mujoco.interaction.joint_bond import JointBond
-        from engines.mujoco.interaction.probe_bond import ProbeBond
-
-        kinds = {"probe": ProbeBond, "contact": ContactSpheresBond}
-        joints: Mapping[str, Sequence[str]] = {**self.params.bonded_joints}
-        for bond in self.bonds:
-            owner, _, kind = bond.name.rpartition("/")
-            plan = setup.bonds.get(bond.name)
-            if kind == WIRE:
-                self._couple_needle(owner, bond, plan)
-                continue
-            if kind in joints.get(owner, ()):
-                self._couple_joint(owner, kind, bond, plan)
-                continue
-            arm = owner.partition("/")[0]
-            if owner != arm:
-                self._mount(arm, self._exchange.owners[arm].index(owner))
-            self._effective_mass[bond.name] = kinds[kind].least_mass(owner, self._model, self._data)
-            if owner != arm:
-                self._mount(arm, 0)
-            felt = self._outputs.setdefault(f"{arm}/tip_wrench", np.zeros(6))
-            if plan:
-                touching = kinds[kind](owner, MotionSide(bond, plan), self._model, self._data)
-                self._touching.append(touching)
-                self._outputs.update(touching.outputs)
-                if arm in self._exchange.engaged:
-                    self._outputs[f"{arm}/tip_wrench"] = felt
-                    self._felt_by_spares.append((cast("Vector", felt), touching))
-        bonded = {one.bond.partition("/")[0] for one in self._touching if not isinstance(one, JointBond)}
-        felt = {arm: self._outputs.get(f"{arm}/tip_wrench") for arm in self.params.arms}
-        self._felt = {arm: cast("Vector", wrench) for arm, wrench in felt.items() if wrench is not None}
-        self._untouched = [wrench for arm, wrench in self._felt.items() if arm not in bonded]
-        self._renewed = [
-            touching
-            for touching in self._touching
-            if touching.acts_off_centre or setup.bonds[touching.bond].correction is not None
-        ]
-
-    def _mount(self, arm: str, number: int) -> None:
-        """Give `arm` an instrument where its servos are."""
-        self._exchange.engage(arm, number)
-        self._servos.engage(self._exchange.engaged)
-        self._exchange.put(arm, self._servos.arm_setpoint(arm), self._servos.jaw_setpoint(arm))
-        self._mujoco.mj_step1(self._model, self._data)
-
-    def _couple_needle(self, thing: str, bond: BondSide, plan: BondPlan | None) -> None:
-        from engines.mujoco.interaction.wire_bond import WireBond
-
-        params = cast("NeedleParams", self.params.objects[thing])
-        self._effective_mass[bond.name] = WireBond.least_mass(thing, params, self._model, self._data)
-        if plan:
-            wire = WireBond(thing, params, MotionSide(bond, plan), self._model, self._data)
-            self._touching.append(wire)
-            self._wires.append(wire)
-            self._outputs.update(wire.outputs)
-
-    def _couple_joint(self, arm: str, joint: str, bond: BondSide, plan: BondPlan | None) -> None:
-        from engines.mujoco.interaction.joint_bond import JointBond
-
-        if plan is None:
-            problem = (
-                f"joint '{bond.name}' has no drive: bond '{self.name}.{bond.name}' to the force side of one"
-            )
-            raise ScenarioError(problem, path=("participants", self.name, "bonded_joints"))
-        self._effective_mass[bond.name] = JointBond.least_mass(bond.name, self._model, self._data)
-        number = [one.name for one in self.params.arms[cast("CartArm", arm)].chain.joints].index(joint)
-        goal = self._servos.arm_setpoint(arm)[number : number + 1]
-        driven = JointBond(bond.name, MotionSide(bond, plan), goal, self._model, self._data)
-        self._touching.append(driven)
-        self._outputs.update(driven.outputs)
-
-    def _feel_needles(self) -> None:
-        """Give the bond's force on a held needle to the holding arm, as `tip_wrench`.
-
-        The force comes through the jaws, so the arm's `rigid_wrench` is less by as much.
-        """
-        for wrench in self._untouched:
-            wrench[:] = 0.0
-        for wire in self._wires:
-            arm = self._holding.holder(wire.thing)
-            if self._rigid is not None and arm in self._felt:
-                self._rigid.give(arm, wire.wrench, self._felt[arm])
-
     def _state_signature(self) -> int:
         """Return the parts of MuJoCo's data to hash and save.
 
@@ -302,7 +209,7 @@ class MujocoEngine(Stepped):
         """
         state = self._mujoco.mjtState
         applied = int(state.mjSTATE_QFRC_APPLIED | state.mjSTATE_XFRC_APPLIED)
-        return int(state.mjSTATE_INTEGRATION) & ~(0 if self._touching else applied)
+        return int(state.mjSTATE_INTEGRATION) & ~(0 if self._coupling.touching else applied)
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance all arms by `h` nanoseconds. Raises SessionError if the simulation has become unstable."""
@@ -316,7 +223,7 @@ class MujocoEngine(Stepped):
         self._servos.begin(inputs)
         self._brakes.set(on="ECM" in self._servos.off)
         self._hands.begin(inputs)
-        if self._rigid is None and not self._touching:
+        if self._rigid is None and not self._coupling.touching:
             self._sub_steps(h // self.params.timestep)
             self._mujoco.mj_step1(self._model, self._data)
         else:
@@ -343,7 +250,8 @@ class MujocoEngine(Stepped):
 
         Raises SessionError as `step` does, and where bonds, sums of contacts or events ask for single steps.
         """
-        if self._rigid is not None or self._touching or self.params.grasp != "friction" or not inputs.quiet:
+        coupled = self._rigid is not None or self._coupling.touching
+        if coupled or self.params.grasp != "friction" or not inputs.quiet:
             raise SessionError(
                 "bonds, contact sums, events, and grasps but by friction go step by step: use `advance`"
             )
@@ -373,10 +281,9 @@ class MujocoEngine(Stepped):
         if not (asked := self._exchange.asked(inputs)):
             return
         for arm, number in asked.items():
-            self._mount(arm, number)
+            self._coupling.mount(arm, number)
         self._ahead = None
-        for touching in self._touching:
-            touching.refresh()
+        self._coupling.refresh()
 
     def _place(self, inputs: Inputs) -> None:
         """Put objects where events say."""
@@ -403,9 +310,8 @@ class MujocoEngine(Stepped):
 
     def _coupled_sub_steps(self, h: int, inputs: Inputs) -> None:
         """Take the sub-steps of `h` nanoseconds, and sum the effects of bonds and contacts."""
-        for touching in self._touching:
-            touching.begin(inputs)
-        if self._at_once and not self._renewed:
+        self._coupling.begin(inputs)
+        if self._at_once and not self._coupling.renewed:
             self._sub_steps(h // self.params.timestep)
             if self._rigid is not None:
                 self._rigid.add()
@@ -414,14 +320,7 @@ class MujocoEngine(Stepped):
             self._watched_sub_steps(h)
         if self._rigid is not None:
             self._rigid.end()
-        for touching in self._touching:
-            touching.end()
-        for felt, _ in self._felt_by_spares:
-            felt[:] = 0.0
-        for felt, touching in self._felt_by_spares:
-            felt += touching.tip_wrench
-        if self._wires:
-            self._feel_needles()
+        self._coupling.end(self._rigid, self._holding)
 
     def _watched_sub_steps(self, h: int) -> None:
         """Take the sub-steps of `h` nanoseconds; renew bonds, and sum forces of contacts in between."""
@@ -429,7 +328,7 @@ class MujocoEngine(Stepped):
         add_rigid = (lambda: None) if self._rigid is None else self._rigid.add
         for tau in range(0, h, self.params.timestep):
             if tau:
-                for touching in self._renewed:
+                for touching in self._coupling.renewed:
                     touching.renew(tau * 1e-9)
             step2(model, data)
             add_rigid()
@@ -442,7 +341,7 @@ class MujocoEngine(Stepped):
         where = f"MuJoCo reports {bad.name} in the step from {t * 1e-9:g} s"
         signals = (p for p in self.ports if (p.causality, p.variability) == ("input", "signal"))
         read = [p.name for p in signals if p.limits is None]
-        for port in read + [touching.motion.force_port for touching in self._touching]:
+        for port in read + [touching.motion.force_port for touching in self._coupling.touching]:
             if not np.isfinite(inputs[port]).all():
                 return f"{where}: input '{port}' is {inputs[port]}; every number must be finite"
         return (
@@ -495,13 +394,9 @@ class MujocoEngine(Stepped):
         self._hands.refresh()
         if self._rigid is not None:
             self._rigid.refresh()
-        for touching in self._touching:
-            touching.refresh()
+        self._coupling.refresh()
 
     def close(self) -> None:
         """Release model and data."""
-        self._touching.clear()
-        self._felt_by_spares.clear()
-        self._wires.clear()
         self._keepers.clear()
         self._outputs.clear()
