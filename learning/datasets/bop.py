@@ -183,11 +183,26 @@ def _diameter(vertices: NDArray[np.float64]) -> float:
     return max(float(np.linalg.norm(points - point, axis=1).max()) for point in points)
 
 
+def _vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return unit normals, shape (n, 3): of the faces around a vertex, weighted by their angles there."""
+    corners = vertices[faces]
+    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    across = np.cross(ahead, back)
+    size = np.linalg.norm(across, axis=2)
+    angles = np.arctan2(size, (ahead * back).sum(axis=2))
+    sums = np.zeros_like(vertices)
+    np.add.at(sums, faces, across * (angles / np.maximum(size, 1e-300))[..., None])
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.where(length > 0.0, sums / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
+
+
 def _write_ply(file: Path, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+    properties = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
     header = (
-        f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\nproperty float x\nproperty float y\n"
-        f"property float z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+        f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\n{properties}"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
     )
-    points = "".join(f"{x:.6f} {y:.6f} {z:.6f}\n" for x, y, z in vertices.tolist())
+    rows = np.hstack([vertices, _vertex_normals(vertices, faces)]).tolist()
+    points = "".join(" ".join(f"{number:.6f}" for number in row) + "\n" for row in rows)
     triangles = "".join(f"3 {a} {b} {c}\n" for a, b, c in faces.tolist())
     file.write_text(header + points + triangles, encoding="ascii")

@@ -108,6 +108,7 @@ class Coco(Annotations):
         """Write annotations.json."""
         content = {
             "info": {"description": "Trocar; pixel (0, 0) is the middle of the upper left pixel"},
+            "licenses": [],
             "images": self._images,
             "annotations": self._annotations,
             "categories": sorted(self._categories.values(), key=lambda one: one["id"]),
