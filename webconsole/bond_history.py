@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from threading import Lock
+
 import numpy as np
 
 from hub.recording.bond_trace import BondTrace
@@ -18,23 +20,29 @@ The values of a fast session are further apart, so five times the time between t
 
 
 class BondHistory:
-    """Places and forces of a bond at one point, each at its own times."""
+    """Places and forces of a bond at one point, each at its own times; from any thread."""
 
     def __init__(self, name: str) -> None:
         self._name = name
         self._places, self._forces = _History(), _History()
+        self._lock = Lock()
 
-    def add(self, place_s: float, place: Vector, force_s: float, force: Vector) -> None:
-        """Add the newest place (m) and force (N), shape (3,) or longer; values known already are ignored."""
-        self._places.add(place_s, place[:3])
-        self._forces.add(force_s, force[:3])
+    def add_place(self, time_s: float, place: Vector) -> None:
+        """Add a place, m, shape (3,) or longer; one known already is ignored."""
+        with self._lock:
+            self._places.add(time_s, place[:3])
+
+    def add_force(self, time_s: float, force: Vector) -> None:
+        """Add a force, N, shape (3,) or longer; one known already is ignored."""
+        with self._lock:
+            self._forces.add(time_s, force[:3])
 
     @property
     def trace(self) -> BondTrace:
         """The trace of the bond."""
-        return BondTrace.of_series(
-            self._name, *self._places.columns(), *self._forces.columns(with_missing=True)
-        )
+        with self._lock:
+            places, forces = self._places.columns(), self._forces.columns(with_missing=True)
+        return BondTrace.of_series(self._name, *places, *forces)
 
 
 class _History:

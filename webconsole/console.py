@@ -76,10 +76,12 @@ class Console:
             if scenario is None:
                 return None
             if generation != self._generation:
-                self._stage = await asyncio.to_thread(
+                self._stage = stage = await asyncio.to_thread(
                     Stage, scenario, self.source.outlets, self.source.params
                 )
-                await asyncio.to_thread(lambda: self._stage and self._stage.packed_geometry)
+                if isinstance(self.source, Live):
+                    self.source.keep = stage.keep
+                await asyncio.to_thread(lambda: stage.packed_geometry)
                 self._generation, self._made, self._firsts = generation, {}, {}
                 await asyncio.to_thread(self.drawable)
             return self._stage

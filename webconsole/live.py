@@ -43,7 +43,7 @@ from schemas.trocar_msgs import ScoreCard, SessionStatus
 from webconsole.commands import Tune
 from webconsole.gauges import HUB, hub_outlets
 from webconsole.guide import guided_participant
-from webconsole.log import Entries, Entry, is_logged
+from webconsole.log import LATE_S, Entries, Entry, is_logged
 from webconsole.past import Past
 from webconsole.source import Outlet, Value
 from webconsole.tunables import TunableParameters
@@ -54,8 +54,6 @@ log = logging.getLogger(__name__)
 
 _RETRY_S = 0.5
 _ENTRIES_KEPT = 500
-_LATE_S = 5.0
-"""Time over which late steps are summed up, s: on a busy machine every step is late."""
 R = TypeVar("R", bound=BaseModel)
 
 
@@ -91,6 +89,8 @@ class Live:
         """Where the hub of the session listens."""
         self.left_out: Callable[[], set[int]] = set
         """Returns the processes of hubs with separate pages."""
+        self.keep: Callable[[str, Value], None] = lambda _name, _value: None
+        """Called with each value received and its outlet, in a thread of the connection."""
         self._status: SessionStatus | None = None
         self._trouble = "looking for a session"
         self._values: dict[str, Value] = {}
@@ -364,6 +364,7 @@ class Live:
                 if outlet.name in self._values:
                     return
         self._values[outlet.name] = value
+        self.keep(outlet.name, value)
         if is_logged(outlet.port):
             try:
                 for entry in self._lines.lines_of(outlet, value):
@@ -387,7 +388,7 @@ class Live:
         if status.detail != before.detail and status.detail:
             self._note_entry(Entry(at, "warn", "session", status.detail))
         late = status.late_steps - self._late
-        if late and monotonic() - self._late_s > _LATE_S:
+        if late and monotonic() - self._late_s > LATE_S:
             self._late, self._late_s = status.late_steps, monotonic()
             self._note_entry(Entry(at, "warn", "session", f"{late} late steps"))
         if refused := status.dropped_messages - before.dropped_messages:

@@ -13,10 +13,12 @@ from schemas.ros import DiagnosticStatus, StringMessage
 from schemas.trocar_msgs import ScoreCard, TaskEvent, TissueEvent, TissueGrasp
 from webconsole.source import Outlet, Value
 
-__all__ = ["Entries", "Entry", "card_of", "is_logged"]
+__all__ = ["LATE_S", "Entries", "Entry", "card_of", "is_logged"]
 
 Level = Literal["info", "warn", "error"]
 
+LATE_S = 5.0
+"""Time over which late steps are summed up, s: on a busy machine every step is late."""
 _LOGGED = frozenset(
     one.ros_type for one in (TaskEvent, TissueEvent, TissueGrasp, DiagnosticStatus, OperatingState)
 )

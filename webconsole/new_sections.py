@@ -108,7 +108,7 @@ class NewSections:
     def _force_arrows(self, stage: Stage, bond: BondArrows) -> Iterator[Section]:
         place, force = self._newest(bond.place), self._newest(bond.force)
         if place and force and self._are_new({bond.place: place, bond.force: force}, "arrows "):
-            yield stage.arrow(bond, place, force, live=self._at_ns is None)
+            yield stage.arrow(bond, place, force)
 
     def _force(self, stage: Stage, device: str) -> Iterator[Section]:
         values = {name: value for name in stage.felt[device] if (value := self._newest(name))}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from importlib.metadata import entry_points
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from hub.participant import Params
 from hub.participant.view import TISSUE_COLOURS, Rgb, Scene
 from schemas.codec import decode
-from schemas.errors import TrocarError
+from schemas.errors import MessageError, TrocarError
 from schemas.message import Message
 from schemas.ros import CompressedImage
 from schemas.scenario import Scenario
@@ -208,12 +209,19 @@ class Stage:
         row = np.concatenate([[value.time_ns / 1e9], numbers])
         return Section(SectionKind.SAMPLE, index, row.astype("<f8").tobytes())
 
-    def arrow(self, bond: BondArrows, place: Value, force: Value, *, live: bool = False) -> Section:
-        """Return the arrows of a bond, and keep live values; raises MessageError if a value is not valid."""
+    def keep(self, name: str, value: Value) -> None:
+        """Keep a live value of a bond for force against depth; one that cannot be read is left out."""
+        for bond in self.arrows:
+            if bond.at_one_point and name in bond:
+                history, time_s = self.histories[bond.name], value.time_ns / 1e9
+                add = history.add_place if name == bond.place else history.add_force
+                with suppress(MessageError):  # the arrow of this bond says it
+                    add(time_s, self.numbers[name].decode(value.payload))
+
+    def arrow(self, bond: BondArrows, place: Value, force: Value) -> Section:
+        """Return the arrows of a bond; raises MessageError if a value is not valid."""
         placed = self.numbers[bond.place].decode(place.payload)
         pushed = self.numbers[bond.force].decode(force.payload)
-        if live and bond.at_one_point:
-            self.histories[bond.name].add(place.time_ns / 1e9, placed, force.time_ns / 1e9, pushed)
         rows = bond.rows(placed, pushed)
         return Section(SectionKind.ARROWS, self.arrows.index(bond), rows.astype("<f4").tobytes())
 

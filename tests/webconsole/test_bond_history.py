@@ -11,7 +11,8 @@ def pressed(times):
     history, half = BondHistory("x"), 0.5 * (times[1] - times[0])
     for time in times:
         place, force = (np.array([0.0, 0.0, 0.005 - 0.01 * t]) for t in (time, time + half))
-        history.add(time, np.append(place, [0, 0, 0, 1]), time + half, np.maximum(0.0, -100.0 * force))
+        history.add_place(time, np.append(place, [0, 0, 0, 1]))
+        history.add_force(time + half, np.maximum(0.0, -100.0 * force))
     return history
 
 
@@ -31,7 +32,8 @@ def test_a_contact_that_began_unseen_is_left_out():
 def test_a_fast_session_has_no_gaps_and_a_long_one_no_end():
     history = BondHistory("x")
     for i in range(30_000):
-        history.add(0.7 * i, np.zeros(3), 0.7 * i, np.array([0.0, 0.0, float(i % 9 > 4)]))
+        history.add_place(0.7 * i, np.zeros(3))
+        history.add_force(0.7 * i, np.array([0.0, 0.0, float(i % 9 > 4)]))
     trace = history.trace
     assert not np.isnan(trace.force).any()
     assert 4000 < len(trace.times_s) <= 8192

@@ -170,6 +170,39 @@ def test_a_changed_parameter_enters_with_a_grant_and_the_session_can_be_verified
     assert summary.state_hash != launch(file, one_host=True).run().state_hash
 
 
+@pytest.mark.long
+def test_force_against_depth_needs_no_page_that_draws_fast():
+    """Every value that arrives is kept, whether or not a page takes it."""
+    session = launch(load("palpation", ["duration=1 s", "participants.robot.looks=false", "pace=realtime"]))
+    traces, failed = [], []
+
+    def look():
+        live = Live(session.endpoint, "palpation")
+        live.start()
+        try:
+            until(lambda: live.generation)
+            console = Console(live, Pilots())
+            stage = asyncio.run(console.stage())
+            console.want("a page that acknowledges nothing", stage.shown)
+            live.ask("resume", Empty(), Empty)
+            (history,) = stage.histories.values()
+            traces.append(until(lambda: len(history.trace.times_s) > 5 and history.trace))
+        except Exception as error:  # noqa: BLE001  # it is raised below, in the thread of the test
+            failed.append(error)
+            session.state.shutdown()
+        finally:
+            live.close()
+
+    session.state.pause()
+    looking = threading.Thread(target=look)
+    looking.start()
+    session.run()
+    looking.join()
+    assert failed == []
+    assert traces[0].position.shape == traces[0].force.shape
+    assert (np.diff(traces[0].times_s) > 0.0).all()
+
+
 def test_without_a_session_it_says_so_and_goes_on():
     live = Live(session="nothing", pid=-1)
     live.start()

@@ -5,8 +5,9 @@ import pytest
 from hub.participant import event_out
 from schemas.codec import encode
 from schemas.ros import Header
-from schemas.trocar_msgs import TissueEvent
+from schemas.trocar_msgs import SessionStatus, TissueEvent
 from webconsole.log import Entries
+from webconsole.recorded import Recorded
 from webconsole.source import Outlet, Value
 
 
@@ -25,3 +26,34 @@ def test_an_event_of_tissue_is_a_line(event, level, text):
     by = " by scissors" if event["instrument"] else ""
     assert (entry.time_s, entry.level, entry.source) == (1.5, level, "tissue")
     assert entry.text == f"liver {event['kind']}{by}, {text}"
+
+
+def test_late_steps_of_a_recording_are_a_line_every_five_seconds(recording):
+    """On a busy machine every status counts more of them: the other lines stay in sight."""
+    source = Recorded(recording)
+    lost = {3: 2}
+    statuses = [
+        (
+            i * 100_000_000,
+            SessionStatus(
+                session="busy",
+                run=1,
+                state="running",
+                step=100 * i,
+                sim_time_ns=i * 100_000_000,
+                real_time_factor=0.2,
+                late_steps=90 * i,
+                dropped_messages=sum(count for at, count in lost.items() if at <= i),
+            ),
+        )
+        for i in range(121)
+    ]
+    source.__dict__["_read_statuses"] = statuses, []
+    lines = [(one.time_s, one.text) for one in source.events if one.source == "session"]
+    assert lines == [
+        (0.1, "90 late steps"),
+        (0.3, "2 messages refused"),
+        (5.1, "4500 late steps"),
+        (10.1, "4500 late steps"),
+        (12.0, "1710 late steps"),
+    ]
