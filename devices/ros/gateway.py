@@ -60,6 +60,8 @@ __all__ = ["Gateway"]
 
 _ERRORS_OF_VREP = "stereo/error"
 """Error topic for the authors' simulator, which has no topic for errors."""
+_REPORTS = ("error", "warning")
+"""Topics of an arm with refusals."""
 _STATUS_NS = 1_000_000_000
 
 
@@ -269,7 +271,11 @@ class Gateway(Device):
             self._early[port] = value
 
     def _note_value(self, row: Row, value: Value) -> None:
-        """Note the operating state of a simulated arm and the simulated time, before their publication."""
+        """Note operating states, refusals and the simulated time, before their publication."""
+        if row.name in _REPORTS:
+            for message in value if isinstance(value, tuple) else (value,):
+                if isinstance(message, StringMessage):
+                    self._counters.note_report(row.owner, message.data)
         if row.name == "operating_state" and isinstance(value, OperatingState):
             self._arbiters[row.owner].busy = value.is_busy
             self._refused_moves.update(row.owner, value)

@@ -1,7 +1,8 @@
-"""Status of a gateway, as shown by `trocar ros`: message counts, rates and clients."""
+"""Status of a gateway, as shown by `trocar ros`: message counts, rates, refusals and clients."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from time import monotonic_ns
 
@@ -12,14 +13,25 @@ from schemas.trocar_msgs import GatewayClient, GatewayStatus, GatewayTopic
 __all__ = ["Count", "StatusCounters"]
 
 
-class Count:
-    """Counts of a row: messages, refused messages, and the reason of the last refusal."""
+_REFUSAL = re.compile(
+    r"(?P<command>[\w/]+)(?: [^:]*?)? refused:? (?P<reason>.*?)(?: \((?P<times>\d+) times\))?", re.DOTALL
+)
+"""What a controller says on `error` or `warning` of a refused command, after the arm's name."""
 
-    __slots__ = ("messages", "reason", "refused")
+
+class Count:
+    """Counts of a row: messages, refused messages, the last refusal's reason, the last accepted client."""
+
+    __slots__ = ("client", "messages", "reason", "refused")
 
     def __init__(self) -> None:
         self.messages = self.refused = 0
-        self.reason = ""
+        self.reason = self.client = ""
+
+    def refuse(self, reason: str, times: int = 1) -> None:
+        """Count a refusal: of the gateway, or of a controller behind it."""
+        self.refused = min(self.refused + times, self.messages)
+        self.reason = reason
 
 
 class StatusCounters:
@@ -28,12 +40,20 @@ class StatusCounters:
     def __init__(self, kind: str, rows: Iterable[Row]) -> None:
         self._kind = kind
         self._counts = {row: Count() for row in rows}
+        self._commands = {(row.owner, row.name): count for row, count in self._counts.items()}
         self._before = dict.fromkeys(self._counts, 0)
         self._asked_ns = monotonic_ns()
 
     def __getitem__(self, row: Row) -> Count:
         """Return the count of a row."""
         return self._counts[row]
+
+    def note_report(self, owner: str, text: str) -> None:
+        """Count the command of a program that a controller has refused, by its report on the owner's topic."""
+        found = _REFUSAL.fullmatch(text.removeprefix(f"{owner}: "))
+        count = None if found is None else self._commands.get((owner, found["command"]))
+        if found is not None and count is not None and count.client:
+            count.refuse(f"{found['reason']} (to {count.client})", int(found["times"] or 1))
 
     def status(self, clients: Iterable[Client]) -> GatewayStatus:
         """Return the status, with rates since the last call."""

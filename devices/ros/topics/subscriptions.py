@@ -70,6 +70,7 @@ class SubscribedTopic:
             return
         reason = self._refusal(message, client, connected_ns)
         if reason is None:
+            self._count.client = client
             self._accept(self._row, message if self._signal is None else as_signal(message, self._signal))
         else:
             self._refuse("warning", reason)
@@ -99,6 +100,5 @@ class SubscribedTopic:
         return self._repeated.refusal(stamp_ns)
 
     def _refuse(self, level: str, reason: str) -> None:
-        self._count.refused += 1
-        self._count.reason = reason
+        self._count.refuse(reason)
         self._report(self._row, level, reason)

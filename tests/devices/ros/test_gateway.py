@@ -626,6 +626,31 @@ def test_the_status_tells_clients_and_rates(gateway: MemoryGateway) -> None:
     encode(second)
 
 
+@pytest.mark.parametrize(
+    ("said", "refused", "why"),
+    [
+        ("servo_jp refused: the arm is DISABLED, allowed in ENABLED and homed", 1, "the arm is DISABLED"),
+        ("servo_jp refused: joint insertion at 0.9 m (3 times)", 3, "joint insertion at 0.9 m (to /console)"),
+        ("servo_jp refused: more than were sent (9 times)", 4, "more than were sent"),
+        ("state_command 'walk' is refused in state ENABLED", 1, "in state ENABLED"),
+        ("move_jp refused: commanded by no program", 0, ""),
+        ("jaw closed", 0, ""),
+    ],
+)
+def test_the_status_counts_what_controllers_refuse(
+    gateway: MemoryGateway, said: str, refused: int, why: str
+) -> None:
+    for _ in range(4):
+        gateway.transport.send("/PSM1/servo_jp", joints(*[0.0] * 6))
+    gateway.transport.send("/PSM1/state_command", StringStamped(string="walk"))
+    gateway.write("PSM1/warning", (StringMessage(data=f"PSM1: {said}"),))
+    (status,) = [found.message for found in gateway.read(0) if found.port == "gateway"]
+    assert isinstance(status, GatewayStatus)
+    counted = [topic for topic in status.topics if topic.refused]
+    assert sum(topic.refused for topic in counted) == refused
+    assert all(why in topic.reason for topic in counted)
+
+
 def test_diagnostics_report_rates_and_the_age_of_the_snapshot(gateway: MemoryGateway) -> None:
     for k in range(250):  # 2.5 s of wall time or more, of which the simulation makes half at most
         gateway.write("PSM1/measured_js", np.arange(18.0))
