@@ -49,7 +49,7 @@ class StatusCounters:
         return self._counts[row]
 
     def note_report(self, owner: str, text: str) -> None:
-        """Count the command of a program that a controller has refused, by its report on the owner's topic."""
+        """Count a program's command that a controller has refused, by the report on the owner's topic."""
         found = _REFUSAL.fullmatch(text.removeprefix(f"{owner}: "))
         count = None if found is None else self._commands.get((owner, found["command"]))
         if found is not None and count is not None and count.client:
