@@ -267,6 +267,8 @@ class MjModel:
     nq: int
     nmat: int
     ngeom: int
+    nskin: int
+    nflex: int
     stat: MjStatistic
     vis: MjVisual
     nv: int

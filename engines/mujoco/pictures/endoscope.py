@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from engines.mujoco.markers.store import shown_markers
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.drawing import Drawing, find_drawing
+from engines.mujoco.pictures.enclosure import enclosing_bodies
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.lens import NO_DISTORTION, Distortion
 from engines.mujoco.pictures.soft_body import SoftBody
@@ -31,6 +32,7 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import CameraInfo, CompressedImage, Header, Image, Time
 from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange, SurfaceFilm
+from schemas.vectors import Vector
 
 if TYPE_CHECKING:
     from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
@@ -69,6 +71,7 @@ class Endoscope(Stepped):
         self._scene: EndoscopeScene | None = None
         self._truth: CameraTruth | None = None
         self._drawing = Drawing("", "")
+        self._entered: set[str] = set()
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -155,6 +158,7 @@ class Endoscope(Stepped):
         header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
         markers = () if self._shown is None else tuple(shown_markers(self._shown))
         pictures = scene.draw(self._positions, markers, t)
+        self._warn_inside(scene.lens, t)
         messages = {
             f"{eye}/{name}": message
             for eye, pixels in zip(EYES, pictures, strict=True)
@@ -163,6 +167,19 @@ class Endoscope(Stepped):
         if self._truth is not None:
             messages |= dict(self._truth.messages(self._positions, header))
         return self._outputs(messages)
+
+    def _warn_inside(self, lens: Vector, t: int) -> None:
+        """Log a warning, once for each soft body, if the cameras are inside; `lens`: shape (3,), m."""
+        for organ in enclosing_bodies(lens, self._bodies):
+            if organ not in self._entered:
+                self._entered.add(organ)
+                _log.warning(
+                    "participant '%s': at %.3f s the camera is inside '%s' and sees nothing else; move the"
+                    " endoscope, or its `view`, out of the tissue",
+                    self.name,
+                    t * 1e-9,
+                    organ,
+                )
 
     def _messages(self, eye: Eye, pixels: NDArray[np.uint8], header: Header) -> Iterator[tuple[str, Message]]:
         params = self.params

@@ -134,6 +134,11 @@ class EndoscopeScene:
             return left, right
         return self._sensor.expose(left, time_ns, 0), self._sensor.expose(right, time_ns, 1)
 
+    @property
+    def lens(self) -> Vector:
+        """Place midway between the cameras at the state drawn last, shape (3,), m, in the world."""
+        return self._mount.pose(self._data)[:3, 3]
+
     def _shapes(self, thing: str) -> list[Shape]:
         """Return the shapes of an object that can be seen and are no meshes, in its frame."""
         model, body = self._model, self._model.body(thing)

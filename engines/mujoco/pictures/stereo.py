@@ -23,7 +23,9 @@ _SHADOW_PIXELS = 2048
 at endoscope resolution.
 """
 _SPARE_GEOMS = 100
-"""Room in the scene for what MuJoCo may add to a model's geoms."""
+"""Room in the scene for what MuJoCo may add to a model's geoms, beside soft bodies."""
+_FLEX_GEOMS = 4
+"""Geoms of a flex in the scene at most: vertices, edges, faces and skin (mjv_addGeoms)."""
 _HIDDEN = 5
 """The last group of geoms (mjNGROUP is 6), which MuJoCo does not draw by default (mjv_defaultOption)."""
 
@@ -64,7 +66,8 @@ class StereoRenderer:
         self._counts = model.flex_elemnum, model.flex_vertnum, model.flex_edgenum, model.flex_shellnum
         self._flex_room = [count.copy() for count in self._counts]
         """Counts of the compiled model, as many as a flex may have later."""
-        self._scene = self._new_scene(model.ngeom + _SPARE_GEOMS)
+        self._room = model.ngeom + model.nskin + _FLEX_GEOMS * model.nflex + _SPARE_GEOMS
+        self._scene = self._new_scene(self._room)
         self._viewport = mujoco.MjrRect(0, 0, width, height)
         self._pixels = np.zeros((height, width, 3), np.uint8)
         half = clip[0] * tan(0.5 * camera.field_of_view)
@@ -100,7 +103,7 @@ class StereoRenderer:
             solids: to be drawn beside the model.
         """
         self._gl.make_current()
-        if (room := self._model.ngeom + _SPARE_GEOMS + len(solids)) > self._scene.maxgeom:
+        if (room := self._room + len(solids)) > self._scene.maxgeom:
             self._scene = self._new_scene(2 * room)
         self._model.geom_group[:] = np.where(self._in_sight(data, pose), self._groups, _HIDDEN)
         what = mujoco.mjtCatBit.mjCAT_STATIC | mujoco.mjtCatBit.mjCAT_DYNAMIC

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope import Endoscope
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
+from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 from engines.mujoco.pictures.skin_params import SkinParams
 from engines.mujoco.pictures.skins import Skins
 from engines.mujoco.pictures.soft_body import SoftBody
@@ -101,6 +102,29 @@ def test_nodes_are_seen_where_camera_info_projects_them(gl: str) -> None:
         assert len(seen) == len(points)
         for point in (projected[:2] / projected[2]).T:
             assert np.linalg.norm(seen - point, axis=1).min() < 0.5
+
+
+def test_all_of_many_soft_bodies_are_seen(gl: str) -> None:
+    pose = camera_pose()
+    across, down = np.meshgrid(np.linspace(-0.03, 0.03, 15), np.linspace(-0.025, 0.025, 8))
+    points = np.array([(pose @ [x, y, AHEAD, 1.0])[:3] for x, y in zip(across.flat, down.flat, strict=True)])
+    skins = {f"organ{i}": {"colour": YELLOW} for i in range(len(points))}
+    params = make(skins=skins, width=640, height=576).params
+    bodies = {name: SoftBody(f"{name}/nodes") for name in skins}
+    for point, body in zip(points, bodies.values(), strict=True):
+        body.accept(message(octahedra(point[None]), FACES))
+    scene = EndoscopeScene(params, gl, bodies)
+    picture, _ = scene.draw(state(Endoscope("endoscope", params)))
+    scene.close()
+    assert len(bright_spots(picture)) == len(points)
+
+
+def test_a_camera_inside_a_soft_body_is_said_once(gl: str, caplog: pytest.LogCaptureFixture) -> None:
+    pose = camera_pose()
+    nodes = [pose[:3, 3] + 10.0 * OCTAHEDRON + [shift, 0.0, 0.0] for shift in (0.02, 0.0, 0.02, 0.0)]
+    draw(make(), message(nodes[0], FACES), *map(message, nodes[1:]))
+    (record,) = caplog.records
+    assert "'endoscope': at 0.016 s the camera is inside 'organ'" in record.getMessage()
 
 
 def skin_of(
