@@ -17,6 +17,14 @@ from tests.webconsole.test_browser import LED_ARM, Person, running
 from webconsole.drag import dragged_tips
 from webconsole.recorded import Recorded
 
+OUTSIDE = """(() => {
+  const { scene } = trocar, box = scene.robotBox().union(scene.surfaceBox()), out = []
+  for (const x of ["min", "max"]) for (const y of ["min", "max"]) for (const z of ["min", "max"]) {
+    const place = scene.camera.position.clone().set(box[x].x, box[y].y, box[z].z).project(scene.camera)
+    if (Math.max(Math.abs(place.x), Math.abs(place.y)) > 1) out.push(place.toArray())
+  }
+  return out
+})()"""
 CAMERA = "trocar.scene.camera.getWorldDirection(trocar.scene.camera.position.clone()).toArray()"
 TIP = "trocar.scene.tips[0].axes.getWorldPosition(trocar.scene.tips[0].axes.position.clone()).toArray()"
 UP_ARROW = """
@@ -74,10 +82,19 @@ def person(browser, served_scene):
 
 def test_cameras_look_along_the_axes_and_the_room_is_the_scenarios(person):
     one = person()
+    one.picture()
+    home = one.page.evaluate(CAMERA)
     for name, way in (("Front", [0, 1, 0]), ("Side", [-1, 0, 0]), ("Top", [0, 0, -1])):
         one.page.get_by_role("radio", name=name).click()
         one.picture()
         assert one.page.evaluate(CAMERA) == pytest.approx(way, abs=0.03)
+    one.page.get_by_role("radio", name="Work").click()
+    one.picture()
+    assert one.page.evaluate(CAMERA) == pytest.approx(home), "not from above, where the arm hides it"
+    one.page.get_by_role("radio", name="Robot").click()
+    one.picture()
+    assert one.page.evaluate(OUTSIDE) == [], "all of the robot and what it works on is in the picture"
+    one.page.get_by_role("radio", name="Top").click()
     one.page.keyboard.press("Tab")
     one.page.evaluate("trocar.scene.orbit.turn(0.1, 0)")
     assert one.page.get_by_role("radio", name="Top").get_attribute("aria-checked") == "false"

@@ -11,6 +11,7 @@ import { Smoke } from "./smoke.js"
 import { FILMIC } from "./tone.js"
 import { DIRECTIONS, orbitFrom } from "./views.js"
 
+const HOME = [-0.9, 0.45] // azimuth and elevation, rad
 const ASIDE_M = 0.1, ASIDE_RAD = 0.5
 const SLOW_MS = 50, QUICK_MS = 20, SMOOTH = 2
 const FAR_M = 0.6 // from the work: surroundings are seen from inside
@@ -263,20 +264,22 @@ export class Scene {
   }
 
   frameChoice(name) {
-    const box = name === "robot" ? this.robotBox() : this.workBox()
+    const robot = name === "robot", box = robot ? this.robotBox().union(this.surfaceBox()) : this.workBox()
     const tip = this.usedTips.find((one) => one.name === name)
     if (tip) this.orbit.look(tip.axes.getWorldPosition(new THREE.Vector3()).toArray(), 0.12)
     else if (name !== "endoscope" && !box.isEmpty()) {
       const sphere = box.getBoundingSphere(new THREE.Sphere())
-      if (name === "work") this.turnToWork(sphere.center)
-      this.orbit.look(sphere.center.toArray(), Math.max(sphere.radius, 0.03) * (name === "robot" ? 2.4 : 3.2))
+      if (robot || name === "work") this.turnToWork(this.workBox().getCenter(new THREE.Vector3()))
+      const upright = Math.min(1, this.canvas.clientWidth / this.canvas.clientHeight || 1) // a phone is narrow
+      this.orbit.look(sphere.center.toArray(), Math.max(sphere.radius, 0.03) * (robot ? 2.95 : 3.2) / upright)
     }
     if (name in DIRECTIONS) this.orbit.face(...DIRECTIONS[name].turn)
-    this.floor(name === "robot" ? box : this.surfaceBox())
+    this.floor(robot ? box : this.surfaceBox())
   }
 
-  // Look from where the robot does not stand: its arms would hide the work.
+  // Look a little down, from where the robot does not stand: its arms would hide the work.
   turnToWork(center) {
+    this.orbit.face(...HOME)
     const robot = this.robotBox().getCenter(new THREE.Vector3()).sub(center).negate()
     if (Math.hypot(robot.x, robot.y) > ASIDE_M) this.orbit.azimuth = Math.atan2(robot.y, robot.x) + ASIDE_RAD
   }
