@@ -49,9 +49,13 @@ def recording_directory(given: Path | None, name: str, *, overwrite: bool) -> Pa
         name: name of the scenario, for a recording without a name.
         overwrite: whether the directory may hold an earlier recording, for `delete_earlier`.
 
-    Raises typer.BadParameter for a directory that holds something else.
+    Raises typer.BadParameter for a directory that holds something else, and for nothing to overwrite.
     """
     if given is None:
+        if overwrite:
+            raise typer.BadParameter(
+                "--overwrite says what to do with the directory of --record: add that too"
+            )
         return None
     if str(given) == _UNNAMED:
         return _dated_directory(name)

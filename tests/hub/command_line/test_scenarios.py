@@ -91,6 +91,8 @@ def test_a_recording_is_overwritten_on_demand_alone(trocar, here):
     code, _, err = trocar("run", "short.yaml", "--record", "one", "--overwrite")
     assert (code, "something else than a recording" in " ".join(err.replace("│", " ").split())) == (2, True)
     assert (here / "one" / "notes.txt").read_text() == "mine"
+    code, _, err = trocar("run", "short.yaml", "--overwrite")
+    assert (code, "add that too" in " ".join(err.replace("│", " ").split())) == (2, True)
 
 
 OWN = """\
