@@ -24,6 +24,8 @@ _NECK_WALL = 0.0021
 """Wall of the gallbladder where the cystic duct begins, m."""
 _MOST_WALL = 0.3
 """Largest wall of the gallbladder over its outer diameter: a narrow infundibulum keeps a lumen."""
+_LEAST_STONE = 0.008
+"""Least width of a stone in the neck, m; assumed."""
 _CONFLUENCE_Y = -0.014
 _COMMON = np.array(
     [[0.020, -0.050, -0.010], [0.0205, -0.028, -0.007], [0.020, -0.008, -0.007], [0.019, 0.012, -0.009]]
@@ -113,6 +115,18 @@ class Layout:
         found = np.minimum(wall, _MOST_WALL * self.gallbladder_diameters)
         found[0] = min(wall, _NECK_WALL)
         return found
+
+    @cached_property
+    def stone(self) -> tuple[Line, Line, float]:
+        """Lower end of a stone in the neck, direction of its line, and width of the lumen there, m."""
+        line, lumens = self.gallbladder[:5], (self.gallbladder_diameters - 2.0 * self.gallbladder_walls)[:5]
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        low = max(0.5 * (along[1] + along[2]), float(np.interp(_LEAST_STONE, lumens, along)))
+        end, above = (
+            np.array([np.interp(at, along, line[:, axis]) for axis in range(3)])
+            for at in (low, low + _LEAST_STONE)
+        )
+        return end, _unit(above - end), float(np.interp(low, along, lumens))
 
     def _on_infundibulum(self, outward: Line) -> tuple[Line, Line]:
         """Return a place on the wall of the infundibulum in a direction, and the normal there."""

@@ -48,6 +48,12 @@ _JOINT: dict[str, Any] = {"strength": 1e6, "toughness": 1000.0}
 """As a duct or vessel itself; assumed."""
 
 
+_FILLS, _STONE_LENGTH = 0.95, 1.2
+"""Diagonal of a stone over the width of the lumen at its lower end, and length over width; assumed."""
+_STONE_MODULUS = 150e3
+"""Pa; assumed: three times that of the wall keeps jaws apart, and steps of 2 ms stay stable."""
+_IMPACTED = 0.003
+"""Largest distance between stone and wall where the stone sticks, m."""
 _FAT: dict[str, Any] = {"strength": 5e3, "toughness": 20.0}
 """Areolar tissue between fat and what lies below; assumed."""
 _FAT_OFF, _FAT_SIZE = np.array([-0.003, 0.006]), (0.034, 0.034)
@@ -69,6 +75,8 @@ def organs_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
         "hepatic_artery": _hepatic_artery,
     }
     made = {name: make(patient, layout) for name, make in makers.items()}
+    if patient.stone:
+        made["stone"] = _stone(layout)
     if phase in _BEFORE_DISSECTION:
         made["fat"] = _fat(patient, layout)
     if phase in ("gallbladder-bed", "cholecystectomy"):
@@ -83,6 +91,8 @@ def attachments_of(patient: Patient, phase: Phase) -> dict[str, dict[str, Any]]:
     found = _plate(patient, 0.0 if phase in _BEFORE_DISSECTION else _OPENED)
     if phase != "gallbladder-bed":
         found |= _joints(patient)
+    if patient.stone:
+        found["stone_wall"] = {"organs": ["stone", "gallbladder"], "within": _IMPACTED, **_JOINT}
     if phase in _BEFORE_DISSECTION:
         for name in _under_fat(patient):
             found[f"fat_{name}"] = {"organs": ["fat", name], "surface": "underside", "within": 0.002, **_FAT}
@@ -173,6 +183,25 @@ def _gallbladder(patient: Patient, layout: Layout) -> dict[str, Any]:
         "anchors": [{"surface": "right"}],
         "cutting": _DUCT_CUTTING,
         "lumen": {**_BILE, "volume": _BILE_VOLUME},
+    }
+
+
+def _stone(layout: Layout) -> dict[str, Any]:
+    """Return a stone with flat faces whose edges lie at the wall."""
+    end, along, lumen = layout.stone
+    width = lumen * _FILLS / np.sqrt(2.0)
+    size = width, width, _STONE_LENGTH * width
+    half_turn = np.append(np.cross([0.0, 0.0, 1.0], along), 1.0 + along[2])
+    return {
+        "size": np.round(size, _DIGITS).tolist(),
+        "nodes": 75,
+        "position": np.round(end + size[2] * along, _DIGITS).tolist(),
+        "orientation": np.round(half_turn / np.linalg.norm(half_turn), _DIGITS).tolist(),
+        "young_modulus": _STONE_MODULUS,
+        "density": 1100.0,
+        "inertia": _TUBE_INERTIA,
+        **_SOFT,
+        "anchors": [],
     }
 
 

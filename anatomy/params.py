@@ -41,11 +41,15 @@ class AnatomyParams(BaseModel):
     thick_wall: bool | None = Field(
         default=None, description="an inflamed gallbladder; default: as the seed draws it"
     )
+    stone: bool = Field(
+        default=False, description="a stone fills the neck of the gallbladder; drawn by no seed"
+    )
 
     @property
     def drawn(self) -> Patient:
         """The patient."""
-        return draw_patient(self.patient or 0, Variations(self.artery, self.short_duct, self.thick_wall))
+        stated = Variations(self.artery, self.short_duct, self.thick_wall, self.stone)
+        return draw_patient(self.patient or 0, stated)
 
     @property
     def organs(self) -> dict[str, dict[str, Any]]:

@@ -76,6 +76,8 @@ class Variations:
     artery: ArteryCourse | None = None
     short_duct: bool | None = None
     thick_wall: bool | None = None
+    stone: bool = False
+    """No seed draws a stone: patients keep their numbers."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,8 @@ class Patient:
     artery: ArteryCourse
     short_duct: bool
     thick_wall: bool
+    stone: bool
+    """A stone fills the neck."""
 
 
 def draw_patient(seed: int, variations: Variations) -> Patient:
@@ -125,6 +129,7 @@ def draw_patient(seed: int, variations: Variations) -> Patient:
         artery=artery,
         short_duct=is_short,
         thick_wall=is_thick,
+        stone=variations.stone,
     )
 
 

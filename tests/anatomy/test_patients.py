@@ -149,6 +149,37 @@ def check_fat(given):
 
 
 @pytest.mark.long
+@costly
+@given(SEEDS)
+@example(284)  # a wall of 5.5 mm and a narrow infundibulum
+@example(4)
+def test_a_stone_sticks_in_the_lumen_of_the_neck(seed):
+    given = tissue(patient=seed, stone=True)
+    wall, stone = (Organ(name, given.organs[name], is_carried=True) for name in ("gallbladder", "stone"))
+    assert stone.solid.longest_step > 50e-6
+    every = np.ones(len(stone.mesh.nodes), dtype=np.bool_)
+    ties = find_ties(stone, wall, every, given.attachments["stone_wall"].within)
+    assert len(ties.areas) >= 10
+    line = Layout(draw_patient(seed, Variations(stone=True)))
+    far = np.linalg.norm(stone.mesh.nodes - line.neck, axis=1)
+    assert far.max() < 0.5 * length_of(line.gallbladder)
+    rings = wall.mesh.nodes[given.organs["gallbladder"].inner_wall.rings]
+    middles = rings.mean(axis=1)
+    radii = np.linalg.norm(rings - middles[:, None], axis=2).mean(axis=1)
+    ways = np.diff(middles, axis=0)
+    shares = np.einsum("nij,ij->ni", stone.mesh.nodes[:, None] - middles[:-1], ways) / (ways**2).sum(axis=1)
+    shares = np.clip(shares, 0.0, 1.0)
+    off = np.linalg.norm(stone.mesh.nodes[:, None] - middles[:-1] - shares[..., None] * ways, axis=2)
+    assert (off / (radii[:-1] + shares * np.diff(radii))).min(axis=1).max() < 1.1, "inside the lumen"
+
+
+def test_without_a_stone_patients_are_as_they_were():
+    plain = AnatomyParams(patient=7)
+    assert "stone" not in plain.organs
+    assert "stone_wall" not in plain.attachments
+
+
+@pytest.mark.long
 @given(SEEDS, st.sampled_from(COURSES), st.booleans())
 @example(88, "cranial", True)  # a wide gallbladder, and the longest artery
 @example(4, "behind", True)
