@@ -120,12 +120,11 @@ class Layout:
     def stone(self) -> tuple[Line, Line, float]:
         """Lower end of a stone in the neck, direction of its line, and width of the lumen there, m."""
         line, lumens = self.gallbladder[:5], (self.gallbladder_diameters - 2.0 * self.gallbladder_walls)[:5]
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-        low = max(0.5 * (along[1] + along[2]), float(np.interp(_LEAST_STONE, lumens, along)))
-        end, above = (
-            np.array([np.interp(at, along, line[:, axis]) for axis in range(3)])
-            for at in (low, low + _LEAST_STONE)
-        )
+        legs: Line = np.linalg.norm(np.diff(line, axis=0), axis=1)
+        along: Line = np.append(0.0, np.cumsum(legs))
+        low = max(0.5 * float(along[1] + along[2]), float(np.interp(_LEAST_STONE, lumens, along)))
+        places = np.array([low, low + _LEAST_STONE])
+        end, above = np.stack([np.interp(places, along, line[:, axis]) for axis in range(3)], axis=1)
         return end, _unit(above - end), float(np.interp(low, along, lumens))
 
     def _on_infundibulum(self, outward: Line) -> tuple[Line, Line]:

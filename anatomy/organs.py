@@ -191,7 +191,7 @@ def _stone(layout: Layout) -> dict[str, Any]:
     end, along, lumen = layout.stone
     width = lumen * _FILLS / np.sqrt(2.0)
     size = width, width, _STONE_LENGTH * width
-    half_turn = np.append(np.cross([0.0, 0.0, 1.0], along), 1.0 + along[2])
+    half_turn = np.array([-along[1], along[0], 0.0, 1.0 + along[2]])
     return {
         "size": np.round(size, _DIGITS).tolist(),
         "nodes": 75,
