@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -189,11 +190,11 @@ def _gallbladder(patient: Patient, layout: Layout) -> dict[str, Any]:
 def _stone(layout: Layout) -> dict[str, Any]:
     """Return a stone with flat faces whose edges lie at the wall."""
     end, along, lumen = layout.stone
-    width = lumen * _FILLS / np.sqrt(2.0)
+    width = lumen * _FILLS / sqrt(2.0)
     size = width, width, _STONE_LENGTH * width
     half_turn = np.array([-along[1], along[0], 0.0, 1.0 + along[2]])
     return {
-        "size": np.round(size, _DIGITS).tolist(),
+        "size": [round(edge, _DIGITS) for edge in size],
         "nodes": 75,
         "position": np.round(end + size[2] * along, _DIGITS).tolist(),
         "orientation": np.round(half_turn / np.linalg.norm(half_turn), _DIGITS).tolist(),
