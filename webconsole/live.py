@@ -43,7 +43,7 @@ from schemas.trocar_msgs import ScoreCard, SessionStatus
 from webconsole.commands import Tune
 from webconsole.gauges import HUB, hub_outlets
 from webconsole.guide import guided_participant
-from webconsole.log import LATE_S, Entries, Entry, is_logged
+from webconsole.log import Entries, Entry, Tally, is_logged
 from webconsole.past import Past
 from webconsole.source import Outlet, Value
 from webconsole.tunables import TunableParameters
@@ -97,8 +97,8 @@ class Live:
         self._firsts: dict[str, Value] = {}
         self._by_name: dict[str, Outlet] = {}
         self._wanted: frozenset[str] = frozenset()
-        self._run = self._late = 0
-        self._late_s = 0.0
+        self._run = 0
+        self._late, self._refused = Tally(), Tally()
         self._device_keys: set[str] = set()
         self._untagged: set[str] = set()
         """Participants with messages without a simulated time."""
@@ -284,7 +284,8 @@ class Live:
 
     def _begin(self, session: zenoh.Session, keys: Keys, described: DescribeReply, *, here: bool) -> None:
         self._values, self._firsts = {}, {}
-        self._status, self._late, self._lines = None, 0, Entries()
+        self._status, self._lines = None, Entries()
+        self._late, self._refused = Tally(), Tally()
         self._run, self._keys = described.run, keys
         self.scenario, self.recording = described.scenario, described.recording
         self.past = Past(Path(described.recording)) if described.recording and here else None
@@ -387,11 +388,9 @@ class Live:
             self._note_entry(Entry(at, "error" if failed else "info", "session", status.state))
         if status.detail != before.detail and status.detail:
             self._note_entry(Entry(at, "warn", "session", status.detail))
-        late = status.late_steps - self._late
-        if late and monotonic() - self._late_s > LATE_S:
-            self._late, self._late_s = status.late_steps, monotonic()
+        if late := self._late.more(status.late_steps, monotonic()):
             self._note_entry(Entry(at, "warn", "session", f"{late} late steps"))
-        if refused := status.dropped_messages - before.dropped_messages:
+        if refused := self._refused.more(status.dropped_messages, monotonic()):
             self._note_entry(Entry(at, "warn", "session", f"{refused} messages refused"))
 
     def _ask_status(self, session: zenoh.Session, keys: Keys) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple
 
@@ -13,12 +14,12 @@ from schemas.ros import DiagnosticStatus, StringMessage
 from schemas.trocar_msgs import ScoreCard, TaskEvent, TissueEvent, TissueGrasp
 from webconsole.source import Outlet, Value
 
-__all__ = ["LATE_S", "Entries", "Entry", "card_of", "is_logged"]
+__all__ = ["Entries", "Entry", "Tally", "card_of", "is_logged"]
 
 Level = Literal["info", "warn", "error"]
 
-LATE_S = 5.0
-"""Time over which late steps are summed up, s: on a busy machine every step is late."""
+_SUMMED_S = 5.0
+"""Time over which a tally is summed up, s: on a busy machine every step is late."""
 _LOGGED = frozenset(
     one.ros_type for one in (TaskEvent, TissueEvent, TissueGrasp, DiagnosticStatus, OperatingState)
 )
@@ -52,6 +53,21 @@ class Entry(NamedTuple):
     def as_json(self) -> dict[str, Any]:
         """Return the line, ready for JSON."""
         return {"time": self.time_s, "level": self.level, "source": self.source, "text": self.text}
+
+
+class Tally:
+    """Sums up what a session counts, late steps or refused messages, so that it hides no other line."""
+
+    def __init__(self) -> None:
+        self._said, self._said_s = 0, -math.inf
+
+    def more(self, total: int, now_s: float, *, last: bool = False) -> int:
+        """Return how many more there are since the last line; 0 while no line is due."""
+        more = total - self._said
+        if more <= 0 or (now_s - self._said_s < _SUMMED_S and not last):
+            return 0
+        self._said, self._said_s = total, now_s
+        return more
 
 
 class Entries:

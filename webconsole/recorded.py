@@ -25,7 +25,7 @@ from schemas.trocar_msgs import SessionStatus
 from schemas.vectors import Vector
 from webconsole.arrows import BondArrows
 from webconsole.gauges import GAUGES, HUB, hub_outlets
-from webconsole.log import LATE_S, Entries, Entry, is_logged
+from webconsole.log import Entries, Entry, Tally, is_logged
 from webconsole.pyramid import Pyramid
 from webconsole.source import Outlet, Value
 
@@ -225,19 +225,15 @@ class Recorded:
                     yield Entry(grant.start_ns / 1e9, "warn" if sample.stale else "info", name, text)
 
     def _statuses(self) -> Iterator[Entry]:
-        """Yield late steps, summed up, and refused messages, at the time of the next status."""
-        late = refused = 0
-        late_s = -LATE_S
+        """Yield late steps and refused messages, summed up, at the time of the next status."""
+        late, refused = Tally(), Tally()
         statuses = self._read_statuses[0]
         for i, (time_ns, status) in enumerate(statuses):
-            at, is_last = time_ns / 1e9, i == len(statuses) - 1
-            more_late, more_refused = status.late_steps - late, status.dropped_messages - refused
-            if more_late > 0 and (is_last or at - late_s >= LATE_S):
-                yield Entry(at, "warn", "session", f"{more_late} late steps")
-                late, late_s = status.late_steps, at
-            if more_refused > 0:
-                yield Entry(at, "warn", "session", f"{more_refused} messages refused")
-            refused = status.dropped_messages
+            at, last = time_ns / 1e9, i == len(statuses) - 1
+            if more := late.more(status.late_steps, at, last=last):
+                yield Entry(at, "warn", "session", f"{more} late steps")
+            if more := refused.more(status.dropped_messages, at, last=last):
+                yield Entry(at, "warn", "session", f"{more} messages refused")
 
     def close(self) -> None:
         """Files are opened for each look alone."""
