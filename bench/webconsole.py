@@ -58,6 +58,7 @@ from webconsole.source import Outlet, Value
 
 NODES, PICTURE_BYTES = 1024, 14_000
 """Of an organ; of a JPEG of 320 x 288 of the endoscope."""
+LONGEST_WAIT_S = 120.0
 CHROMIUM = shutil.which("chromium") or ""
 
 
@@ -69,6 +70,7 @@ class Fed:
     def __init__(self) -> None:
         file = load("teleop", [])
         self.scenario, (plan, _) = file.scenario, plan_of(file.scenario, file.params)
+        self.params = file.params.__getitem__
         self.qpos = VectorCodec(plan.participants["robot"].port("qpos"))
         picture = {"causality": "output", "type": CompressedImage.ros_type, "variability": "event"}
         self.outlets = (
@@ -249,6 +251,8 @@ def bench_page(seconds: float) -> dict[str, Any]:
         begun = perf_counter()
         page.goto(link)
         while not page.evaluate("Boolean(window.trocar?.scene?.placed)"):
+            if perf_counter() - begun > LONGEST_WAIT_S:
+                raise TimeoutError(f"no scene on the page after {LONGEST_WAIT_S:g} s")
             sleep(0.02)
         first_s = perf_counter() - begun
         sleep(2.0)
