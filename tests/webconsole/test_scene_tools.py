@@ -25,6 +25,17 @@ OUTSIDE = """(() => {
   }
   return out
 })()"""
+AROUND_A_WALL = """async () => {
+  const THREE = await import("/web/vendor/three.module.js")
+  const { clearestAzimuth } = await import("/web/clearest.js")
+  const wall = new THREE.Mesh(new THREE.BoxGeometry(0.02, 0.4, 0.4))
+  wall.position.set(0.1, 0, 0)
+  wall.updateMatrixWorld()
+  const work = new THREE.Box3().setFromCenterAndSize(new THREE.Vector3(), new THREE.Vector3(0.05, 0.05, 0.01))
+  const usual = { distance: 0.5, elevation: 0.45, usual: 0 }, around = clearestAzimuth([wall], work, usual)
+  wall.visible = false
+  return [around, clearestAzimuth([wall], work, usual)]
+}"""
 CAMERA = "trocar.scene.camera.getWorldDirection(trocar.scene.camera.position.clone()).toArray()"
 TIP = "trocar.scene.tips[0].axes.getWorldPosition(trocar.scene.tips[0].axes.position.clone()).toArray()"
 UP_ARROW = """
@@ -105,6 +116,11 @@ def test_cameras_look_along_the_axes_and_the_room_is_the_scenarios(person):
     assert one.page.evaluate("trocar.scene.camera.position.toArray()") == pytest.approx([0, -1, 1])
     assert one.page.get_by_role("radio", name="Overview").get_attribute("aria-checked") == "true"
     assert one.errors == []
+
+
+def test_the_work_is_seen_from_where_the_arms_hide_least(person):
+    around, usual = person().page.evaluate(AROUND_A_WALL)
+    assert (around, usual) == (pytest.approx(np.pi / 2), 0.0)
 
 
 def test_bodies_are_found_hidden_followed_and_told_by_keys(person):

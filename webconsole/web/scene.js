@@ -3,6 +3,7 @@
 import * as THREE from "./vendor/three.module.js"
 import { Orbit } from "./orbit.js"
 import { Markers } from "./markers.js"
+import { clearestAzimuth } from "./clearest.js"
 import { Contents } from "./contents.js"
 import { loadAppearance } from "./appearance.js"
 import { Lights } from "./lights.js"
@@ -269,19 +270,22 @@ export class Scene {
     if (tip) this.orbit.look(tip.axes.getWorldPosition(new THREE.Vector3()).toArray(), 0.12)
     else if (name !== "endoscope" && !box.isEmpty()) {
       const sphere = box.getBoundingSphere(new THREE.Sphere())
-      if (robot || name === "work") this.turnToWork(this.workBox().getCenter(new THREE.Vector3()))
       const upright = Math.min(1, this.canvas.clientWidth / this.canvas.clientHeight || 1) // a phone is narrow
-      this.orbit.look(sphere.center.toArray(), Math.max(sphere.radius, 0.03) * (robot ? 2.95 : 3.2) / upright)
+      const distance = Math.max(sphere.radius, 0.03) * (robot ? 2.95 : 3.2) / upright
+      if (robot || name === "work") this.turnToWork(this.workBox(), robot ? null : distance)
+      this.orbit.look(sphere.center.toArray(), distance)
     }
     if (name in DIRECTIONS) this.orbit.face(...DIRECTIONS[name].turn)
     this.floor(robot ? box : this.surfaceBox())
   }
 
-  // Look a little down, from where the robot does not stand: its arms would hide the work.
-  turnToWork(center) {
+  // Look a little down, from where the robot does not stand, and from nearby, from where its arms hide least.
+  turnToWork(work, distance) {
     this.orbit.face(...HOME)
-    const robot = this.robotBox().getCenter(new THREE.Vector3()).sub(center).negate()
+    const robot = this.robotBox().getCenter(new THREE.Vector3()).sub(work.getCenter(new THREE.Vector3())).negate()
     if (Math.hypot(robot.x, robot.y) > ASIDE_M) this.orbit.azimuth = Math.atan2(robot.y, robot.x) + ASIDE_RAD
+    const { azimuth: usual, elevation } = this.orbit
+    if (distance) this.orbit.azimuth = clearestAzimuth(this.bodies.flat(), work, { distance, elevation, usual })
   }
 
   // A grid of 10 mm, or of 100 mm, below what is seen: it shows where up is, and how large things are.
