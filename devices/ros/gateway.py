@@ -10,7 +10,9 @@ import threading
 from abc import abstractmethod
 from collections import defaultdict, deque
 from collections.abc import Collection
+from math import inf
 from pathlib import Path
+from time import monotonic
 from typing import ClassVar, cast
 
 import numpy as np
@@ -60,6 +62,8 @@ __all__ = ["Gateway"]
 
 _ERRORS_OF_VREP = "stereo/error"
 """Error topic for the authors' simulator, which has no topic for errors."""
+_NEWCOMER_S = 5.0
+"""Time after a program has joined in which all states are used, s: it may want any at once."""
 _REPORTS = ("error", "warning")
 """Topics of an arm with refusals."""
 _STATUS_NS = 1_000_000_000
@@ -247,9 +251,11 @@ class Gateway(Device):
         self._is_new.set()
 
     def _update_used(self) -> None:
+        joined_s = -inf if self._transport is None else self._transport.joined_s
+        is_new = monotonic() - joined_s < _NEWCOMER_S
         for state, publish in self._optional:
             # the first value is awaited: by it the topic counts as published
-            state.use(used=publish.wanted or not state.writes)
+            state.use(used=is_new or publish.wanted or not state.writes)
         unused = frozenset(state.port.name for state, _ in self._optional if not state.used)
         if unused != self._unused:
             self._unused = unused

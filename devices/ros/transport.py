@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import Protocol
 
 from devices.ros.topics.row import Row
@@ -76,7 +77,9 @@ class Transport(ABC):
     """Publishers, subscribers and services of a ROS graph."""
 
     changed: Callable[[], None] = staticmethod(lambda: None)
-    """Is called, in any thread, when a publisher has become `wanted` or is so no longer."""
+    """Is called, in any thread, when a publisher has become `wanted` or is so no longer, and by newcomers."""
+    joined_s = -inf
+    """When the last program joined the graph, by the monotonic clock (s), where the middleware knows."""
     endpoint = ""
     """Where programs reach the graph, in words: a master, a domain."""
 

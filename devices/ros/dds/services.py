@@ -14,7 +14,7 @@ import os
 import struct
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from time import monotonic
 
 from devices.ros.dds.endpoints import ReceiveSample, Service, Subscription
@@ -67,6 +67,8 @@ class ServiceParticipant:
         """
         self._gateway = self._gateway_announcement = b""
         self._domain = domain
+        self.joined: Callable[[], None] = lambda: None
+        """Called, in the thread of this participant, by every program that joins the domain."""
         self._introductions: deque[tuple[float, bytes]] = deque()
         """Times at which new programs, by GUID prefix, are told again of us."""
         self._guid_prefix = _NO_VENDOR + os.urandom(10)
@@ -207,6 +209,7 @@ class ServiceParticipant:
         metatraffic, default = ((host, port) for port in announced_participant(announcement))
         proxy = ParticipantProxy(metatraffic, default, monotonic())
         self._matching.add_program(prefix, proxy)
+        self.joined()
         self._introduce(proxy)
         self._matching.announce_all(proxy)
         self._introductions.extend((proxy.announced_s + delay, prefix) for delay in _INTRODUCE_AGAIN_S)

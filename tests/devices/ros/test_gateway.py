@@ -3,7 +3,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from itertools import pairwise
 from pathlib import Path
-from time import sleep, time_ns
+from time import monotonic, sleep, time_ns
 from typing import Any
 
 import numpy as np
@@ -160,6 +160,22 @@ def test_a_state_is_used_while_a_program_subscribes_and_counted_as_before(gatewa
     first = gateway.transport.heard(topic)[0]
     assert isinstance(first, JointState)
     np.testing.assert_array_equal(first.position, np.ones(6))
+
+
+def test_all_states_are_used_for_a_while_when_a_program_joins(gateway: MemoryGateway) -> None:
+    """It asks once, perhaps as soon as it has subscribed."""
+    gateway.transport.let_go(*(row.topic for row in gateway.rows))
+    for name in {row.port.name for row in gateway.rows if row.port is not None and row.periodic}:
+        gateway.write(name, gateway._states[name]._codec.neutral)
+    gateway.read(0)
+    assert "PSM1/setpoint_cp" in gateway.unused()
+    gateway.transport.joined_s = monotonic()
+    gateway.transport.changed()
+    gateway.read(0)
+    assert set(gateway.unused()) == set()
+    gateway.transport.joined_s -= 60.0
+    gateway.read(10**12)  # once a second
+    assert "PSM1/setpoint_cp" in gateway.unused()
 
 
 def test_what_the_gateway_reads_itself_is_always_used(gateway: MemoryGateway) -> None:
