@@ -12,7 +12,7 @@ from schemas.errors import TrocarError
 from webconsole.arrows import BondArrows
 from webconsole.commands import Show
 from webconsole.console import Console
-from webconsole.frame import Section
+from webconsole.frame import Section, SectionKind
 from webconsole.source import Value
 from webconsole.stage import Stage
 
@@ -74,7 +74,7 @@ class NewSections:
             yield name, partial(self._markers, stage, name)
         if show.pictures and (self._at_ns is not None or self._may_send(stage.pictures)):
             for name in stage.pictures:
-                yield name, partial(self._changed_section, stage, name)
+                yield name, partial(self._picture, stage, name)
         for index, name in enumerate(show.numbers):
             if stage.is_numeric(name):
                 yield name, partial(self._sample, stage, index, name)
@@ -135,6 +135,13 @@ class NewSections:
         value = self._newest(name)
         if value is not None and self._are_new({name: value}):
             yield self._console.section(stage, name, value)
+
+    def _picture(self, stage: Stage, name: str) -> Iterator[Section]:
+        """Yield a new picture, and an empty one for an instant before the first picture."""
+        if self._newest(name) is None and self._sent.pop(name, None) is not None:
+            yield Section(SectionKind.PICTURE, stage.pictures.index(name), b"")
+        else:
+            yield from self._changed_section(stage, name)
 
     def _sample(self, stage: Stage, index: int, name: str) -> Iterator[Section]:
         value = self._newest(name)

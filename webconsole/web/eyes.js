@@ -24,7 +24,10 @@ export class Eyes {
     this.drawn = drawn
     this.section.hidden = !names.length
     this.all = names.map((name) => ({ name, ...figure(drawn ? `${name} eye, drawn by this page` : name.replace("/image_raw/compressed", "")), drawn: 0 }))
-    for (const eye of drawn ? [] : this.all) eye.canvas.onclick = (event) => this.pick(eye, event)
+    for (const eye of drawn ? [] : this.all) {
+      eye.canvas.onclick = (event) => this.pick(eye, event)
+      this.blank(eye)
+    }
     this.both = figure("both eyes, for red and cyan glasses")
     const picks = () => Boolean(this.picking)
     for (const eye of [...this.all, this.both]) enlargeable(eye.figure, picks)
@@ -46,15 +49,24 @@ export class Eyes {
     this.combine()
   }
 
+  // Say that there is no picture at this instant.
+  blank(eye) {
+    eye.drawn = 0
+    eye.canvas.getContext("2d").clearRect(0, 0, eye.canvas.width, eye.canvas.height)
+    eye.caption.textContent = `${eye.text}: no picture yet`
+  }
+
   async take(index, bytes) {
     const eye = this.all[index]
     if (!eye || eye.busy) { if (eye) eye.next = bytes; return }
+    if (!bytes.byteLength) { this.blank(eye); return }
     eye.busy = true
     try {
       const picture = await createImageBitmap(new Blob([bytes]))
       Object.assign(eye.canvas, { width: picture.width, height: picture.height })
       eye.canvas.getContext("2d").drawImage(picture, 0, 0)
       picture.close()
+      eye.caption.textContent = eye.text
       eye.drawn++
       if (!this.both.figure.hidden) this.waiting ??= requestAnimationFrame(() => this.combine())
     } catch { this.unreadable() }
@@ -103,5 +115,5 @@ function figure(text) {
   canvas.setAttribute("role", "img")
   canvas.setAttribute("aria-label", `Picture of ${text}`)
   figure.append(canvas, caption)
-  return { figure, canvas }
+  return { figure, canvas, caption, text }
 }
