@@ -6,7 +6,7 @@ from typing import Any, ClassVar, cast
 
 from controllers.cholecystectomy.params import ClipAndCutParams
 from controllers.cholecystectomy.ports import PROGRESS, routine_ports
-from controllers.cholecystectomy.procedure import SurgeonHands
+from controllers.cholecystectomy.procedure import SurgeonHands, SurgeonState
 from controllers.cholecystectomy.sight import Sight
 from controllers.cholecystectomy.sub_task import SubTask, instruction
 from controllers.cholecystectomy.surfaces import Surfaces
@@ -52,6 +52,16 @@ class ClipAndCut(Controller):
         return routine_ports(self.params, self._hands)
 
     @property
+    def state(self) -> SurgeonState:
+        """State of the routine."""
+        return self._surgeon.state
+
+    @property
+    def grasper(self) -> SurgeonHand:
+        """The hand that holds the gallbladder."""
+        return self._hands.grasper
+
+    @property
     def ended(self) -> str:
         """Reason to end the session: both tubes are parted, or the routine has given up."""
         state = self._surgeon.state
@@ -72,7 +82,7 @@ class ClipAndCut(Controller):
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Read the measurements, advance the routine, and send the commands."""
         surgeon, before = self._surgeon, self._surgeon.state.sub_task
-        self._sense(inputs)
+        self.sense(inputs)
         if t == 0:
             surgeon.begin()
         surgeon.step(Sight(self.params, inputs, self._surfaces))
@@ -107,7 +117,8 @@ class ClipAndCut(Controller):
         self._surfaces.restore(state[end:])
         super().restore(state[8:end])
 
-    def _sense(self, inputs: Inputs) -> None:
+    def sense(self, inputs: Inputs) -> None:
+        """Read the measurements of the hands."""
         for hand in self._hands:
             arm = hand.arm
             hand.sense(inputs[f"{arm}/local/measured_cp"], float(inputs[f"{arm}/jaw/measured_js"][0]))

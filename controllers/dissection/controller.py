@@ -9,6 +9,7 @@ import numpy as np
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.dissection.dissector import Dissector
 from controllers.dissection.hook_hand import HookHand
+from controllers.dissection.lifting import DissectionState
 from controllers.dissection.params import DissectionParams
 from controllers.dissection.ports import PROGRESS, dissection_ports
 from controllers.dissection.sight import Sight
@@ -58,6 +59,16 @@ class Dissection(Controller):
         return tuple(dissection_ports(self.params, self._hook, self._grasper))
 
     @property
+    def state(self) -> DissectionState:
+        """State of the routine."""
+        return self._dissector.state
+
+    @property
+    def grasper(self) -> SurgeonHand:
+        """The hand that holds the gallbladder."""
+        return self._grasper
+
+    @property
     def ended(self) -> str:
         """Reason to end the session: all is free, or the routine has given up."""
         state = self._dissector.state
@@ -79,7 +90,7 @@ class Dissection(Controller):
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Read the measurements, advance the routine, and send the commands."""
         dissector, outputs = self._dissector, self._outputs
-        self._sense(inputs)
+        self.sense(inputs)
         if t == 0:
             dissector.begin()
         dissector.step(Sight(self.params, inputs))
@@ -90,7 +101,8 @@ class Dissection(Controller):
         outputs["status"] = tuple(StringMessage(data=text) for text in dissector.statuses())
         return outputs
 
-    def _sense(self, inputs: Inputs) -> None:
+    def sense(self, inputs: Inputs) -> None:
+        """Read the measurements of the hands."""
         grasper = self._grasper
         for hand in (self._hook, grasper):
             angle = float(inputs[f"{hand.arm}/jaw/measured_js"][0]) if hand is grasper else 0.0

@@ -9,8 +9,8 @@ import numpy as np
 from controllers.cholecystectomy.approach import withdraw
 from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
+from controllers.dissection.clearing import Clearing
 from controllers.dissection.hook_hand import HookHand
-from controllers.dissection.lifting import Lifting
 from controllers.dissection.params import DissectionParams
 from controllers.dissection.sight import Sight
 from controllers.dissection.step import Failure, Step
@@ -25,8 +25,8 @@ _BESIDE = 12.0e-3
 """Distance of the next place up to which the hook stays in the gap, m."""
 _GENTLE, _FINE = 0.3, 0.15
 """Shares of the speed before tissue, and in the gap."""
-_EDGE = 7.0e-3
-"""Depth along the bed of the edge of what is tied: its places may be next, m."""
+_BESIDE_FAT = 25.0e-3
+"""The same below fat, m."""
 _AWAY = 0.1
 """Time with power without heat after which the hook goes deeper, s."""
 _DEEPER, _DEEPEST = 0.8e-3, 5.0e-3
@@ -35,9 +35,13 @@ _TOWARDS, _FARTHEST = 0.7, 2.0e-3
 """Share of the way from a tied place to the gallbladder's wall at which the hook works, and its limit, m."""
 _PAST = 2.5e-3
 """Distance beyond which a tied place is another one, m."""
+_LONG_FAT = 1.0
+"""Longest time with the hook at fat that does not part, s."""
+_RAISED, _TUCKED = 4.5e-3, 1.5e-3
+"""Way of the hook when it lifts fat, along the normal and farther below the fat, m."""
 
 
-class Dissector(Lifting):
+class Dissector(Clearing):
     """Grasps and lifts the gallbladder, and burns what ties it to the liver."""
 
     def __init__(self, params: DissectionParams, hook: HookHand, grasper: SurgeonHand) -> None:
@@ -53,6 +57,7 @@ class Dissector(Lifting):
             Step.PLAN: self._plan,
             Step.HOVER: self._hover,
             Step.REACH: self._reach,
+            Step.RAISE: self._raise,
             Step.BURN: self._burn,
             Step.LEAVE: self._leave,
         }
@@ -79,7 +84,7 @@ class Dissector(Lifting):
         state = self.state
         if state.done or state.failed or not sight.is_complete:
             return
-        state.ties = len(sight.ties)
+        state.ties = len(self.ties)
         self._watch()
         before = state.step
         try:
@@ -103,13 +108,19 @@ class Dissector(Lifting):
             self.say("the gallbladder has slipped out of the grasper; it is grasped again")
             self.grasper.move_jaw(self.opening)
             self._leave_tissue(Step.AIM_GRASP)
-        if seen.is_free and Step.LIFT <= state.step < Step.LEAVE:
-            self.say("all is free")
-            self._leave_tissue(Step.LEAVE)
+        if state.ahead.any() and self.is_free and Step.LIFT <= state.step < Step.LEAVE:
+            if state.clears:
+                self.say("the fat is cleared")
+                self.end_fat()
+                self._leave_tissue(Step.LIFT)
+            else:
+                self.say("all is free")
+                self._leave_tissue(Step.LEAVE)
 
     def _leave_tissue(self, step: Step) -> None:
         """Draw the hook back out of the gap."""
         self.hook.state.correction[:] = 0.0
+        self.state.inside = False
         self.hook.go(withdraw(self.hook.line(), _BEFORE), 2.0 * _GENTLE)
         self.enter(step)
 
@@ -117,33 +128,32 @@ class Dissector(Lifting):
         if not self.hook.has_arrived:
             return
         if not self.state.ahead.any():
-            self._find_bed()
+            self.find_work()
         self.aim_grasp()
 
-    def _find_bed(self) -> None:
-        """Take direction and normal of the bed from what is tied, from the free end on."""
-        state, ties, nodes = self.state, self.seen.ties, self.seen.gallbladder
-        middle, body = ties.mean(axis=0), nodes.mean(axis=0)
-        _, _, axes = np.linalg.svd(ties - middle)
-        free = nodes[np.linalg.norm(nodes[:, None] - ties, axis=2).min(axis=1).argmax()]
-        state.ahead[:] = axes[0] * np.sign(axes[0] @ (middle - free))
-        state.normal[:] = axes[2] * np.sign(axes[2] @ (body - middle))
-
     def _lift(self) -> None:
-        if self.pull():
-            self.say(f"the gallbladder is lifted by {1e3 * self.state.pulled:.0f} mm, {self.seen.pull:.2f} N")
+        if self.hook.has_arrived and self.pull():
+            way = 1e3 * self.state.pulled
+            self.say(
+                "the gallbladder is held"
+                if self.state.clears
+                else f"the gallbladder is lifted by {way:.0f} mm, {self.seen.pull:.2f} N"
+            )
             self.enter(Step.PLAN)
 
     def _plan(self) -> None:
         """Choose the next place, and go there: within the gap, or from before it."""
         state, hook = self.state, self.hook
-        place = self._next_place()
+        is_inside = state.inside or not state.clears
+        places = self.edge_places(is_inside=is_inside)
+        place = places[state.skipped % len(places)]
         if state.skipped > self.params.attempts * max(1, state.ties):
             self.fail(Failure.NOT_PARTED, f"{state.ties} places hang together")
             return
-        is_near = bool(np.linalg.norm(hook.bare_end - place) < _BESIDE)
+        beside = _BESIDE_FAT if state.clears else _BESIDE
+        is_near = is_inside and bool(np.linalg.norm(hook.bare_end - place) < beside)
         way = 0.0 if is_near else _BEFORE
-        obstacles = Obstacles.join([self.seen.obstacles, self.grasper_shaft])
+        obstacles = Obstacles.join([self.seen.obstacles, self.grasper_shaft, self.fat_body])
         try:
             state.goal[:] = hook.choose(self._beside(place), state.ahead, state.normal, way, obstacles)
         except MotionError:
@@ -152,25 +162,19 @@ class Dissector(Lifting):
             state.skipped += 1
             return
         state.place[:], state.deeper, state.idle = place, 0.0, 0.0
+        state.before = len(self.ties)
         hook.state.correction[:] = 0.0
         if is_near:
-            hook.go(state.goal, _FINE)
+            hook.go(state.goal, _GENTLE if state.clears else _FINE)
             self.enter(Step.REACH)
         else:
             hook.go(withdraw(state.goal, _BEFORE))
             self.enter(Step.HOVER)
 
-    def _next_place(self) -> Vector:
-        """Return a place at the edge of what is tied, the nearest that has not been tried in vain."""
-        state, ties = self.state, self.seen.ties
-        along = ties @ state.ahead
-        edge = ties[along < along.min() + _EDGE]
-        order = np.linalg.norm(edge - self.hook.bare_end, axis=1).argsort(kind="stable")
-        place: Vector = edge[order[state.skipped % len(order)]]
-        return place
-
     def _beside(self, place: Vector) -> Vector:
         """Return where the hook works at a tied place, m, shape (3,): towards the gallbladder's wall."""
+        if self.state.clears:
+            return self.under_fat(place)
         nodes = self.seen.gallbladder
         wall = nodes[np.linalg.norm(nodes - place, axis=1).argmin()] - place
         length = float(np.linalg.norm(wall))
@@ -183,23 +187,59 @@ class Dissector(Lifting):
             self.enter(Step.REACH)
 
     def _reach(self) -> None:
-        if self.hook.has_arrived:
-            self.state.heat = self.seen.delivered
-            self.enter(Step.BURN)
+        if not self.hook.has_arrived:
+            return
+        self.state.inside = True
+        if self.state.clears:
+            self.state.goal[:3] += _RAISED * self.state.normal + _TUCKED * self.state.ahead
+            self.hook.go(self.state.goal, _FINE)
+            self.enter(Step.RAISE)
+        else:
+            self._begin_burn()
+
+    def _raise(self) -> None:
+        """Lift the fat without power; what does not part is burnt, away from what lies below."""
+        if self._has_parted():
+            self._go_on()
+        elif self.hook.has_arrived:
+            self._begin_burn()
+
+    def _begin_burn(self) -> None:
+        self.state.heat, self.state.yielded = self.seen.delivered, False
+        self.enter(Step.BURN)
+
+    def _has_parted(self) -> bool:
+        """Return whether the place at which the hook works has parted, and follow it if not."""
+        state, ties = self.state, self.ties
+        if state.clears:
+            return len(ties) < state.before
+        if not len(ties) or np.linalg.norm(ties - state.place, axis=1).min() > _PAST:
+            return True
+        state.place[:] = ties[np.linalg.norm(ties - state.place, axis=1).argmin()]
+        return False
+
+    def _go_on(self) -> None:
+        self.state.skipped = 0
+        self.enter(Step.PLAN)
+
+    def _leave_place(self) -> None:
+        """Try another place first."""
+        self.state.skipped += 1
+        self.state.recoveries += 1
+        self.enter(Step.PLAN)
 
     def _burn(self) -> None:
         """Burn until the place has parted; where nothing is touched go deeper, power off."""
         state, hook = self.state, self.hook
-        ties = self.seen.ties
-        if not len(ties) or np.linalg.norm(ties - state.place, axis=1).min() > _PAST:
-            state.skipped = 0
-            self.enter(Step.PLAN)
-            return
-        state.place[:] = ties[np.linalg.norm(ties - state.place, axis=1).argmin()]
-        if state.elapsed > 1e-9 * self.params.patience:
-            state.skipped += 1
-            state.recoveries += 1
-            self.enter(Step.PLAN)
+        if self._has_parted():
+            if self.is_beside_fat:
+                state.before, state.elapsed, state.yielded = len(self.ties), 0.0, True
+            else:
+                self._go_on()
+                return
+        longest = _LONG_FAT if state.clears else 1e-9 * self.params.patience
+        if state.elapsed > longest or not self.may_burn:
+            (self._go_on if state.yielded else self._leave_place)()
             return
         if not hook.has_arrived:
             return
@@ -210,7 +250,9 @@ class Dissector(Lifting):
             self.power = self.params.power
             return
         state.idle = 0.0
-        if state.deeper < _DEEPEST:
+        if state.yielded:
+            self._go_on()
+        elif state.deeper < _DEEPEST and not state.clears:
             state.deeper += _DEEPER
             hook.go(withdraw(state.goal, -state.deeper), _FINE)
         else:

@@ -41,6 +41,8 @@ _MARGIN = 0.08
 """Least share of the joints' ranges that a stride leaves."""
 _NECK = 5.0e-3
 """Depth of the end of the gallbladder that counts as its neck, m."""
+_COVERS, _REACHED = 25.0e-3, 4.0e-3
+"""Distance from the neck of fat that is in the way, and its part that every grasp leaves aside, m."""
 
 
 class DissectionState(Record):
@@ -48,10 +50,18 @@ class DissectionState(Record):
 
     step = choice(Step.AIM_GRASP)
     failure = choice(Failure.NONE)
+    clears = flag()
+    """Whether fat is cleared; else the plate is freed."""
+    whole = number()
+    """Area where fat was tied at the beginning, m^2."""
+    inside = flag()
+    """Whether the hook is in the tissue."""
+    bed = array(3)
+    """Direction along the plate at the beginning, from the neck on."""
     ahead = array(3)
-    """Direction along the bed, from where it is free to where it is tied."""
+    """Direction of the work, from where is free to where it is tied."""
     normal = array(3)
-    """Normal of the bed, towards the gallbladder."""
+    """Normal of what is tied, towards gallbladder or fat."""
     goal = array(7)
     """Pose of the tip at the tissue, of the hand at work."""
     begun = array(3)
@@ -59,8 +69,12 @@ class DissectionState(Record):
     place = array(3)
     """Tied place at which the hook works, m."""
     ties = integer()
+    before = integer()
+    """Tied places when the hook came to its place."""
     heat = number()
     """Heat given before the last step, J."""
+    yielded = flag()
+    """Whether fat has parted at the present place."""
     idle = number()
     """Time with power that heats nothing, s."""
     deeper = number()
@@ -108,8 +122,9 @@ class Lifting(Telling):
     def aim_grasp(self) -> None:
         """Choose the pose of the next grasp, and send the grasper there."""
         state, hand, nodes = self.state, self.grasper, self.seen.gallbladder
-        along = nodes @ state.ahead
+        along = nodes @ state.bed
         neck = nodes[along < along.min() + _NECK].mean(axis=0)
+        neck += self._beyond_fat(neck) * state.bed
         poses = grasp_poses(hand, nodes, neck, state.grasps)
         obstacles = self.seen.obstacles.near(poses[0, :3, 3], NEAR)
         pose = choose_pose(hand, poses, _BEFORE, self.opening, obstacles, "the gallbladder")
@@ -117,6 +132,14 @@ class Lifting(Telling):
         hand.move_jaw(self.opening)
         hand.go(withdraw(state.goal, _BEFORE))
         self.enter(Step.HOVER_GRASP)
+
+    def _beyond_fat(self, neck: Vector) -> float:
+        """Return how far (m) along the gallbladder from its neck the jaws close beside the fat."""
+        sheet = self.seen.sheet
+        if not len(sheet):
+            return 0.0
+        covered = sheet[np.linalg.norm(sheet - neck, axis=1) < _COVERS] - neck
+        return max(0.0, float((covered @ self.state.bed).max(initial=0.0)) - _REACHED)
 
     def hover_grasp(self) -> None:
         """Wait before the gallbladder, then go ahead."""
@@ -156,6 +179,8 @@ class Lifting(Telling):
         state.since_stride += hand.period
         if not state.grasped or not hand.has_arrived or state.since_stride < _CALM:
             return False
+        if state.clears:
+            return True  # held alone: a pull would carry the fat along
         pull, way = self.seen.pull, self._way()
         if pull > most:
             stride = -_STRIDE
@@ -184,8 +209,8 @@ class Lifting(Telling):
 
     def _way(self) -> Vector:
         """Return the direction of the pull, shape (3,): it turns the flap over the edge of what is tied."""
-        state, ties = self.state, self.seen.ties
-        edge = ties[(ties @ state.ahead).argsort()[:3]].mean(axis=0) if len(ties) else state.place
+        state, ties = self.state, self.seen.plate
+        edge = ties[(ties @ state.bed).argsort()[:3]].mean(axis=0) if len(ties) else state.place
         flap = self.grasper.line()[:3] - edge
         x, y = float(flap @ state.ahead), float(flap @ state.normal)
         length = max(float(np.hypot(x, y)), 1e-6)

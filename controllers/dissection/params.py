@@ -23,6 +23,20 @@ class DissectionParams(RoutineParams):
     avoid: tuple[Name, ...] = Field(
         default=("liver",), max_length=16, description="organs that the shaft of the hook keeps away from"
     )
+    sheet: Name = Field(default="fat", description="name of the organ of fat that lies over the triangle")
+    fat: tuple[Name, ...] = Field(
+        default=("fat_gallbladder", "fat_cystic_duct", "fat_cystic_artery"),
+        max_length=16,
+        description=(
+            "attachments of this organ that are cleared first, if the scene has them; the common duct need"
+            " not be exposed"
+        ),
+    )
+    spare: tuple[Name, ...] = Field(
+        default=("common_bile_duct", "hepatic_artery"),
+        max_length=16,
+        description="organs near which the hook pulls without power",
+    )
     part: Literal["all", "lower third"] = Field(
         default="all",
         description="what is freed: the whole attachment, or its third nearest to its `lower_end`",

@@ -37,6 +37,12 @@ def dissection_ports(params: DissectionParams, hook: HookHand, grasper: SurgeonH
     for organ in dict.fromkeys((params.gallbladder, *params.avoid)):
         yield signal_in(f"{organ}/nodes", SoftBodyState, frame="world")
     yield signal_in(f"{params.plate}/ties", TiedPlaces, frame="world")
+    for name in params.fat:
+        yield signal_in(f"{name}/ties", TiedPlaces, frame="world", start=())
+    seen = {params.gallbladder, *params.avoid}
+    for organ in dict.fromkeys((params.sheet, *params.spare)):
+        if organ not in seen:
+            yield signal_in(f"{organ}/nodes", SoftBodyState, frame="world", start=())
     yield signal_in(f"{params.plate}/lower_third", start=(0.0,))
     yield signal_in(f"{grasper.arm}/held", Float64Message, "1 while tissue is held, else 0")
     yield signal_in(f"{grasper.arm}/pull", size=3, unit="N", frame="world")

@@ -10,7 +10,7 @@ from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.sight import nodes_of
 from controllers.dissection.params import DissectionParams
 from hub.participant import Inputs
-from schemas.trocar_msgs import TiedPlaces
+from schemas.trocar_msgs import SoftBodyState, TiedPlaces
 from schemas.vectors import Vector
 
 __all__ = ["Sight"]
@@ -33,16 +33,47 @@ class Sight:
         return all(self._inputs.message(port) is not None for port in ports)
 
     @property
-    def ties(self) -> Vector:
-        """Places that are still tied, m, shape (n, 3)."""
+    def plate(self) -> Vector:
+        """Places where the plate is still tied, m, shape (n, 3)."""
         message = cast("TiedPlaces", self._inputs.message(f"{self._params.plate}/ties"))
         return message.points_m.reshape(-1, 3)
+
+    @property
+    def fat(self) -> Vector:
+        """Places where fat is still tied, m, shape (n, 3)."""
+        points = [message.points_m.reshape(-1, 3) for message in self._fat_ties]
+        return np.concatenate([np.zeros((0, 3)), *points])
+
+    @property
+    def fat_area(self) -> float:
+        """Area where fat is still tied, m^2."""
+        return float(sum(message.areas_m2.sum() for message in self._fat_ties))
+
+    @property
+    def _fat_ties(self) -> list[TiedPlaces]:
+        found = [self._inputs.message(f"{name}/ties") for name in self._params.fat]
+        return [message for message in found if isinstance(message, TiedPlaces)]
+
+    @property
+    def sheet(self) -> Vector:
+        """Nodes of the fat, m, shape (n, 3); none without fat."""
+        return self._nodes(self._params.sheet)
+
+    @property
+    def spared(self) -> Vector:
+        """Nodes of the organs near which there is no power, m, shape (n, 3)."""
+        return np.concatenate([np.zeros((0, 3)), *map(self._nodes, self._params.spare)])
+
+    def _nodes(self, organ: str) -> Vector:
+        port = f"{organ}/nodes"
+        is_seen = isinstance(self._inputs.message(port), SoftBodyState)
+        return nodes_of(self._inputs, organ) if is_seen else np.zeros((0, 3))
 
     @property
     def is_free(self) -> bool:
         """Whether the part of the plate that is to be divided has parted."""
         if self._params.part == "all":
-            return not len(self.ties)
+            return not len(self.plate)
         return float(self._inputs[f"{self._params.plate}/lower_third"][0]) >= _FREE
 
     @property

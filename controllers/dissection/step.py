@@ -22,10 +22,12 @@ class Step(IntEnum):
     HOVER = 6
     """The hook is on its way to a place before the tissue."""
     REACH = 7
-    BURN = 8
-    LEAVE = 9
-    DONE = 10
-    FAILED = 11
+    RAISE = 8
+    """The hook lifts the fat without power."""
+    BURN = 9
+    LEAVE = 10
+    DONE = 11
+    FAILED = 12
 
 
 class Failure(IntEnum):

@@ -40,8 +40,8 @@ BILE = (GALLBLADDER, DUCT, COMMON_DUCT)
 
 PLATE = "cystic_plate"
 """Attachment of the gallbladder to the liver."""
-FAT_BEDS = "fat_gallbladder", "fat_cystic_duct", "fat_cystic_artery", "fat_common_bile_duct"
-"""Attachments of the fat over the triangle to what lies below."""
+FAT_BEDS = "fat_gallbladder", "fat_cystic_duct", "fat_cystic_artery"
+"""Attachments of the fat over the triangle to what lies below; the common duct need not be exposed."""
 JOINTS: Mapping[str, str] = MappingProxyType(
     {"neck_duct": DUCT, "duct_confluence": DUCT, "neck_artery": ARTERY, "artery_origin": ARTERY}
 )

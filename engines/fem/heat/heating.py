@@ -109,7 +109,7 @@ class Heating:
             [sphere for _, probe in self._instruments for sphere in probe.bodies], np.int64
         )
         """Spheres with power, by the engine's number."""
-        self._edge = max(organ.mean_edge for organ in organs)
+        self._edges = [organ.mean_edge for organ in organs]
         self._elapsed = np.zeros(1)
         """Time since the last step of heat, s."""
         self._known = [organ.mesh_version for organ in organs]
@@ -204,7 +204,7 @@ class Heating:
                 continue
             nodes = nodes or [organ.solid.nodes for organ in self._organs]
             poles = instrument.poles(probe.positions, probe.touching | probe.held)
-            given = instrument.deposit(self.heats, nodes, poles, self._edge)
+            given = instrument.deposit(self.heats, nodes, poles, self._edges)
             if given and instrument.cuts:
                 cut = [heat > 0.0 for heat in given]
                 bursts = [one | other for one, other in zip(bursts, cut, strict=True)] if bursts else cut

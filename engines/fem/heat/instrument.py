@@ -87,15 +87,21 @@ class EnergyInstrument:
             current = one / one.sum() - other / other.sum()
         return np.column_stack([centres, self._radii, current])[touching]
 
-    def deposit(self, heats: Sequence[Heat], nodes: Sequence[Vector], poles: Vector, edge: float) -> Deposit:
+    def deposit(
+        self, heats: Sequence[Heat], nodes: Sequence[Vector], poles: Vector, edges: Sequence[float]
+    ) -> Deposit:
         """Return the heat (J) in every element of every body, shapes (m,), since the last call.
 
-        `nodes`: present nodes of every body, m, shapes (n, 3); `edge`: their mean distance, m.
+        `nodes`: present nodes of every body, m, shapes (n, 3). `edges`: mean length of its edges, m: an
+        element has the heat of its middle, so the mesh of a body widens the reach in this body.
         """
         waiting, self.numbers[0] = float(self.numbers[0]), 0.0
         if not waiting:
             return []
-        found = [heat.spread(at, poles, self.reach + edge) for heat, at in zip(heats, nodes, strict=True)]
+        found = [
+            heat.spread(at, poles, self.reach + edge)
+            for heat, at, edge in zip(heats, nodes, edges, strict=True)
+        ]
         total = sum(share for _, share in found)
         if not total:
             if self.numbers[2] >= _LONGEST_IDLE_S:

@@ -92,7 +92,9 @@ class OrganParams(BaseModel):
             " a relative path starts at the scenario"
         ),
     )
-    young_modulus: TissueModulus | None = Field(default=None, description="instead of a material")
+    young_modulus: TissueModulus | None = Field(
+        default=None, description="instead of a material, or of its own: heat is then that of the material"
+    )
     poisson_ratio: TissuePoissonRatio | None = Field(
         default=None, description=f"with young_modulus; default: {_POISSON_RATIO}"
     )
@@ -192,8 +194,8 @@ class OrganParams(BaseModel):
             raise ValueError("tissue bleeds where it is opened: bleeding goes with `cutting`")
         if self.young_modulus is None and (self.poisson_ratio is not None or self.density is not None):
             raise ValueError("poisson_ratio and density go with young_modulus; a material has its own")
-        if sum(part is not None for part in (self.material, self.material_file, self.young_modulus)) > 1:
-            raise ValueError("an organ has a material, a material_file or a young_modulus, one of them")
+        if self.material_file is not None and (self.material is not None or self.young_modulus is not None):
+            raise ValueError("an organ has a material_file, or a material or young_modulus: one of them")
         _ = self.elastic, self.local, self.anchored_nodes, self.inner_wall
         return self
 
@@ -222,6 +224,8 @@ class OrganParams(BaseModel):
             return Material(own.young_modulus, own.poisson_ratio, own.density, damping)
         if self.young_modulus is not None:
             poisson_ratio, density = self.poisson_ratio, self.density
+            if self.material is not None:
+                preset(self.material)  # refuses a name that is not known
             return Material(
                 self.young_modulus,
                 _POISSON_RATIO if poisson_ratio is None else poisson_ratio,
@@ -238,10 +242,11 @@ class OrganParams(BaseModel):
 
     @property
     def material_name(self) -> str | None:
-        """Name of the material, as stated or of the shape; None: a modulus or a file."""
-        if self.young_modulus is not None or self.material_file is not None:
-            return None
-        return self.material or self.body.material
+        """Name of the material, as stated or of the shape; None: a modulus alone, or a file."""
+        if self.material is not None:
+            return self.material
+        is_own = self.young_modulus is not None or self.material_file is not None
+        return None if is_own else self.body.material
 
     @cached_property
     def relaxed(self) -> Material:

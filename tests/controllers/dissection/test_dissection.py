@@ -8,7 +8,7 @@ from controllers.dissection.step import Failure, Step
 from hub.planning.scenario_file import load
 from robots.transform import pose_to_matrix
 from schemas.errors import MotionError, ScenarioError
-from tests.controllers.dissection.world import PERIOD, World
+from tests.controllers.dissection.world import PERIOD, Triangle, World
 
 
 @pytest.mark.long
@@ -150,3 +150,47 @@ def test_the_hook_keeps_clear_of_what_lies_in_its_way():
     assert np.linalg.norm(other[:3, 2] - free[:3, 2]) > 0.2  # another direction
     for pose in (free, other):
         assert np.allclose(pose[:3, :3] @ hook._middle + pose[:3, 3], place, atol=1e-9)
+
+
+@pytest.mark.long
+def test_fat_is_lifted_without_power_then_burnt_and_the_lower_third_follows():
+    world = Triangle().run(120.0)
+    assert world.state.done
+    assert len(world.fat) <= 2
+    assert world.routine.ended == "cystic_plate is free (lower third), after 0 recoveries"
+    assert world.said.index("the fat is cleared") < world.said.index("all is free")
+    steps = world.steps[: world.steps.index(Step.BURN) + 1]
+    assert steps[-3:] == [Step.REACH, Step.RAISE, Step.BURN]
+    burns = np.array(world.burns)
+    assert (burns[:, 2] > 0.005).all()  # above what lies below the fat
+    duct = np.linalg.norm(burns[:, None] - world.common_duct, axis=2).min(axis=1)
+    assert (duct > 0.006).all()
+    assert np.linalg.norm(burns[0] - [-0.010, -0.006, 0.004]) < 0.012  # begun far from the common duct
+
+
+def test_weak_fat_comes_off_without_power():
+    world = Triangle()
+    world.weak[:] = True
+    while world.state.clears or world.state.step < Step.PLAN:
+        world.step()
+    assert not world.burns
+    assert "the fat is cleared" in world.said
+
+
+@pytest.mark.long
+def test_fat_beside_the_common_duct_is_not_burnt_and_given_up():
+    world = Triangle("attempts=1")
+    world.common_duct += [-0.009, 0.0, 0.012]
+    world.run(120.0)
+    assert world.state.failure is Failure.NOT_PARTED
+    duct = np.linalg.norm(np.array(world.burns)[:, None] - world.common_duct, axis=2).min(axis=1)
+    assert (duct > 0.006).all()
+
+
+def test_the_gallbladder_is_grasped_beside_the_fat():
+    world = Triangle()
+    while not world.state.grasped:
+        world.step()
+    tip = world.tip("PSM2")
+    ends = tip[:3, 3] + 0.012 * tip[:3, 2]
+    assert np.linalg.norm(world.sheet - ends, axis=1).min() > 4e-3

@@ -11,7 +11,7 @@ from schemas.errors import MotionError
 from schemas.ros import Header, StringMessage
 from schemas.trocar_msgs import SoftBodyState, TiedPlaces
 
-__all__ = ["World"]
+__all__ = ["Triangle", "World"]
 
 PERIOD = 20_000_000
 HEADER = Header(frame_id="world")
@@ -30,8 +30,10 @@ def grid(*ranges):
 class World:
     """A gallbladder on its bed, as in the scenario gallbladder-bed."""
 
+    scenario = "gallbladder-bed"
+
     def __init__(self, *settings):
-        given = load("gallbladder-bed", [f"participants.routine.{setting}" for setting in settings])
+        given = load(self.scenario, [f"participants.routine.{setting}" for setting in settings])
         self.routine = Dissection("routine", given.params["routine"])
         self.routine.configure(Setup(PERIOD, "."))
         self.hands = {hand.arm: hand for hand in (self.routine._hook, self.routine._grasper)}
@@ -76,6 +78,10 @@ class World:
             "cystic_plate/lower_third": np.array([1.0 - (self.ties[:, 1] < 0.035).sum() / 4.0]),
             "cystic_plate/ties": TiedPlaces(header=HEADER, attachment="", points_m=self.ties.ravel()),
         }
+        values |= self._more()
+        for port in self.routine.ports:
+            if port.causality == "input" and port.start == ():
+                values.setdefault(port.name, None)
         for organ, nodes in (("gallbladder", self.nodes), ("liver", self.liver)):
             values[f"{organ}/nodes"] = SoftBodyState(
                 header=HEADER, body="", nodes_m=np.float32(nodes).ravel()
@@ -103,6 +109,10 @@ class World:
             if self.state.done or self.state.failed:
                 break
         return self
+
+    def _more(self):
+        """Return what a scene has besides, by port."""
+        return {}
 
     def _follow(self, arm, out):
         hand = self.hands[arm]
@@ -134,3 +144,49 @@ class World:
             self.heats[near & ~self.stubborn] += 0.5 * power * PERIOD * 1e-9
             kept = self.heats < HEAT
             self.ties, self.heats, self.stubborn = self.ties[kept], self.heats[kept], self.stubborn[kept]
+
+
+class Triangle(World):
+    """The scenario calot-dissection: fat lies on gallbladder and duct, beside the common duct."""
+
+    scenario = "calot-dissection"
+    area = 4e-6
+    """Area of a tie of the fat, m^2."""
+
+    def __init__(self, *settings):
+        super().__init__(*settings)
+        self.fat = grid((-0.010, 0.012, 6), (-0.006, 0.006, 4), (0.004, 0.004, 1))
+        self.sheet = grid((-0.014, 0.016, 13), (-0.018, 0.014, 13), (0.0045, 0.0045, 1))
+        self.common_duct = grid((0.022, 0.026, 3), (-0.04, 0.04, 15), (-0.008, 0.0, 3))
+        self.glued = np.zeros(len(self.fat), np.bool_)
+        """Ties of the fat that neither pull nor heat parts."""
+        self.weak = np.zeros(len(self.fat), np.bool_)
+        """Ties of the fat that part when they are lifted."""
+        self.lifted_from = np.full(len(self.fat), np.nan)
+        self.burns = []
+        """Places of the hook with power at the fat, m."""
+
+    def _more(self):
+        areas = np.full(len(self.fat), self.area)
+        tied = TiedPlaces(header=HEADER, attachment="", points_m=self.fat.ravel(), areas_m2=areas)
+        nodes = {"fat": self.sheet, "common_bile_duct": self.common_duct}
+        nodes |= dict.fromkeys(("cystic_duct", "cystic_artery", "hepatic_artery"), self.common_duct)
+        return {"fat_cystic_duct/ties": tied} | {
+            f"{organ}/nodes": SoftBodyState(header=HEADER, body="", nodes_m=np.float32(points).ravel())
+            for organ, points in nodes.items()
+        }
+
+    def _burn(self, power):
+        super()._burn(power)
+        end = self.hands["PSM1"].bare_end
+        near = np.linalg.norm(self.fat - end, axis=1) < 0.012
+        self.lifted_from[near] = np.fmin(self.lifted_from, end[2])[near]
+        lifted = near & self.weak & (end[2] - self.lifted_from > 0.003)
+        burnt = np.zeros_like(lifted)
+        if power and near.any():
+            self.delivered += 0.5 * power * PERIOD * 1e-9
+            self.burns.append(end.copy())
+            burnt = near & (np.linalg.norm(self.fat - end, axis=1) < 0.010)
+        kept = ~((lifted | burnt) & ~self.glued)
+        self.fat, self.glued, self.weak = self.fat[kept], self.glued[kept], self.weak[kept]
+        self.lifted_from = self.lifted_from[kept]

@@ -83,7 +83,7 @@ def test_a_command_is_within_the_bounds_of_the_generator(watts, stale, expected)
     for _ in range(10):
         instrument.listen(inputs(watts, stale=stale), 1e-3)
     poles = instrument.poles(np.zeros((1, 3)), np.ones(1, bool))
-    found = instrument.deposit([heat], [points], poles, 1e-3)
+    found = instrument.deposit([heat], [points], poles, [1e-3])
     assert instrument.numbers[1] == pytest.approx(0.01 * expected)
     assert float(sum(map(np.sum, found))) == pytest.approx(0.01 * expected, rel=1e-6)
 
@@ -103,6 +103,22 @@ def test_heat_is_that_of_point_currents_in_an_infinite_body(mode):
     np.testing.assert_allclose(shares / total, truth / truth.sum(), rtol=1e-4)
     alone = instrument.poles(at, np.array([True, False]))
     assert len(alone) == (0 if mode == "bipolar" else 1)
+
+
+@pytest.mark.parametrize(
+    ("edges", "is_heated"), [([1e-3, 1e-3], False), ([1e-2, 1e-3], False), ([1e-3, 1e-2], True)]
+)
+def test_a_coarse_body_widens_the_reach_of_a_current_in_itself_alone(edges, is_heated):
+    (near, points, _), (far, others, _) = unit_block(), unit_block()
+    others = others + np.array([points[:, 0].max() - others[:, 0].min() + 4e-3, 0.0, 0.0])
+    instrument = EnergyInstrument("hook", EnergyParams(), np.array([0.5e-3]))
+    instrument.listen(inputs(30.0), 1e-3)
+    at = np.array([[points[:, 0].max(), 0.0, 0.0]])
+    one, other = instrument.deposit(
+        [near, far], [points, others], instrument.poles(at, np.ones(1, bool)), edges
+    )
+    assert one.sum() > 0.0
+    assert bool(other.sum() > 0.0) is is_heated
 
 
 def test_insulated_spheres_conduct_nothing_and_press_all_the_same():

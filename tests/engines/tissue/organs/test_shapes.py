@@ -138,7 +138,7 @@ def test_every_material_says_where_it_comes_from_and_for_which_loading(name):
         ({"young_modulus": "1 kPa", "poisson_ratio": float("nan")}, "outside 0.01"),
         ({"young_modulus": "1 kPa", "density": "1 kg/m^3"}, "inflated lung"),
         ({"material": "colonn"}, "no material 'colonn'. Did you mean 'colon'"),
-        ({"material": "liver", "young_modulus": "1 kPa"}, "one of them"),
+        ({"material": "livver", "young_modulus": "1 kPa"}, "no material 'livver'"),
         ({"material": "liver", "density": 1000}, "a material has its own"),
         ({}, "the material is missing"),
     ],
@@ -146,6 +146,13 @@ def test_every_material_says_where_it_comes_from_and_for_which_loading(name):
 def test_materials_outside_nature_or_without_a_source_are_refused(wrong, expected):
     with pytest.raises(ValidationError, match=expected):
         organ(size=BLOCK["size"], **wrong)
+
+
+def test_an_organ_with_a_modulus_of_its_own_keeps_the_heat_of_its_material():
+    own = organ(size=BLOCK["size"], material="fat", young_modulus="10 kPa", density="911 kg/m^3")
+    assert own.material_name == "fat"
+    assert own.elastic.young_modulus == 10e3
+    assert organ(size=BLOCK["size"], young_modulus="10 kPa").material_name is None
 
 
 @pytest.mark.parametrize(
