@@ -16,6 +16,8 @@ _SPARED = 6.0e-3
 """Distance of organs to be spared within which there is no power, m; assumed."""
 _BACK, _UNDER, _OVER = 3.0e-3, 2.0e-3, 3.0e-3
 """Distance of the hook before a tied place, depth below the fat, and width of fat that tells it, m."""
+_HANGS = 6.0e-3
+"""Height off a place beyond which fat hangs loose, and is not what is lifted, m."""
 _GROUP = 6.0e-3
 """Distance of tied places from the hook that are burnt together with the first, m."""
 _AROUND = 8.0e-3
@@ -117,6 +119,7 @@ class Clearing(Lifting):
         off = sheet - before
         heights = off @ state.normal
         over = np.linalg.norm(off - heights[:, None] * state.normal, axis=1) < _OVER
+        over &= np.abs(heights) < _HANGS
         lowest = float(heights[over].min()) if over.any() else 0.0
         found: Vector = before + (lowest - _UNDER) * state.normal
         return found

@@ -144,6 +144,8 @@ class Dissector(Clearing):
     def _plan(self) -> None:
         """Choose the next place, and go there: within the gap, or from before it."""
         state, hook = self.state, self.hook
+        if state.clears and not hook.has_arrived:
+            return
         is_inside = state.inside or not state.clears
         places = self.edge_places(is_inside=is_inside)
         place = places[state.skipped % len(places)]
@@ -152,6 +154,9 @@ class Dissector(Clearing):
             return
         beside = _BESIDE_FAT if state.clears else _BESIDE
         is_near = is_inside and bool(np.linalg.norm(hook.bare_end - place) < beside)
+        if state.clears and state.inside and not is_near:
+            self._leave_tissue(Step.PLAN)
+            return
         way = 0.0 if is_near else _BEFORE
         obstacles = Obstacles.join([self.seen.obstacles, self.grasper_shaft, self.fat_body])
         try:

@@ -194,3 +194,11 @@ def test_the_gallbladder_is_grasped_beside_the_fat():
     tip = world.tip("PSM2")
     ends = tip[:3, 3] + 0.012 * tip[:3, 2]
     assert np.linalg.norm(world.sheet - ends, axis=1).min() > 4e-3
+
+
+def test_fat_that_hangs_loose_below_is_not_what_the_hook_lifts():
+    world = Triangle()
+    world.sheet = np.concatenate([world.sheet, world.sheet - [0.0, 0.0, 0.025]])
+    while world.state.step is not Step.RAISE:
+        world.step()
+    assert world.hands["PSM1"].bare_end[2] > 0.0
