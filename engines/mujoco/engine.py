@@ -147,7 +147,7 @@ class MujocoEngine(Stepped):
         from engines.mujoco.arms.hands import Hands
         from engines.mujoco.arms.readings import Readings
         from engines.mujoco.arms.servos import Servos
-        from engines.mujoco.interaction.coupling import Coupling
+        from engines.mujoco.coupling import Coupling
         from engines.mujoco.interaction.holding import Holding
 
         model, data, params = self._model, self._data, self.params
