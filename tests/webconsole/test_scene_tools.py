@@ -1,5 +1,6 @@
 """Tools around the scene of the page: cameras, bodies, full-screen pictures, the handle on a tip, sliders."""
 
+import itertools
 import json
 from pathlib import Path
 
@@ -200,17 +201,20 @@ def test_the_handle_leads_the_tip_while_it_is_held(browser, session):
     one.sees("document.body.classList.contains('leading')")
     one.page.get_by_role("radio", name="PSM1").click()
 
-    def drag():  # again where a busy machine lets go
+    ways, turns = itertools.cycle((1, -1)), itertools.cycle((1, -1))
+
+    def drag():  # again, the other way, where a busy machine lets go
+        way = next(ways)
         start = one.page.evaluate(TIP)
         x, y = one.page.evaluate(UP_ARROW)
         one.page.mouse.move(x, y)
         one.page.wait_for_timeout(300)
         one.page.mouse.down()
-        one.page.mouse.move(x, y - 40, steps=5)
+        one.page.mouse.move(x, y - 40 * way, steps=5)
         one.page.wait_for_timeout(1000)
         ended = one.page.evaluate(TIP)
         one.page.mouse.up()
-        return ended[2] - start[2] > 0.003 and ended[:2] == pytest.approx(start[:2], abs=1e-3)
+        return way * (ended[2] - start[2]) > 0.003 and ended[:2] == pytest.approx(start[:2], abs=1e-3)
 
     def turn():
         start, before = one.page.evaluate(TIP), np.array(one.page.evaluate(TURN))
@@ -218,7 +222,7 @@ def test_the_handle_leads_the_tip_while_it_is_held(browser, session):
         one.page.mouse.move(x, y)
         one.page.wait_for_timeout(300)
         one.page.mouse.down()
-        one.page.mouse.move(x + 60, y, steps=5)
+        one.page.mouse.move(x + 60 * next(turns), y, steps=5)
         one.page.wait_for_timeout(1000)
         ended, after = one.page.evaluate(TIP), np.array(one.page.evaluate(TURN))
         one.page.mouse.up()
