@@ -44,9 +44,8 @@ def run_calls(
     from joblib import Parallel, delayed
 
     parallel = Parallel(n_jobs=jobs, backend=workers, return_as="generator_unordered", batch_size=1)
-    run = (
-        _numbered if workers == "threading" else partial(_numbered_on, max(1, (os.cpu_count() or 1) // jobs))
-    )
+    is_alone = workers == "threading" or _DRAWING_THREADS in os.environ  # what the user says stands
+    run = _numbered if is_alone else partial(_numbered_on, max(1, (os.cpu_count() or 1) // jobs))
     yield from parallel(delayed(run)(number, function, call) for number, call in enumerate(calls))
 
 
@@ -80,7 +79,7 @@ def _on_ray(
 
 def _numbered_on(cores: int, number: int, function: Callable[..., T], call: tuple[Any, ...]) -> tuple[int, T]:
     """Call in a worker process; its software renderer takes as many threads as `cores`."""
-    os.environ.setdefault(_DRAWING_THREADS, str(cores))
+    os.environ[_DRAWING_THREADS] = str(cores)  # a worker may have served other calls before
     return _numbered(number, function, call)
 
 

@@ -12,6 +12,7 @@ THREADS = "LP_NUM_THREADS"
 def test_workers_share_the_cores_for_drawing(monkeypatch):
     monkeypatch.delenv(THREADS, raising=False)
     monkeypatch.setattr("os.cpu_count", lambda: 6)
+    assert list(run_calls(os.getenv, [(THREADS,)], 6)) == [(0, "1")]
     assert list(run_calls(os.getenv, [(THREADS,)], 3)) == [(0, "2")]
     assert THREADS not in os.environ
 
