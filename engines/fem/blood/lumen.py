@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.fem.blood.film import Liquid
-from engines.fem.blood.partings import Parting, find_partings
+from engines.fem.blood.partings import Parting, find_partings, without_crumbs
 from engines.fem.organ import Organ
 from engines.tissue.organs.inner_wall import InnerWall
 from engines.tissue.organs.lumen import LumenParams
@@ -74,6 +74,8 @@ class Lumen:
         self.shut: NDArray[np.bool_] = np.zeros(len(self._rings), np.bool_)
         """Rings that a clip has shut, shape (r,)."""
         points = organ.mesh.nodes[self._rings]
+        self._ragged: dict[int, NDArray[np.integer]] = {}
+        """Rings with nodes in crumbs: their other nodes."""
         arms = np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=2)
         self.walls: Vector = 0.5 * self.diameters - arms.mean(axis=1)
         """Thickness of the wall at each ring, m, shape (r,)."""
@@ -87,12 +89,18 @@ class Lumen:
         """Places where the tube is parted, from the left end to the right."""
 
     def areas(self, nodes: Vector) -> Vector:
-        """Return the cross-section at every ring as of a round tube through its nodes, m^2, shape (r,)."""
+        """Return the cross-section at every ring as of a round tube through its nodes, m^2, shape (r,).
+
+        A ring with crumbs has no outline, and the mean cross-section at rest.
+        """
         points = nodes[self._rings]
         arms = points - points.mean(axis=1, keepdims=True)
         spans = np.cross(arms, np.roll(arms, -1, axis=1)).sum(axis=1)
         turn = 2.0 * pi / self._rings.shape[1]
-        return 0.5 * turn / sin(turn) * np.linalg.norm(spans, axis=1)
+        found: Vector = 0.5 * turn / sin(turn) * np.linalg.norm(spans, axis=1)
+        for ring in self._ragged:
+            found[ring] = self._area
+        return found
 
     @property
     def spilled(self) -> Vector | None:
@@ -133,7 +141,14 @@ class Lumen:
     @property
     def middles(self) -> Vector:
         """Middle of every ring now, m, in `world`, shape (r, 3)."""
-        return self._organ.nodes[self._rings].mean(axis=1)
+        return self._middles_of(self._organ.nodes)
+
+    def _middles_of(self, nodes: Vector) -> Vector:
+        """Return the middles of the rings without their crumbs, m, shape (r, 3)."""
+        found: Vector = nodes[self._rings].mean(axis=1)
+        for ring, kept in self._ragged.items():
+            found[ring] = nodes[kept].mean(axis=0)
+        return found
 
     def direction(self, ring: int) -> Vector:
         """Return the direction of the tube at a ring, a unit vector, shape (3,)."""
@@ -172,7 +187,11 @@ class Lumen:
         elements = self._station[solid.origin[solid.tetrahedra[solid.owners[slots]]]].mean(axis=1)
         is_left = elements < self._station[origins].mean(axis=1)
         areas = self._areas_of(gone)
-        self.openings, self.partings = [], find_partings(self._ring_pieces(), self.along)
+        pieces = self._ring_pieces()
+        self.openings, self.partings = [], find_partings(pieces, self.along)
+        kept = without_crumbs(pieces)
+        some = np.flatnonzero(kept.any(axis=1) & ~kept.all(axis=1)).tolist()
+        self._ragged = {ring: self._rings[ring, kept[ring]] for ring in some}
         for first, last in _runs(marks):
             sectors = int(opened[first : last + 1].any(axis=0).sum())
             here = ((ring >= first) & (ring <= last)).any(axis=1)
@@ -315,7 +334,7 @@ class Lumen:
         """Return the resistance between each ring and the next, Pa s/m^3, shape (r - 1,); infinite: shut."""
         areas = self.areas(nodes)
         shut = self.shut | (areas < _LEAST_AREA)
-        middles = nodes[self._rings].mean(axis=1)
+        middles = self._middles_of(nodes)
         lengths = np.linalg.norm(np.diff(middles, axis=0), axis=1)
         mean = np.maximum(np.minimum(areas[1:], areas[:-1]), _LEAST_AREA)
         found = 8.0 * pi * self._liquid.viscosity * lengths / (mean * mean)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from schemas.vectors import Vector
 
-__all__ = ["Parting", "find_partings"]
+__all__ = ["Parting", "find_partings", "without_crumbs"]
 
 _NEXT = 2
 """Rings beyond a parting within which the next part begins: crumbs may lie between."""
@@ -44,6 +44,15 @@ def find_partings(pieces: NDArray[np.int64], along: Vector) -> list[Parting]:
         beyond = pieces[ring + 1 : int(ends.max()) + 1 + _NEXT]
         part = _largest(beyond[~np.isin(beyond, seen)])
     return found
+
+
+def without_crumbs(pieces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return the nodes of the rings in pieces as large as a ring: crumbs of a cut fall far away.
+
+    pieces: as for `find_partings`.
+    """
+    counts = np.bincount(pieces[pieces >= 0], minlength=1)
+    return (pieces >= 0) & (counts[pieces] >= pieces.shape[1])
 
 
 def _largest(pieces: NDArray[np.int64]) -> int:

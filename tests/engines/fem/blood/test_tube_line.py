@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from engines.fem.blood.partings import find_partings
+from engines.fem.blood.partings import find_partings, without_crumbs
 from schemas.codec import decode, encode
 from schemas.trocar_msgs import TubeLine
 from tests.engines.fem.blood.test_lumen import TubeRig, foreign_tube
@@ -74,3 +74,31 @@ def test_a_slit_along_the_tube_and_a_slanting_gap_with_crumbs():
     assert parting.along == pytest.approx(4.5e-3)
     assert parting.ring == 4
     assert find_partings(np.full((10, 6), -1), along) == []
+
+
+def test_crumbs_of_a_cut_are_no_part_of_a_ring():
+    pieces = np.zeros((10, 6), np.int64)
+    pieces[5:] = 2
+    pieces[4, :2] = 7  # a crumb
+    pieces[5, 3] = -1  # burnt
+    kept = without_crumbs(pieces)
+    assert not kept[4, :2].any()
+    assert not kept[5, 3]
+    assert kept.sum() == 60 - 3
+
+
+def test_a_crumb_that_flies_off_does_not_move_the_line():
+    with TubeRig() as rig:
+        solid, ring = rig.organ.solid, 5
+        node = rig.lumen._rings[ring, 0]
+        touching = (solid.origin[solid.tetrahedra] == node).any(axis=1)
+        crumbs = (solid._across >= 0) & touching[:, None]
+        solid.compiled.open(np.flatnonzero(crumbs.ravel()).astype(np.int32))
+        rig.organ._note_change()
+        rig.hold(0.016)
+        before, areas = rig.lumen.middles, rig.lumen.open_areas
+        rig.organ.nodes = rig.organ.nodes.copy()
+        rig.organ.nodes[node] += 50e-3
+        assert np.array_equal(rig.lumen.middles, before)
+        assert np.array_equal(rig.lumen.open_areas, areas)
+        assert np.abs(before[ring, 1:]).max() < 1.5e-3
