@@ -49,7 +49,7 @@ _JOINT: dict[str, Any] = {"strength": 1e6, "toughness": 1000.0}
 """As a duct or vessel itself; assumed."""
 
 
-_FILLS, _STONE_LENGTH = 0.95, 1.2
+_FILLS, _STONE_LENGTH = 0.85, 1.2
 """Diagonal of a stone over the width of the lumen at its lower end, and length over width; assumed."""
 _STONE_MODULUS = 150e3
 """Pa; assumed: three times that of the wall keeps jaws apart, and steps of 2 ms stay stable."""

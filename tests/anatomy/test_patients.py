@@ -153,6 +153,7 @@ def check_fat(given):
 @given(SEEDS)
 @example(284)  # a wall of 5.5 mm and a narrow infundibulum
 @example(4)
+@example(235)  # the lumen turns beside the stone
 def test_a_stone_sticks_in_the_lumen_of_the_neck(seed):
     given = tissue(patient=seed, stone=True)
     wall, stone = (Organ(name, given.organs[name], is_carried=True) for name in ("gallbladder", "stone"))
