@@ -63,6 +63,8 @@ class NextJob(Dividing):
     def open_side(self, tube: int) -> tuple[float, float] | None:
         """Return the stump (m) of a parted tube that leaks or has too few clips; None: both are closed."""
         line, clips, leak = self.seen.tube(tube), self.closed(tube), float(self.state.leaks[tube])
+        if not line.partings.size:  # an end of the tube has come off, and nothing shows where it was parted
+            return None
         first, last = float(line.partings[0]), float(line.partings[-1])
         if (clips > last).sum() < STAYS or leak > last:
             return last + CUFF, line.length - LAST
