@@ -36,6 +36,8 @@ _MOST = 4
 _LOOK_S = 0.1
 _PATIENCE_S = 5.0
 _MOST_SAID = 4000
+_PROMISED: set[Path] = set()
+"""Directories of sessions that this server has started."""
 _PAGE_DEVICE = "{kind: browser, host: remote}"
 _LINK = re.compile(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+")
 
@@ -221,9 +223,15 @@ def page_devices(scenario: Scenario, names: Sequence[str]) -> list[str]:
 
 
 def new_recording_path(parent: Path, stem: str) -> Path:
-    """Return a new directory for a recording: the stem, or the stem and a number."""
+    """Return a new directory for a recording: the stem, or the stem and a number.
+
+    No directory is returned twice: a session makes its own only when it begins.
+    """
     names = (stem, *(f"{stem}-{number}" for number in range(2, 1000)))
-    return next(place for name in names if not (place := parent / name).exists())
+    places = (parent / name for name in names)
+    place = next(place for place in places if place not in _PROMISED and not place.exists())
+    _PROMISED.add(place)
+    return place
 
 
 def _wait(process: subprocess.Popen[bytes]) -> None:
