@@ -61,7 +61,7 @@ class NextJob(Dividing):
         return tube, 1 if place > middle else CLIPS - 1, place
 
     def open_side(self, tube: int) -> tuple[float, float] | None:
-        """Return the stump (m) of a parted tube that leaks or has too few clips; None: both are closed."""
+        """Return the stump (m) of a parted tube that leaks or has too few clips; None: no such stump."""
         line, clips, leak = self.seen.tube(tube), self.closed(tube), float(self.state.leaks[tube])
         if not line.partings.size:  # an end of the tube has come off, and nothing shows where it was parted
             return None

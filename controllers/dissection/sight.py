@@ -10,6 +10,7 @@ from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.sight import nodes_of
 from controllers.dissection.params import DissectionParams
 from hub.participant import Inputs
+from schemas.plain_sum import plain_sum
 from schemas.trocar_msgs import SoftBodyState, TiedPlaces
 from schemas.vectors import Vector
 
@@ -47,7 +48,7 @@ class Sight:
     @property
     def fat_area(self) -> float:
         """Area where fat is still tied, m^2."""
-        return float(sum(message.areas_m2.sum() for message in self._fat_ties))
+        return plain_sum(float(message.areas_m2.sum()) for message in self._fat_ties)
 
     @property
     def _fat_ties(self) -> list[TiedPlaces]:

@@ -16,8 +16,6 @@ from schemas.scenario import Name
 
 __all__ = ["OperationParams"]
 
-_NEEDED = "a cautery hook", "a clip applier"
-
 
 class OperationParams(RoutineParams):
     """Arms and their instruments, and the organs that they keep away from."""
@@ -43,7 +41,7 @@ class OperationParams(RoutineParams):
         arm = self.arms.present_arms.get(self.hook)
         found = list(arm.variants[:2]) if isinstance(arm, PsmParams) else []
         if [isinstance(one.end_effector, Electrode) for one in found] != [True, False]:
-            raise ValueError(f"{self.hook} needs {_NEEDED[0]}, and in `spares`, first, {_NEEDED[1]}")
+            raise ValueError(f"{self.hook} needs a cautery hook, and in `spares`, first, a clip applier")
         return found
 
     @property
@@ -67,7 +65,7 @@ class OperationParams(RoutineParams):
     @property
     def bed(self) -> DissectionParams:
         """The rest of the plate."""
-        return DissectionParams(**self._common(0), hook=self.hook, fat=(), avoid=(self.avoid[0],))
+        return DissectionParams(**self._common(0), hook=self.hook, fat=(), avoid=self.avoid[:1])
 
     def _common(self, variant: int) -> dict[str, Any]:
         arms = self.arms.model_copy(update={self.hook: self.variants[variant]})

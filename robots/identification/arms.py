@@ -14,6 +14,7 @@ from robots.dvrk.instruments import Instrument
 from robots.dvrk.linkage import Linkage
 from robots.dvrk.own_dynamics import JAW
 from robots.serial_chain import Joint, SerialChain
+from schemas.plain_sum import plain_sum
 
 __all__ = ["IdentifiedArm", "of_ecm", "of_psm"]
 
@@ -81,7 +82,9 @@ def of_psm(tool: Instrument, *, jaw: bool = False) -> IdentifiedArm:
 
 def _with_jaw(pair: Disc) -> Disc:
     """Return a rubbing pair with a share of the jaw: each finger turns by half the angle."""
-    return replace(pair, shares={**pair.shares, JAW: sum(pair.shares.get(one, 0.0) for one in FINGERS) / 2.0})
+    return replace(
+        pair, shares={**pair.shares, JAW: plain_sum(pair.shares.get(one, 0.0) for one in FINGERS) / 2.0}
+    )
 
 
 def of_ecm() -> IdentifiedArm:
