@@ -15,7 +15,7 @@ from controllers.cholecystectomy.surgeon_hand import SurgeonHand
 from controllers.expert.ports import EVENTS
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import PsmParams
-from hub.participant import Controller, Inputs, Outputs, Params, Setup, state_hash
+from hub.participant import Controller, Inputs, Outputs, Params, Setup, join_saved, split_saved, state_hash
 from robots.dvrk.parameters import ArmName
 from schemas.errors import SessionError
 from schemas.ports import Port
@@ -108,14 +108,13 @@ class ClipAndCut(Controller):
 
     def save(self) -> bytes:
         """Return the bytes of the whole state."""
-        state = super().save()
-        return len(state).to_bytes(8, "little") + state + self._surfaces.save()
+        return join_saved(super().save(), self._surfaces.save())
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if the state does not fit."""
-        end = 8 + int.from_bytes(state[:8], "little")
-        self._surfaces.restore(state[end:])
-        super().restore(state[8:end])
+        own, surfaces = split_saved(self.name, 2, state)
+        self._surfaces.restore(surfaces)
+        super().restore(own)
 
     def sense(self, inputs: Inputs) -> None:
         """Read the measurements of the hands."""

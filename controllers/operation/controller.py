@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from enum import IntEnum
 from typing import Any, ClassVar
 
@@ -24,11 +23,12 @@ from hub.participant import (
     choice,
     flag,
     integer,
+    join_saved,
     number,
+    split_saved,
     state_hash,
 )
 from robots.dvrk.tool_type import tool_type
-from schemas.errors import StateError
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import StringMessage
@@ -219,23 +219,11 @@ class Operation(Controller):
 
     def save(self) -> bytes:
         """Return the bytes of the whole state."""
-        saved = [super().save(), *(part.save() for part in self._parts)]
-        return b"".join(len(one).to_bytes(8, "little") + one for one in saved)
+        return join_saved(super().save(), *(part.save() for part in self._parts))
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if the state does not fit."""
-        parts = list(_split(state))
-        if len(parts) != 1 + len(self._parts):
-            raise StateError(
-                f"participant '{self.name}': a saved state of {len(parts)} parts; was it saved elsewhere?"
-            )
-        super().restore(parts[0])
-        for part, own in zip(self._parts, parts[1:], strict=True):
-            part.restore(own)
-
-
-def _split(state: bytes) -> Iterator[bytes]:
-    while state:
-        size = 8 + int.from_bytes(state[:8], "little")
-        yield state[8:size]
-        state = state[size:]
+        own, *others = split_saved(self.name, 1 + len(self._parts), state)
+        super().restore(own)
+        for part, saved in zip(self._parts, others, strict=True):
+            part.restore(saved)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import accumulate
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,7 +28,18 @@ from engines.tissue.probes.near_faces import BAND_M, CONTACT_PERIOD_NS
 from engines.tissue.probes.place import Surface
 from engines.tissue.probes.sub_grid import warn_beyond
 from engines.tissue.warn_once import warn_once
-from hub.participant import BondPlan, Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
+from hub.participant import (
+    BondPlan,
+    Inputs,
+    Outputs,
+    Params,
+    Setup,
+    Stepped,
+    Value,
+    join_saved,
+    split_saved,
+    state_hash,
+)
 from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port
 
@@ -200,9 +210,7 @@ class FemEngine(Stepped):
 
     def save(self) -> bytes:
         """Return the bytes of all arrays, organs first."""
-        parts = [part.tobytes() for part in self._parts()]
-        sizes = np.array([len(parts), *map(len, parts)])
-        return b"".join([sizes.tobytes(), *parts])
+        return join_saved(*(part.tobytes() for part in self._parts()))
 
     def restore(self, state: bytes) -> None:
         """Go back to a saved state, bit for bit.
@@ -210,7 +218,7 @@ class FemEngine(Stepped):
         Raises StateError for the state of other organs or probes.
         """
         try:
-            self._restore_parts(iter(_split(state, sum(1 for _ in self._parts()))))
+            self._restore_parts(iter(split_saved(self.name, sum(1 for _ in self._parts()), state)))
         except ValueError as error:
             raise StateError(
                 f"participant '{self.name}': a saved state of {len(state)} bytes does not fit: {error}; was"
@@ -390,13 +398,3 @@ class FemEngine(Stepped):
                 f"participant '{self.name}': node_period {self.params.node_period} ns is no multiple of the"
                 f" period {period_ns} ns"
             )
-
-
-def _split(state: bytes, count: int) -> list[bytes]:
-    """Return the parts of a saved state. Raises ValueError for another number of parts or bytes."""
-    head = np.frombuffer(state[: 8 * (count + 1)], np.int64)
-    sizes: list[int] = head[1:].tolist()
-    if len(head) != count + 1 or head[0] != count or min(sizes) < 0 or len(state) != head.nbytes + sum(sizes):
-        raise ValueError(f"expected {count} parts")
-    ends = [end + head.nbytes for end in accumulate(sizes)]
-    return [state[end - size : end] for size, end in zip(sizes, ends, strict=True)]
