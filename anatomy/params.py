@@ -41,8 +41,9 @@ class AnatomyParams(BaseModel):
     thick_wall: bool | None = Field(
         default=None, description="an inflamed gallbladder; default: as the seed draws it"
     )
-    stone: bool = Field(
-        default=False, description="a stone fills the neck of the gallbladder; drawn by no seed"
+    stone: bool | None = Field(
+        default=None,
+        description="a stone fills the neck of the gallbladder; default: as the seed draws it",
     )
 
     @property

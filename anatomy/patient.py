@@ -67,6 +67,8 @@ _COURSES: tuple[tuple[ArteryCourse, float], ...] = (("front", 0.15), ("behind", 
 few patients show all."""
 _SHORT, _THICK = 0.2, 0.25
 """Shares of patients with a short duct and with an inflamed wall: drawn more often than they are."""
+_STONE = 0.119
+"""Share of patients with a stone in the neck: 612 of 5136 (Khan et al., JSLS 24(3), 2020)."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,7 @@ class Variations:
     artery: ArteryCourse | None = None
     short_duct: bool | None = None
     thick_wall: bool | None = None
-    stone: bool = False
-    """No seed draws a stone: patients keep their numbers."""
+    stone: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,7 @@ def draw_patient(seed: int, variations: Variations) -> Patient:
     is_short = short if variations.short_duct is None else variations.short_duct
     is_thick = thick if variations.thick_wall is None else variations.thick_wall
     sizes = [Random(random.random()) for _ in range(12)]
+    stone = random.random() < _STONE
     wall = (THICK_WALL if is_thick else GALLBLADDER_WALL).draw(sizes[2])
     return Patient(
         gallbladder_length=GALLBLADDER_LENGTH.draw(sizes[0]),
@@ -129,7 +131,7 @@ def draw_patient(seed: int, variations: Variations) -> Patient:
         artery=artery,
         short_duct=is_short,
         thick_wall=is_thick,
-        stone=variations.stone,
+        stone=stone if variations.stone is None else variations.stone,
     )
 
 

@@ -38,6 +38,7 @@ def run_patient(patient: int, **settings: str) -> dict[str, Any]:
         f"artery {drawn.artery}",
         *(["short duct"] * drawn.short_duct),
         *(["thick wall"] * drawn.thick_wall),
+        *(["stone"] * drawn.stone),
     ]
     with tempfile.TemporaryDirectory() as folder:
         summary = trocar.run(

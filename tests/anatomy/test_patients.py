@@ -87,7 +87,8 @@ def test_a_stated_variation_changes_nothing_that_it_does_not_concern(seed, cours
 def test_twenty_patients_show_every_variation():
     patients = [draw_patient(seed, Variations()) for seed in range(20)]
     assert {one.artery for one in patients} == set(COURSES)
-    assert {one.short_duct for one in patients} == {one.thick_wall for one in patients} == {True, False}
+    for variation in ("short_duct", "thick_wall", "stone"):
+        assert {getattr(one, variation) for one in patients} == {True, False}
 
 
 @given(SEEDS)
@@ -175,9 +176,11 @@ def test_a_stone_sticks_in_the_lumen_of_the_neck(seed):
 
 
 def test_without_a_stone_patients_are_as_they_were():
-    plain = AnatomyParams(patient=7)
-    assert "stone" not in plain.organs
-    assert "stone_wall" not in plain.attachments
+    drawn, plain = AnatomyParams(patient=11), AnatomyParams(patient=11, stone=False)
+    assert drawn.drawn.stone
+    assert drawn.organs.keys() - plain.organs.keys() == {"stone"}
+    assert drawn.attachments.keys() - plain.attachments.keys() == {"stone_wall"}
+    assert replace(drawn.drawn, stone=False) == plain.drawn
 
 
 @pytest.mark.long
