@@ -4,20 +4,34 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["PLACE", "ROOT", "Keys", "topic", "valid_name"]
+__all__ = ["PLACE", "ROOT", "Keys", "same_session_name", "topic", "valid_name", "valid_session_name"]
 
 ROOT = "trocar"
 PLACE = "place"
 """Port of a gateway that says, once a second, where programs reach it."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_SESSION_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
 def valid_name(name: str) -> bool:
-    """Return whether `name` is a valid name of a session, a participant or a part of a port.
+    """Return whether `name` is a valid name of a participant or a part of a port, and so of a ROS topic.
 
     A name begins with a letter; letters, digits and underscores follow.
     """
     return _NAME.fullmatch(name) is not None
+
+
+def valid_session_name(name: str) -> bool:
+    """Return whether `name` is a valid name of a session: as `valid_name`, and with hyphens."""
+    return _SESSION_NAME.fullmatch(name) is not None
+
+
+def same_session_name(name: str, other: str) -> bool:
+    """Return whether two names of sessions differ in hyphens and underscores at most.
+
+    Recordings of version 0.2 name a scenario `colon_grasp` whose file is `colon-grasp.yaml`.
+    """
+    return name.replace("-", "_") == other.replace("-", "_")
 
 
 def topic(key: str) -> str:

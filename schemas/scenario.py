@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from schemas.keys import valid_name
+from schemas.keys import valid_name, valid_session_name
 from schemas.network_link import NetworkLinkSpec
 from schemas.quantity import Duration
 
@@ -33,15 +33,26 @@ MAX_NAME = 64
 """Characters: names become parts of keys, of ROS topics and of the names of files."""
 
 
-def _name(value: str) -> str:
+def _of_allowed_length(value: str) -> str:
     if len(value) > MAX_NAME:
         raise ValueError(f"a name of {len(value)} characters; at most {MAX_NAME} are allowed")
-    if not valid_name(value):
+    return value
+
+
+def _name(value: str) -> str:
+    if not valid_name(_of_allowed_length(value)):
         raise ValueError(f"'{value}' is no name: a letter, then letters, digits and underscores")
     return value
 
 
+def _session_name(value: str) -> str:
+    if not valid_session_name(_of_allowed_length(value)):
+        raise ValueError(f"'{value}' is no name: a letter, then letters, digits, hyphens and underscores")
+    return value
+
+
 Name = Annotated[str, AfterValidator(_name)]
+SessionName = Annotated[str, AfterValidator(_session_name)]
 
 
 class _Part(BaseModel):
@@ -234,7 +245,7 @@ def _without_none(value: Any) -> Any:
 class Scenario(_Part):
     """A whole session."""
 
-    name: Name
+    name: SessionName
     description: str = ""
     step: Duration = Field(gt=0, description="communication step H")
     duration: Duration | None = Field(

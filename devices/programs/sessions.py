@@ -20,6 +20,7 @@ from hub.transport.hub_files import HubFile, running_hubs
 from hub.transport.session_secret import secret_of
 from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError
+from schemas.keys import same_session_name
 
 __all__ = ["connect"]
 
@@ -77,8 +78,7 @@ def _find_hub(name: str, timeout_s: float) -> HubFile:
     deadline = monotonic() + timeout_s
     while True:
         hubs = running_hubs()
-        # a session has the name of its scenario, with underscores
-        named = [hub for hub in hubs if name.replace("-", "_") in ("", hub.session)]
+        named = [hub for hub in hubs if not name or same_session_name(name, hub.session)]
         if len(found := [hub for hub in named if hub.programs]) == 1:
             return found[0]
         if found:

@@ -17,7 +17,7 @@ from hub.planning.scenario_file import ScenarioFile, installed_scenarios, load, 
 from hub.planning.scenario_source import Source, read
 from hub.recording.file_hashes import file_hashes
 from schemas.errors import ScenarioError
-from schemas.keys import valid_name
+from schemas.keys import valid_session_name
 
 __all__ = ["list_scenarios", "new", "print_scenarios"]
 
@@ -85,7 +85,7 @@ def new(
 ) -> None:
     """Copy a scenario with its data to a directory of your own, to edit."""
     directory = Path(name)
-    if not valid_name(_session_name(directory.name)):
+    if not valid_session_name(directory.name):
         raise typer.BadParameter(f"'{name}' is no name: a letter, then letters, digits, hyphens, underscores")
     if directory.exists():
         raise typer.BadParameter(f"'{directory}' exists already; choose another name")
@@ -101,18 +101,13 @@ def new(
     )
 
 
-def _session_name(name: str) -> str:
-    """Return the name of a session, part of keys and ROS topics, for the name of a file."""
-    return name.replace("-", "_")
-
-
 def _copy(file: ScenarioFile, directory: Path) -> Path:
     """Copy a scenario, the files beside it that it reads, and the schema; return the new scenario file.
 
     Raises ScenarioError if the scenario has no name in a line of its own.
     """
     source = file.source
-    text, found = re.subn(r"(?m)^name:.*$", f"name: {_session_name(directory.name)}", source.text, count=1)
+    text, found = re.subn(r"(?m)^name:.*$", f"name: {directory.name}", source.text, count=1)
     if not found:
         raise ScenarioError(f"{source.file} has no line 'name: ...'; copy the file yourself")
     home = source.directory

@@ -12,7 +12,7 @@ import zenoh
 from hub.recording.recording import ENERGY_PREFIX, STATUS_TOPIC, Recording
 from hub.transport.envelope import Tag
 from schemas.errors import RecordingError
-from schemas.keys import ROOT, valid_name
+from schemas.keys import ROOT, valid_session_name
 
 __all__ = ["ReplaySummary", "is_replayed", "replay"]
 
@@ -60,9 +60,9 @@ def replay(
     a session name.
     """
     name = recording.session() if name is None else name
-    if not valid_name(name):
+    if not valid_session_name(name):
         raise RecordingError(
-            f"'{name}' is not a session name: a letter, then letters, digits and underscores"
+            f"'{name}' is not a session name: a letter, then letters, digits, hyphens and underscores"
         )
     topics = [topic for topic in recording.topics if is_replayed(topic)]
     if not topics:

@@ -149,7 +149,7 @@ def _tasks(given: Sequence[str]) -> dict[str, str]:
     tasks: dict[str, str] = {}
     for text in given:
         named = re.fullmatch(r"([A-Za-z][A-Za-z0-9_-]*)=(.*)", text, re.DOTALL)
-        scenario = named[1].replace("-", "_") if named else ""
+        scenario = named[1] if named else ""
         if scenario in tasks:
             whose = f"of '{scenario}'" if scenario else "without a scenario"
             raise typer.BadParameter(f"two tasks {whose}: expected one", param_hint="--task")

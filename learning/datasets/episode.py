@@ -16,6 +16,7 @@ from learning.datasets.columns import Columns, choose_columns, commanded_columns
 from learning.datasets.instructions import instructions
 from learning.datasets.tips import Tips
 from schemas.errors import RecordingError
+from schemas.keys import same_session_name
 from schemas.scenario import Scenario
 from trocar import Recording, recover
 
@@ -118,8 +119,8 @@ class Episode:
 
 
 def _task(scenario: Scenario, tasks: Mapping[str, str]) -> str:
-    given = tasks.get(scenario.name) or tasks.get("")
-    return given or " ".join(scenario.description.split()) or scenario.name
+    own = (task for name, task in tasks.items() if same_session_name(name, scenario.name))
+    return next(own, "") or tasks.get("") or " ".join(scenario.description.split()) or scenario.name
 
 
 def _names(columns: Sequence[Columns]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 
-from schemas.keys import Keys, topic, valid_name
+from schemas.keys import Keys, same_session_name, topic, valid_name, valid_session_name
 from tests.strategies import names
 
 
@@ -33,3 +33,15 @@ def test_valid_names(name: str) -> None:
 @pytest.mark.parametrize("name", ["", "1a", "_a", "a b", "a/b", "a.b", "a*", "**", "@a", "ä", "a\n"])
 def test_invalid_names(name: str) -> None:
     assert not valid_name(name)
+    assert not valid_session_name(name)
+
+
+def test_a_session_may_have_hyphens_and_nothing_else_may() -> None:
+    assert valid_session_name("colon-grasp")
+    assert not valid_session_name("-grasp")
+    assert not valid_name("colon-grasp")
+
+
+def test_a_session_of_an_older_recording_has_underscores() -> None:
+    assert same_session_name("colon-grasp", "colon_grasp")
+    assert not same_session_name("colon-grasp", "colon")

@@ -267,8 +267,8 @@ def endpoints():
 @pytest.mark.long
 def test_of_a_session_closed_to_programs_it_is_said_what_opens_it(alone, endpoints):
     with (
-        hub_file(endpoints[0], [], session="peg_board"),
-        pytest.raises(ConnectError, match=r"'peg_board' is not open to programs. .* --programs"),
+        hub_file(endpoints[0], [], session="peg-board"),
+        pytest.raises(ConnectError, match=r"'peg-board' is not open to programs. .* --programs"),
     ):
         trocar.connect("peg-board")
 

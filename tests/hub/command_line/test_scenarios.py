@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from hub.planning.scenario_file import installed_scenarios, load, scenario_families
+from hub.planning.scenario_source import read
 from hub.recording.file_hashes import file_hashes
 from hub.recording.recording import Recording
 
@@ -41,6 +42,11 @@ def test_they_are_listed_a_line_each(trocar):
     assert trocar("run")[1] == out, "also where a name is missing"
 
 
+def test_a_session_is_named_as_its_file():
+    for name, file in installed_scenarios().items():
+        assert read(file).tree["name"] == name
+
+
 @pytest.mark.parametrize("name", ["palpation", "palpation-by-hand", "ros-mirror", "retraction", "tendon"])
 def test_a_copy_of_a_scenario_is_complete(trocar, here, name):
     code, out, _ = trocar("new", "my-own", "--from", name)
@@ -48,7 +54,7 @@ def test_a_copy_of_a_scenario_is_complete(trocar, here, name):
     assert "trocar run my-own/my-own.yaml" in out
     copy, original = load("my-own/my-own.yaml"), load(name)
     assert copy.scenario.model_copy(update={"name": original.scenario.name}) == original.scenario
-    assert copy.scenario.name == "my_own"
+    assert copy.scenario.name == "my-own"
     home = original.source.directory
     read = {Path(file).relative_to(home) for file in file_hashes(original.params.values(), home)}
     copied = {file.relative_to(here / "my-own") for file in (here / "my-own").rglob("*") if file.is_file()}
