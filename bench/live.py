@@ -46,6 +46,7 @@ from schemas.lockstep import Ack
 
 LEFT_OUT = {
     "browser": "a person drives it from a page",
+    "cholecystectomy-by-hand": "a person drives it from a page",
     "clip-and-cut-by-hand": "a person drives it from a page",
     "clip-and-cut-by-policy": "a policy's server drives it",
     "keys": "a person drives it by the keyboard",

@@ -197,6 +197,8 @@ class Hand(_Command):
     """1 opens, -1 closes."""
     dead_man: bool = False
     jaw: bool = False
+    pedal: bool = False
+    rinse: bool = False
     away: bool = False
     """Whether the page is no longer in front: its last input."""
     device: Name | None = None

@@ -10,9 +10,11 @@ from schemas.ros import BoolMessage, StringMessage
 from schemas.scenario import Scenario
 from webconsole.source import Value
 
-__all__ = ["Follower", "find_followers"]
+__all__ = ["Follower", "find_followers", "find_pedals"]
 
 _KIND = "browser"
+_PEDALS = {"energy": "pedal", "suction": "pedal", "irrigation": "rinse"}
+"""Buttons of a hand by the outputs of its follower."""
 
 
 class Follower(NamedTuple):
@@ -57,3 +59,20 @@ def find_followers(scenario: Scenario, outlets: Collection[str]) -> dict[str, li
         if device in found and follower not in found[device] and {*follower.outlets} <= {*outlets}:
             found[device].append(follower)
     return found
+
+
+def find_pedals(
+    followers: Mapping[str, Collection[Follower]], outlets: Collection[str]
+) -> dict[str, list[str]]:
+    """Return the buttons, `pedal` or `rinse`, that do something at the instruments led by each device."""
+    return {
+        device: sorted(
+            {
+                button
+                for output, button in _PEDALS.items()
+                for one in found
+                if f"{one.participant}.{output}" in outlets
+            }
+        )
+        for device, found in followers.items()
+    }

@@ -98,7 +98,8 @@ def _give_hand(device: str, hand: Hand | None) -> None:
     if hand is None:
         hand_of(device).release()
         return
-    wish = Wish(hand.linear, hand.angular, hand.gripper, hand.dead_man, hand.jaw, hand.turn)
+    pressed = {name: getattr(hand, name) for name in ("dead_man", "jaw", "pedal", "rinse")}
+    wish = Wish(hand.linear, hand.angular, hand.gripper, turn=hand.turn, **pressed)
     hand_of(device).give(PageInput(wish, hand.drag, _tracked_pose(hand), hand.away))
 
 

@@ -28,7 +28,7 @@ from webconsole.bond_history import BondHistory
 from webconsole.drag import DraggedTip, dragged_tips
 from webconsole.exchanges import OfferedInstruments, offered_instruments
 from webconsole.felt import felt_wrenches
-from webconsole.followers import find_followers
+from webconsole.followers import find_followers, find_pedals
 from webconsole.frame import Section, SectionKind, change_content, film_content, node_content
 from webconsole.gauges import GAUGES
 from webconsole.markers import marker_content
@@ -104,6 +104,8 @@ class Stage:
         """Controllers that follow a device led from pages, by device."""
         of_followers = (name for found in self.followers.values() for one in found for name in one.outlets)
         self.dragged, self.undragged = _dragged_tips(scenario, params)
+        self.pedals = find_pedals(self.followers, self._outlets)
+        """Buttons of each device that do something beside moving arm and jaw."""
         self.instruments = _offered_instruments(scenario, params)
         self.room = _room_view(scenario, params)
         of_hands = (name for names in self.felt.values() for name in names)
@@ -244,6 +246,7 @@ class Stage:
             "dragged": [tip._asdict() for tip in self.dragged],
             "undragged": self.undragged,
             "instruments": [one._asdict() for one in self.instruments],
+            "pedals": self.pedals,
             "room": self.room,
             "numbers": [
                 {

@@ -10,6 +10,7 @@ from controllers.teleoperation.contact_model import ContactModelBuilder
 from controllers.teleoperation.engagement import Engagement, EngagementPhase
 from controllers.teleoperation.led_instrument import LedInstrument
 from controllers.teleoperation.params import TeleoperationParams
+from controllers.teleoperation.pedals import Pedals
 from controllers.teleoperation.ports import has_clips, jaw_joints, teleoperation_ports
 from controllers.teleoperation.velocity_law import advance, twist_in_tip
 from controllers.teleoperation.view import View
@@ -80,6 +81,7 @@ class Teleoperation(Controller):
         self._take(0)
         self._view, self._engagement = View(params), Engagement(params)
         self._contact = ContactModelBuilder(params.force, params.planes)
+        self._pedals = Pedals(params)
         self._now = TeleoperationState(n=len(params.chain.joints), jaw=len(jaw_joints(params)))
         self._command, self._goal, self._tip = self._now.command, self._now.goal, self._now.tip
         self._hand, self._jaw = self._now.hand, self._now.jaw
@@ -89,16 +91,18 @@ class Teleoperation(Controller):
             *self._engagement.state,
             *(state for one in self._instruments for state in one.state),
             *(() if self._held is None else (self._held,)),
+            *self._pedals.state,
         )
         self._outputs: dict[str, Any] = {"servo_jp": self._command, "goal_cp": self._goal}
+        self._outputs |= self._pedals.outputs
         self._streams = {f"{params.arm}/servo_jp": self._command}
         if self._jaw.size:
             self._outputs["jaw/servo_jp"] = self._streams[f"{params.arm}/jaw/servo_jp"] = self._jaw
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Hand, buttons, arm and `scale` in; commands, `contact` and events out."""
-        return teleoperation_ports(self.params)
+        """Hand, buttons, arm and `scale` in; commands, `contact`, what pedals do, and events out."""
+        return *teleoperation_ports(self.params), *self._pedals.ports
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Start with the arm held at the position of the parameters."""
@@ -151,6 +155,7 @@ class Teleoperation(Controller):
             self._outputs["clip"] = (EmptyMessage(),) if fires else ()
         elif "clip" in self._outputs:
             self._outputs["clip"] = ()
+        self._pedals.step(0 if self._held is None else self._held.number, follows=follows)
         self._publish(phase, warnings + self._engagement.warnings)
         header = Header.model_construct(stamp=Time.from_ns(t + h), frame_id="")
         self._stream(header, follows=follows)
@@ -192,6 +197,7 @@ class Teleoperation(Controller):
             self._now.translation_locked, self._now.relocked = lock.data, True
         for joy in cast("tuple[Joy, ...]", inputs.events("buttons")):
             self._engagement.receive_buttons(joy)
+            self._pedals.receive(joy)
             if self._ghost is not None and joy.buttons.size > self.params.buttons.jaw:
                 self._ghost.press(pressed=joy.buttons[self.params.buttons.jaw] != 0)
 

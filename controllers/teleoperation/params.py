@@ -14,7 +14,7 @@ from hub.participant import Params
 from robots.dvrk import ecm, psm, si
 from robots.dvrk.mounted.psm_tool import DEFAULT_INSTRUMENT, PsmTool
 from robots.dvrk.parameters import ArmName, InstrumentName, MountedPositions, UnitQuaternion, home
-from schemas.quantity import Angle, Duration
+from schemas.quantity import Angle, Duration, Power
 
 __all__ = ["Buttons", "TeleoperationParams"]
 
@@ -58,6 +58,14 @@ class Buttons(Params):
     jaw: int = Field(
         default=1, ge=0, description="closes the jaw while it is pressed, unless a `gripper` is connected"
     )
+    pedal: int = Field(
+        default=2,
+        ge=0,
+        description=(
+            "while it is pressed and the arm follows, the generator gives `power`, or the sucker sucks"
+        ),
+    )
+    rinse: int = Field(default=3, ge=0, description="likewise, lets saline out of a suction irrigator")
 
 
 class _LedArm(Params):
@@ -144,6 +152,9 @@ class TeleoperationParams(PsmTool, _LedArm):
         ),
     )
     buttons: Buttons = Buttons()
+    power: Power = Field(
+        default=60.0, gt=0, le=400, description="of the generator at the tissue, while the pedal is pressed"
+    )
     align: Literal["relative", "gate"] = Field(
         default="relative",
         description=(

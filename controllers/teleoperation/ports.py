@@ -37,7 +37,10 @@ def teleoperation_ports(params: TeleoperationParams) -> tuple[Port, ...]:
 def _hand(p: TeleoperationParams) -> tuple[Port, ...]:
     clutch = "leads the arm while it is held" if p.engage == "held" else "clutch"
     still = NO_TWIST if p.law == "pose" else None
-    buttons = f"button {p.buttons.clutch}: {clutch}; button {p.buttons.jaw}: closes the jaw"
+    buttons = (
+        f"button {p.buttons.clutch}: {clutch}; button {p.buttons.jaw}: closes the jaw; button"
+        f" {p.buttons.pedal}: power or suction; button {p.buttons.rinse}: saline"
+    )
     gripper = "of the hand, 0 closed .. 1 open; negative: none, the button leads the jaw"
     scale = "metres of the tip per metre of the hand, above 0 and up to 1"
     twist = "of the hand, for `law: velocity`"

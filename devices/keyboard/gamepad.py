@@ -58,6 +58,8 @@ class Gamepad:
             gripper=max(0.0, self._axis_share(pygame.CONTROLLER_AXIS_TRIGGERLEFT)) - close,
             dead_man=bool(self._pad.get_button(pygame.CONTROLLER_BUTTON_LEFTSHOULDER)),
             jaw=close > 0.0,
+            pedal=bool(self._pad.get_button(pygame.CONTROLLER_BUTTON_RIGHTSHOULDER)),
+            rinse=bool(self._pad.get_button(pygame.CONTROLLER_BUTTON_A)),
         )
 
     def _axis_share(self, axis: int) -> float:

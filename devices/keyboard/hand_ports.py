@@ -31,7 +31,7 @@ def hand_ports(participant: str, stands_for: StandsFor, max_age_ns: int) -> Hand
     """Return the ports of a virtual hand, in the frame `<participant>_base` (x ahead, y left, z up)."""
     frame = f"{participant}_base"
     pose, axes = _FRAMES[stands_for], "of the same, along the axes of the base frame"
-    presses = "each press and release: 0 the dead-man, 1 the jaw"
+    presses = "each press and release: 0 the dead-man, 1 the jaw, 2 power or suction, 3 saline"
     return HandPorts(
         signal_out("pose", PoseStamped, pose, frame=frame, max_age_ns=max_age_ns, clock="wall"),
         signal_out("twist", TwistStamped, axes, frame=frame, max_age_ns=max_age_ns, clock="wall"),

@@ -24,6 +24,8 @@ KEYS: dict[str, tuple[str, Wish]] = {
     "space": ("button 0, the dead-man", Wish(dead_man=True)),
     "c": ("button 1, and close the gripper", Wish(gripper=-1.0, jaw=True)),
     "v": ("open the gripper", Wish(gripper=1.0)),
+    "x": ("button 2, power or suction", Wish(pedal=True)),
+    "z": ("button 3, saline", Wish(rinse=True)),
 }
 """Meaning in words and command of each key, by the key's name in pygame."""
 

@@ -54,7 +54,7 @@ class VirtualHand(Device):
     def _reset(self) -> None:
         """Start with the stylus at the origin of the base frame, nothing pressed."""
         self._stylus = VirtualStylus(self.params.speed, self.params.turn_speed, self.params.stands_for)
-        self._pressed = (False, False)
+        self._pressed = (False, False, False, False)
         self._timer, self._last_ns = SampleTimer(self.params.rate), 0
 
     @property
@@ -69,7 +69,7 @@ class VirtualHand(Device):
 
     def _press(self, t: int, wish: Wish) -> list[Sample]:
         """Return the sample of changed buttons."""
-        pressed = wish.dead_man, wish.jaw
+        pressed = wish.dead_man, wish.jaw, wish.pedal, wish.rinse
         if pressed == self._pressed:
             return []
         self._pressed = pressed

@@ -32,6 +32,10 @@ class Wish:
     """1 opens, -1 closes."""
     dead_man: bool = False
     jaw: bool = False
+    pedal: bool = False
+    """Power of a generator, or suction."""
+    rinse: bool = False
+    """Saline of a suction irrigator."""
     turn: Vector3 = (0.0, 0.0, 0.0)
     """Angular shares about the axes of the base frame: ahead, left, up."""
 
@@ -43,6 +47,8 @@ class Wish:
             self.gripper + other.gripper,
             self.dead_man or other.dead_man,
             self.jaw or other.jaw,
+            self.pedal or other.pedal,
+            self.rinse or other.rinse,
             _sum(self.turn, other.turn),
         )
 

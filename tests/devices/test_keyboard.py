@@ -147,13 +147,15 @@ def test_buttons_and_gripper(desk):
     assert "buttons" not in desk.read(5)
     desk.press("space", "c")
     desk.read(125)
-    assert [list(m.buttons) for port, m in desk.all if port == "buttons"] == [[1, 1]]
+    assert [list(m.buttons) for port, m in desk.all if port == "buttons"] == [[1, 1, 0, 0]]
     assert desk.all[-1][1].data == pytest.approx(0.5)
     desk.press("c", up=True)
     got = desk.read(3)
-    assert (list(got["buttons"].buttons), got["gripper"].data) == ([1, 0], pytest.approx(0.5))
+    assert (list(got["buttons"].buttons), got["gripper"].data) == ([1, 0, 0, 0], pytest.approx(0.5))
     desk.press("v")
     assert desk.read(300)["gripper"].data == 1.0
+    desk.press("x", "z")
+    assert list(desk.read(3)["buttons"].buttons) == [1, 0, 1, 1]
 
 
 def test_out_of_focus_the_buttons_are_let_go_and_nothing_more_comes(desk):
@@ -162,7 +164,7 @@ def test_out_of_focus_the_buttons_are_let_go_and_nothing_more_comes(desk):
     desk.focus(False)
     desk.read(50)
     assert [port for port, _ in desk.all] == ["buttons", "diagnostics"]
-    assert list(desk.all[0][1].buttons) == [0, 0]
+    assert list(desk.all[0][1].buttons) == [0, 0, 0, 0]
     assert "click into it" in desk.all[1][1].message
     desk.focus(True)
     got = desk.read(5)
@@ -260,13 +262,18 @@ def test_a_gamepad_moves_the_stylus_too(pad):
         pygame.CONTROLLER_AXIS_LEFTX: 5000,
         pygame.CONTROLLER_AXIS_TRIGGERRIGHT: 32767,
     }
-    pad.buttons = {pygame.CONTROLLER_BUTTON_LEFTSHOULDER, pygame.CONTROLLER_BUTTON_DPAD_RIGHT}
+    pad.buttons = {
+        pygame.CONTROLLER_BUTTON_LEFTSHOULDER,
+        pygame.CONTROLLER_BUTTON_DPAD_RIGHT,
+        pygame.CONTROLLER_BUTTON_RIGHTSHOULDER,
+        pygame.CONTROLLER_BUTTON_A,
+    }
     got = desk.read(25)
     v, w = got["twist"].twist.linear, got["twist"].twist.angular
     # the other axis is inside its dead zone
     assert np.allclose([v.x, v.y, v.z, w.x, w.y, w.z], [0.1, 0, 0, 1, 0, 0], atol=1e-9)
     assert got["gripper"].data == pytest.approx(0.9)
-    assert list(dict(desk.all)["buttons"].buttons) == [1, 1]
+    assert list(dict(desk.all)["buttons"].buttons) == [1, 1, 1, 1]
     pad.there = False
     assert desk.read()["twist"].twist.linear.x == 0.0
     desk.device.close()

@@ -14,7 +14,10 @@ LONGER = {"suturing": "12 s", "peg-board-by-hand": "3 s"}
 """Until the needle is in the tissue; until a hand leads."""
 
 
-WITHOUT_PICTURES = {"clip-and-cut-by-hand": {"participants.endoscope.images": "none"}}
+WITHOUT_PICTURES = {
+    name: {"participants.endoscope.images": "none"}
+    for name in ("clip-and-cut-by-hand", "cholecystectomy-by-hand")
+}
 """Scenes whose pictures take most of the time, and say nothing to the task."""
 SERVED = {"clip-and-cut-by-policy"}
 """Scenarios that need the server of a policy: task and scene are those of clip-and-cut."""

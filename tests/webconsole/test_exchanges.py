@@ -29,3 +29,6 @@ def test_a_page_is_offered_what_the_arm_may_hold():
             "instruments": ["MEDIUM-LARGE_CLIP_APPLIER:420327[..]", SCISSORS],
         }
     ]
+    (right,) = offered("cholecystectomy-by-hand")
+    assert right["instruments"][0] == "PERMANENT_CAUTERY_HOOK:400183[..]"
+    assert len(right["instruments"]) == 4

@@ -7,7 +7,7 @@ import pytest
 from hub.planning.scenario_file import load
 from schemas.codec import encode
 from schemas.ros import BoolMessage, StringMessage
-from webconsole.followers import Follower, find_followers
+from webconsole.followers import Follower, find_followers, find_pedals
 from webconsole.source import Value
 
 LED_ARM = Path(__file__).parent / "led_arm.yaml"
@@ -19,6 +19,15 @@ def test_it_is_the_controller_that_the_hand_is_connected_to():
     assert find_followers(scenario, TELEOP.outlets) == {"hand": [TELEOP]}
     assert find_followers(scenario, ["teleop.following"]) == {"hand": []}
     assert find_followers(load("palpation", []).scenario, TELEOP.outlets) == {}
+
+
+def test_pedals_are_those_that_do_something_at_the_led_instruments():
+    followers = {"left": [TELEOP, Follower("other")], "right": [Follower("other")]}
+    assert find_pedals(followers, ["teleop.energy", "teleop.irrigation", "other.suction", "energy"]) == {
+        "left": ["pedal", "rinse"],
+        "right": ["pedal"],
+    }
+    assert find_pedals(followers, TELEOP.outlets) == {"left": [], "right": []}
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,7 @@ const link = new Link({
     showCard($("card"), state.card)
     headset.show(state.pilots, session?.role)
     pilot.instruments = session?.instruments ?? []
+    pilot.pedals = session?.pedals ?? {}
     pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one),
       session?.role, state.state)
     pilot.gizmo?.show(session?.dragged?.find(({ device }) => device === pilot.device) ?? null)

@@ -12,7 +12,9 @@ const KEYS = {
   q: ["roll left", { angular: [0, 0, -1] }], e: ["roll right", { angular: [0, 0, 1] }],
   " ": ["hold to move", { dead_man: true }], shift: ["slowly", {}],
   c: ["close", { gripper: -1, jaw: true }], v: ["open", { gripper: 1 }],
+  x: ["power, suction", { pedal: true }], z: ["saline", { rinse: true }],
 }
+const PEDALS = { x: "pedal", z: "rinse" } // shown where the instruments of the led arm have them
 const CAPS = { " ": "space", arrowup: "↑", arrowdown: "↓", arrowleft: "←", arrowright: "→" }
 // Why a device holds (devices/browser/page_hand.py), and what to do.
 const WHY = {
@@ -37,6 +39,7 @@ export class Pilot {
     this.dragging = false
     this.text = ""
     this.instruments = [] // of each arm that may get others from this page: device, arm, instruments
+    this.pedals = {} // of each device: buttons that do something at the instrument, "pedal" or "rinse"
     this.led = {} // of each device that this page leads: how it follows, and what keeps an arm from following it
     addEventListener("keydown", (event) => this.key(event, true))
     addEventListener("keyup", (event) => this.key(event, false))
@@ -117,6 +120,7 @@ export class Pilot {
     state.append(dead)
     const keys = element("div", "keys")
     for (const [key, [text]] of Object.entries(KEYS)) {
+      if (key in PEDALS && !this.pedals[this.device]?.includes(PEDALS[key])) continue
       const one = element("span"), cap = element("kbd")
       cap.dataset.key = key
       cap.textContent = CAPS[key] ?? key
@@ -188,12 +192,11 @@ export class Pilot {
   }
 
   wish() {
-    const wish = { linear: [0, 0, 0], angular: [0, 0, 0], turn: [0, 0, 0], gripper: 0, dead_man: this.dragging, jaw: false }
+    const wish = { linear: [0, 0, 0], angular: [0, 0, 0], turn: [0, 0, 0], gripper: 0, dead_man: this.dragging, jaw: false, pedal: false, rinse: false }
     const add = (one, speed = 1) => {
       for (const name of ["linear", "angular", "turn"]) one[name]?.forEach((share, i) => { wish[name][i] += speed * share })
       wish.gripper += speed * (one.gripper ?? 0)
-      wish.dead_man ||= one.dead_man ?? false
-      wish.jaw ||= one.jaw ?? false
+      for (const name of ["dead_man", "jaw", "pedal", "rinse"]) wish[name] ||= one[name] ?? false
     }
     for (const key of this.held) add(KEYS[key][1], this.held.has("shift") ? SLOWLY : 1)
     const pad = this.pad()
@@ -252,6 +255,7 @@ function gamepad({ axes, buttons }) {
     linear: [-axis(1), -axis(0), button(12) - button(13)],
     angular: [-axis(3), axis(2), button(15) - button(14)],
     gripper: button(6) - button(7), dead_man: button(4) > 0.5, jaw: button(7) > 0,
+    pedal: button(5) > 0.5, rinse: button(0) > 0.5,
   }
 }
 
