@@ -1,10 +1,10 @@
-"""Numbers as people read them: four digits, a unit with a fitting prefix."""
+"""Numbers as people read them: four digits, a unit with a fitting prefix; counted things."""
 
 from __future__ import annotations
 
 from math import isfinite
 
-__all__ = ["label", "readable"]
+__all__ = ["counted", "label", "readable"]
 
 _SMALLER = {
     "m": (1e3, "mm"),
@@ -34,3 +34,8 @@ def label(name: str, unit: str) -> str:
     """Return the name of a measure as text, without its unit: `lift_m` and `m` give `lift`."""
     short = name.removesuffix(f"_{unit.lower()}") if unit else name
     return short.replace("_", " ")
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number of things: `1 late step`, `2 late steps`; the plural ends in s."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

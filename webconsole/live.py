@@ -38,6 +38,7 @@ from schemas.errors import ConnectError, MessageError, ScenarioError
 from schemas.files import Files
 from schemas.keys import Keys, topic
 from schemas.network_link import NetworkLinkSpec
+from schemas.readable import counted
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import ScoreCard, SessionStatus
 from webconsole.commands import Tune
@@ -389,9 +390,9 @@ class Live:
         if status.detail != before.detail and status.detail:
             self._note_entry(Entry(at, "warn", "session", status.detail))
         if late := self._late.more(status.late_steps, monotonic()):
-            self._note_entry(Entry(at, "warn", "session", f"{late} late steps"))
+            self._note_entry(Entry(at, "warn", "session", counted(late, "late step")))
         if refused := self._refused.more(status.dropped_messages, monotonic()):
-            self._note_entry(Entry(at, "warn", "session", f"{refused} messages refused"))
+            self._note_entry(Entry(at, "warn", "session", f"{counted(refused, 'message')} refused"))
 
     def _ask_status(self, session: zenoh.Session, keys: Keys) -> None:
         """Ask for the status: a paused session publishes none."""

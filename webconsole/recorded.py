@@ -20,6 +20,7 @@ from hub.recording.trust import trusted_parameters
 from schemas.codec import decode
 from schemas.errors import MessageError, RecordingError, TrocarError
 from schemas.ports import Port
+from schemas.readable import counted
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import SessionStatus
 from schemas.vectors import Vector
@@ -231,9 +232,9 @@ class Recorded:
         for i, (time_ns, status) in enumerate(statuses):
             at, last = time_ns / 1e9, i == len(statuses) - 1
             if more := late.more(status.late_steps, at, last=last):
-                yield Entry(at, "warn", "session", f"{more} late steps")
+                yield Entry(at, "warn", "session", counted(more, "late step"))
             if more := refused.more(status.dropped_messages, at, last=last):
-                yield Entry(at, "warn", "session", f"{more} messages refused")
+                yield Entry(at, "warn", "session", f"{counted(more, 'message')} refused")
 
     def close(self) -> None:
         """Files are opened for each look alone."""

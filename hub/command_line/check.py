@@ -17,6 +17,7 @@ from hub.planning.plan import Plan, PlannedParticipant
 from hub.planning.scenario_file import load
 from hub.planning.scenario_schema import scenario_schema
 from hub.session.launch import plan_of
+from schemas.readable import counted
 
 __all__ = ["check", "schema"]
 
@@ -89,7 +90,7 @@ def _counts(planned: PlannedParticipant, sources: Mapping[tuple[str, str], list[
     connected = [port for port in inputs if (planned.name, port) in sources]
     origins = {one.partition(".")[0] for port in connected for one in sources[planned.name, port]}
     outputs = len(planned.ports) - len(inputs)
-    text = f"{outputs} output{'s'[outputs == 1 :]}, {len(inputs)} input{'s'[len(inputs) == 1 :]}"
+    text = f"{counted(outputs, 'output')}, {counted(len(inputs), 'input')}"
     return f"{text}, {len(connected)} of them from {', '.join(sorted(origins))}" if connected else text
 
 

@@ -17,7 +17,7 @@ from rich.text import Text
 
 from hub.observation.summary import Progress
 from hub.planning.limits import safe_text
-from schemas.readable import label, readable
+from schemas.readable import counted, label, readable
 from schemas.scenario import Scenario
 
 __all__ = [
@@ -132,7 +132,7 @@ class RunProgress:
         live = (
             f"{label(name, unit)} {readable(value, unit)}" for name, (value, unit) in progress.live.items()
         )
-        late = (f"{progress.late_steps} late steps",) if progress.late_steps else ()
+        late = (counted(progress.late_steps, "late step"),) if progress.late_steps else ()
         now = "  ".join(
             (f"{progress.sim_time_s:.2f} s", f"{progress.real_time_factor:.2f} x real time", *late, *live)
         )

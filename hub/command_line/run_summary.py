@@ -16,7 +16,7 @@ from hub.planning.limits import safe_text
 from hub.recording.profiles import profile_tables
 from hub.recording.recording import Recording
 from hub.recording.scores import score_tables
-from schemas.readable import label, readable
+from schemas.readable import counted, label, readable
 
 __all__ = ["show_summary"]
 
@@ -66,7 +66,7 @@ def _sentence(name: str, summary: Summary) -> str:
 
 def _speed(summary: Summary) -> str:
     factor = summary.real_time_factor
-    late = f"; {summary.late_steps} steps were late" if summary.late_steps else ""
+    late = f"; {counted(summary.late_steps, 'late step')}" if summary.late_steps else ""
     return (
         f"{summary.sim_time_s:g} s simulated in {summary.wall_time_s:.3g} s, {factor:.3g} x real time{late}"
     )
@@ -76,7 +76,8 @@ def _numbers(summary: Summary, *, everything: bool) -> Iterator[tuple[str, str]]
     """Yield the measures and the hash, and if `everything`, the rest."""
     for name, value in summary.measures.items():
         unit = summary.units.get(name, "")
-        yield label(name, unit), "no value" if value is None else readable(value, unit)
+        known = f"no value: {summary.missing[name]}" if value is None else readable(value, unit)
+        yield label(name, unit), known
     if everything:
         yield "steps", f"{summary.steps}"
         yield "late steps", f"{summary.late_steps}"

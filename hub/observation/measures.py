@@ -26,6 +26,7 @@ class _Meter:
     def __init__(self, measure: Measure, part: slice, period: float) -> None:
         self.live = measure.live
         self.unit = measure.unit
+        self._of = measure.of
         self.now: float | None = None
         self._kind = measure.kind
         self._part = part
@@ -77,6 +78,14 @@ class _Meter:
             "time-above": self._longest * self._period,
         }
         return results[self._kind]
+
+    @property
+    def missing(self) -> str:
+        """Why there is no result; empty if there is one."""
+        if self._count:
+            return ""
+        since = f" after {self._after / 1e9:g} s" if self.now is not None else ""
+        return f"'{self._of}' published no value{since}"
 
 
 class Measures:
@@ -135,3 +144,7 @@ class Measures:
     def results(self) -> dict[str, float | None]:
         """Return the result of every measure; None if the port had no value."""
         return {name: meter.result for name, meter in self._meters.items()}
+
+    def missing(self) -> dict[str, str]:
+        """Return why each measure without a result has none."""
+        return {name: meter.missing for name, meter in self._meters.items() if meter.missing}

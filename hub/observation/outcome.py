@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from schemas.readable import readable
+from schemas.readable import counted, readable
 from schemas.scenario import Outcome, Scenario
 
 __all__ = ["Verdict", "verdict"]
@@ -59,4 +59,4 @@ def _goals_reached(card: Mapping[str, Any]) -> str:
     reached, goals = card["reached"], card["goals"]
     time = card["metrics"].get("completion_time", {}).get("value")
     within = f" in {readable(time, 's')}" if time is not None and reached == goals else ""
-    return f"{reached} of {goals} goal{'s'[goals == 1 :]} reached{within}"
+    return f"{reached} of {counted(goals, 'goal')} reached{within}"

@@ -74,6 +74,8 @@ class Summary:
     succeeded: bool | None = None
     """Whether scenario or task count the run as a success; None if neither has conditions."""
     measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
+    missing: dict[str, str] = field(default_factory=dict[str, str])
+    """Why each measure without a value has none."""
     units: dict[str, str] = field(default_factory=dict[str, str])
     """Unit of each measure with a unit."""
     scores: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]])

@@ -6,6 +6,7 @@ import numpy as np
 
 from hub.recording.bond_trace import CONTACT_SHARE, BondTrace
 from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, draw_legend, line_of, thin
+from schemas.readable import counted
 from schemas.vectors import Vector
 
 __all__ = [
@@ -43,7 +44,7 @@ def press_figure(trace: BondTrace) -> Figure:
     caption = (
         "Depth is the displacement of the motion side since the touch, against the force until half of the"
         f" contact's largest; contact is where the force exceeds {CONTACT_SHARE:.0%} of its peak of"
-        f" {trace.peak:.3g} N. {len(contacts)} contact{'s' if len(contacts) != 1 else ''},"
+        f" {trace.peak:.3g} N. {counted(len(contacts), 'contact')},"
         f" deepest {deepest_mm:.2f} mm."
     )
     return Figure(f"{trace.name}: force against depth", result.svg(caption), caption)

@@ -8,6 +8,7 @@ import numpy as np
 
 from hub.recording.recording import Recording
 from hub.recording.report_canvas import Figure, axes_of, draw_legend, line_of, thin
+from schemas.readable import counted
 from schemas.trocar_msgs import TissueEvent
 
 __all__ = ["tissue_figures"]
@@ -50,8 +51,8 @@ def _force(recording: Recording, name: str) -> Iterator[Figure]:
             axes.plot(way[start:end][at] * 1e3, line[1], label=f"{i + 1}", **line_of(i))
         draw_legend(axes)
     caption = (
-        f"Force of skin and tissue on the tip alone, {len(through)} times in: it breaks through the skin,"
-        f" cuts, and breaks out again. At most {pushed.max():.3g} N."
+        f"Force of skin and tissue on the tip alone, {counted(len(through), 'time')} in: it breaks through"
+        f" the skin, cuts, and breaks out again. At most {pushed.max():.3g} N."
     )
     yield Figure(f"{name}: force on the tip", result.svg(caption), caption)
 
@@ -79,7 +80,7 @@ def _event_figures(recording: Recording, port: str) -> Iterator[Figure]:
                 times, sizes = np.transpose(own)
                 total = np.cumsum(sizes)
                 axes.plot(times, total, drawstyle="steps-post", marker=".", label=kind, **line_of(i))
-                sums.append(f"{total[-1]:.3g} {name} {kind}, {len(own)} times")
+                sums.append(f"{total[-1]:.3g} {name} {kind}, {counted(len(own), 'time')}")
             draw_legend(axes)
         caption = "; ".join(sums) + "."
         yield Figure(f"{port.removesuffix('/events')}: {', '.join(kinds)}", result.svg(caption), caption)

@@ -47,7 +47,8 @@ def score_tables(name: str, numbers: Mapping[str, Any], *, everything: bool = Tr
     groups = {"": numbers["metrics"], **numbers["rules"]}
     without: dict[str, list[str]] = {}
     for group, values in groups.items():
-        rows = [("goals reached", f"{numbers['reached']} of {numbers['goals']}")] if not group else []
+        is_first = numbers["goals"] and not group
+        rows = [("goals reached", f"{numbers['reached']} of {numbers['goals']}")] if is_first else []
         for metric, one in values.items():
             label = metric.replace("_", " ")
             if one["value"] is None:

@@ -145,6 +145,7 @@ class Bookkeeping:
             outcome=result.text,
             succeeded=result.succeeded,
             measures=measures,
+            missing=self._monitor.measures.missing(),
             units={name: one.si_unit for name, one in self._scenario.measure.items() if one.si_unit},
             scores=scores,
             ending=self.detail or None,

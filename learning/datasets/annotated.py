@@ -14,6 +14,7 @@ from learning.datasets.episode import Wanted, open_recording
 from learning.datasets.pictures import DEFAULT_SIZE, recorded_size
 from learning.datasets.truth import open_scene, open_truth, stereo_frames
 from schemas.errors import RecordingError, SessionError, TrustError
+from schemas.readable import counted
 from trocar import Recording
 
 __all__ = ["Annotated"]
@@ -83,4 +84,6 @@ class Annotated:
         if not self._frames:
             raise RecordingError("no recording could be used, so there is no data set")
         left_out = f", {self.left_out} left out" if self.left_out else ""
-        return f"{self._recordings} recordings, {self._frames} stereo pictures{left_out}"
+        return (
+            f"{counted(self._recordings, 'recording')}, {counted(self._frames, 'stereo picture')}{left_out}"
+        )

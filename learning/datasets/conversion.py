@@ -16,6 +16,7 @@ from learning.datasets.pictures import DEFAULT_SIZE, recorded_size, stereo
 from learning.datasets.truth import RecordedScene, open_scene, open_truth, write_truth
 from learning.datasets.writer import Writer
 from schemas.errors import RecordingError, SessionError, TrustError
+from schemas.readable import counted
 from trocar import Recording
 
 __all__ = ["Conversion"]
@@ -130,4 +131,4 @@ class Conversion:
         if self._writer is None or not self._writer.episodes:
             raise RecordingError("no recording could be used, so there is no data set")
         count, left_out = self._writer.episodes, f", {self.left_out} left out" if self.left_out else ""
-        return f"{count} episode{'s' if count != 1 else ''}, {self._writer.frames} frames{left_out}"
+        return f"{counted(count, 'episode')}, {counted(self._writer.frames, 'frame')}{left_out}"

@@ -10,6 +10,7 @@ from learning.datasets.open_h import ARMS, META
 from learning.datasets.video import CODEC, PIXEL_FORMAT
 from robots.dvrk.crtk import CAMERA_FRAME
 from robots.policies.states import state_groups
+from schemas.readable import counted
 
 __all__ = ["CHUNK", "FORMAT", "Counts", "info", "modality", "readme"]
 
@@ -146,7 +147,7 @@ def readme(info: Mapping[str, Any], tasks: Sequence[str]) -> str:
 
 ## Dataset Description
 
-{info["total_episodes"]} episodes, {info["total_frames"]} frames, {hours} hours.
+{counted(info["total_episodes"], "episode")}, {counted(info["total_frames"], "frame")}, {hours} hours.
 Data type: physical simulation (Trocar). License: chosen by the publisher.
 
 {done}

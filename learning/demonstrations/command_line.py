@@ -12,6 +12,7 @@ import typer
 
 import trocar
 from schemas.errors import MissingExtraError, ScenarioError
+from schemas.readable import counted
 
 if TYPE_CHECKING:
     from learning.demonstrations.collection import Collection
@@ -150,8 +151,8 @@ def _run(order: Order, collection: Collection, episodes: int, jobs: int, ray: st
     finally:
         dropped = collection.dropped
         typer.echo(
-            f"{collection.episodes} episodes, {collection.frames} frames, {len(dropped)} of"
-            f" {collection.episodes + len(dropped)} dropped: {collection.directory}"
+            f"{counted(collection.episodes, 'episode')}, {counted(collection.frames, 'frame')},"
+            f" {len(dropped)} of {collection.episodes + len(dropped)} dropped: {collection.directory}"
         )
     if not collection.episodes:
         raise typer.Exit(1)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from schemas.errors import MissingExtraError
+from schemas.readable import counted
 
 if TYPE_CHECKING:
     from learning.sweeps.sweep import Sweep
@@ -114,8 +115,8 @@ def _run(sweep: Sweep, jobs: int, ray: str | None) -> None:
             write_table(rows, sweep.variations, sweep.directory / "results.parquet")
             drawn = write_plots(rows, sweep.variations, sweep.directory / "results.png")
             typer.echo(
-                f"{len(rows)} of {total} trials, {failed} failed: {sweep.directory / 'results.parquet'}"
-                + (", results.png" if drawn else "")
+                f"{len(rows)} of {counted(total, 'trial')}, {failed} failed:"
+                f" {sweep.directory / 'results.parquet'}" + (", results.png" if drawn else "")
             )
     if failed:
         raise typer.Exit(1)

@@ -597,8 +597,9 @@ def test_a_warning_stays_above_the_scene_until_it_is_dismissed(person):
         """async () => {
           const { Alerts } = await import("/web/alerts.js")
           const alerts = new Alerts(document.getElementById("alerts"))
-          const late = (n, time) => ({ time, level: "warn", source: "session", text: `${n} late steps` })
-          alerts.add([late(2, 1), { time: 1, level: "info", source: "task", text: "grasped" }, late(5, 9)])
+          const late = (text, time) => ({ time, level: "warn", source: "session", text })
+          alerts.add([late("1 late step", 1), late("5 late steps", 9)])
+          alerts.add([{ time: 1, level: "info", source: "task", text: "grasped" }])
           alerts.add([{ time: 0, level: "warn", source: "hand", text: "no page leads" }])
           alerts.leave(new Set(["hand"]))
         }"""

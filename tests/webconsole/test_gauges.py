@@ -71,7 +71,7 @@ def test_a_page_is_offered_them_and_gets_samples(recorded):
 
 def test_late_steps_and_refused_messages_are_events(recorded):
     found = [(one.time_s, one.level, one.text) for one in recorded.events]
-    assert found == [(1.0, "warn", "2 late steps"), (2.0, "warn", "1 messages refused")]
+    assert found == [(1.0, "warn", "2 late steps"), (2.0, "warn", "1 message refused")]
 
 
 def test_of_several_streams_the_slowest_counts():

@@ -51,7 +51,7 @@ def test_late_steps_and_refused_messages_are_a_line_every_five_seconds(recording
     lines = [(one.time_s, one.text) for one in source.events if one.source == "session"]
     assert lines == [
         (0.1, "90 late steps"),
-        (0.3, "1 messages refused"),
+        (0.3, "1 message refused"),
         (5.1, "4500 late steps"),
         (5.3, "39 messages refused"),
         (10.1, "4500 late steps"),

@@ -17,7 +17,7 @@ export class Alerts {
   add(entries = []) {
     for (const { time, level, source, text } of entries) {
       if (level === "info") continue
-      const what = `${source}: ${text.replace(/^\d+ /, "")}` // "3 late steps" is "late steps" again
+      const what = `${source}: ${text.replace(/^\d+ /, "").replaceAll(/s\b/g, "")}` // "3 late steps" is "1 late step" again
       const known = this.shown.get(what)
       if (known) {
         known.count++

@@ -1,6 +1,7 @@
 // The score card of a training task: one line below the plots, which opens.
 
 import { short } from "./plots.js"
+import { counted } from "./words.js"
 
 let shown = ""
 
@@ -18,7 +19,7 @@ export function showCard(element, card) {
     row.insertCell().textContent = number
   }
   const head = document.createElement("summary")
-  head.textContent = `Score: ${card.task}, ${card.reached} of ${card.goals} goals`
+  head.textContent = `Score: ${card.task}${card.goals ? `, ${card.reached} of ${counted(card.goals, "goal")}` : ""}`
   element.replaceChildren(head, table)
 }
 

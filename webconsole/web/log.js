@@ -1,5 +1,7 @@
 // The log: what happened, with warnings that cannot be overlooked. It follows the instant that is shown.
 
+import { counted } from "./words.js"
+
 const KEPT = 2000
 const RANKS = { info: 0, warn: 1, error: 2 }
 const LOWEST_PX = 38, STEP_PX = 17, HEIGHT = "trocar-log-height"
@@ -49,7 +51,7 @@ export class Log {
     for (const { line } of this.rows.splice(0, this.rows.length - KEPT)) line.remove()
     if (this.time != null) this.at(this.time)
     else if (below && !jumps) this.lines.scrollTop = this.lines.scrollHeight
-    this.worst.textContent = this.warnings ? `${this.warnings} warning${this.warnings > 1 ? "s" : ""}` : ""
+    this.worst.textContent = this.warnings ? counted(this.warnings, "warning") : ""
   }
 
   line({ time, level, source, text, recording }, jumps) {

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from schemas.readable import counted
+
 __all__ = ["app"]
 
 app = typer.Typer()
@@ -49,8 +51,8 @@ def import_file(
     lines += [f"not carried over: {line}" for line in imported.lost]
     number = len(imported.scenario["participants"])
     lines += [
-        f"wrote {imported.file}: {number} FMU{'s'[number == 1 :]},"
-        f" {len(imported.scenario.get('connections', ()))} connections",
+        f"wrote {imported.file}: {counted(number, 'FMU')},"
+        f" {counted(len(imported.scenario.get('connections', ())), 'connection')}",
         f"next: trocar run {imported.file}",
     ]
     typer.echo("\n".join(safe_text(line, 500) for line in lines))

@@ -88,6 +88,7 @@ def test_values_before_a_time_do_not_count():
     for second, value in enumerate((5.0, 4.0, 3.0, 1.0, 2.0)):
         found.add("a", "out", np.array([value]), second * 10**9)
     assert found.results() == {"late": 3.0, "never": None}
+    assert found.missing() == {"never": "'a.out' published no value after 9 s"}
 
 
 @pytest.mark.parametrize("measure", [{"kind": "time-above"}, {"kind": "peak", "level": 1.0}])
@@ -96,8 +97,10 @@ def test_a_level_belongs_to_time_above(measure):
         Measure.model_validate({"of": "a.out", **measure})
 
 
-def test_a_port_that_never_spoke_has_no_measure():
-    assert set(measures("a.out", Part("a", out())).results().values()) == {None}
+def test_a_port_that_never_spoke_has_no_measure_and_this_is_said():
+    found = measures("a.out", Part("a", out()))
+    assert set(found.results().values()) == {None}
+    assert found.missing() == dict.fromkeys(found.results(), "'a.out' published no value")
 
 
 def test_the_events_of_a_port_are_measured_one_by_one():
