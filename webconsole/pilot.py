@@ -103,7 +103,7 @@ class Pilots:
         """Return each device and its pilot, as `page` is told, ready for JSON."""
         self._expire_leads()
         rows: list[dict[str, Any]] = []
-        for device in self._devices:
+        for device in sorted(self._devices):
             holder = self._pages.get(device)
             who = "" if holder is None else "you" if holder is page else f"page {self._number_of(holder)}"
             rows.append({"device": device, "pilot": who})

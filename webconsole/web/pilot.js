@@ -73,7 +73,7 @@ export class Pilot {
   build(devices) {
     this.panel.classList.toggle("leading", this.leading)
     const rows = devices.map(({ device, pilot }) => {
-      const row = element("div", "row"), button = element("button")
+      const row = element("span", "row"), button = element("button")
       button.textContent = pilot === "you" ? `Leave ${device}` : `Lead ${device}`
       button.disabled = Boolean(pilot) && pilot !== "you"
       button.title = button.disabled ? `${pilot} leads ${device}, and must leave it first` : ""
@@ -82,13 +82,23 @@ export class Pilot {
         this.link.send(pilot === "you" ? { do: "leave" } : { do: "lead", device })
       }
       const who = element("span")
-      who.textContent = pilot === "you" ? "you lead it" : pilot ? `${pilot} leads it` : "no page leads it"
+      who.textContent = pilot === "you" ? "you lead it" : pilot ? `${pilot} leads it` : this.leading ? "" : "no page leads it"
       row.append(button, who)
       return row
     })
-    if (this.leading) rows.push(...this.exchange(), ...this.help())
-    this.panel.replaceChildren(...rows)
+    if (!this.leading) return this.panel.replaceChildren(...rows)
+    const first = element("div", "row")
+    first.append(...rows, this.pill())
+    this.panel.replaceChildren(first, ...this.exchange(), this.help())
     this.mark()
+  }
+
+  // How the arm follows, and what to press if it does not.
+  pill() {
+    const pill = element("span", "pill")
+    pill.id = "dead-man"
+    pill.setAttribute("role", "status")
+    return pill
   }
 
   // What the led arm may hold, each with its key.
@@ -114,10 +124,6 @@ export class Pilot {
   }
 
   help() {
-    const state = element("div", "row"), dead = element("span", "pill")
-    dead.id = "dead-man"
-    dead.setAttribute("role", "status")
-    state.append(dead)
     const keys = element("div", "keys")
     for (const [key, [text]] of Object.entries(KEYS)) {
       if (key in PEDALS && !this.pedals[this.device]?.includes(PEDALS[key])) continue
@@ -135,8 +141,7 @@ export class Pilot {
     this.listen(pad)
     const row = element("div", "row")
     row.append(pad, keys)
-    keys.style.flex = "1"
-    return [state, row]
+    return row
   }
 
   listen(pad) {
