@@ -20,7 +20,7 @@ _FLAGS = [] if sys.platform == "win32" else ["-ffp-contract=off", "-fno-fast-mat
 _EXTENSIONS = (
     Extension(
         "robots._kinematics",
-        ["robots/_kinematics.c", "robots/_closed_form.c"],
+        ["robots/_kinematics.c", "robots/_closed_form.c", "robots/_tips.c"],
         depends=["robots/_kinematics.h"],
         include_dirs=[np.get_include()],
         extra_compile_args=_FLAGS,

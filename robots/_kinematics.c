@@ -1,4 +1,4 @@
-/* Kinematics of one configuration, to the bit as robots/ has it in numpy, without the cost of numpy's calls.
+/* Kinematics, to the bit as robots/ has it in numpy, without the cost of numpy's calls.
 
 Sines, products of matrices and solutions are those of numpy's own inner loops, which its ufuncs hold, called with
 the shapes and strides that numpy would call them with: so they have numpy's bits on every processor and with every
@@ -108,7 +108,7 @@ void find_frames(const Chain *chain, const double *q, double *poses)
 }
 
 /* Write the unit quaternion of the matrix in the corner of a pose: `_from_rows` of rotation.py. */
-static void quaternion_of(const double *pose, double *q)
+void quaternion_of(const double *pose, double *q)
 {
     double a = pose[0], b = pose[1], c = pose[2], d = pose[4], e = pose[5], f = pose[6], g = pose[8], h = pose[9],
            i = pose[10];
@@ -140,7 +140,7 @@ static void turn_to(const double *goal, const double *pose, double *vector)
 }
 
 /* Write the Jacobian, (6, n): `SerialChain.jacobian`. */
-static void find_jacobian(const Chain *chain, const double *poses, double *jacobian)
+void find_jacobian(const Chain *chain, const double *poses, double *jacobian)
 {
     npy_intp n = chain->n;
     const double *tip = poses + 16 * n;
@@ -255,6 +255,8 @@ static PyMethodDef functions[] = {
     {"frames", (PyCFunction)(void (*)(void))frames, METH_FASTCALL, frames_doc},
     {"pursue", (PyCFunction)(void (*)(void))pursue, METH_FASTCALL, pursue_doc},
     {"inverse", (PyCFunction)(void (*)(void))inverse, METH_FASTCALL, inverse_doc},
+    {"tips", (PyCFunction)(void (*)(void))tips, METH_FASTCALL, tips_doc},
+    {"tip_poses", (PyCFunction)(void (*)(void))tip_poses, METH_FASTCALL, tip_poses_doc},
     {NULL, NULL, 0, NULL},
 };
 

@@ -59,8 +59,18 @@ int read_chain(PyObject *object, Chain *chain);
 /* Write the poses of all links and the tip, (n + 1, 4, 4): `_Workspace.frames` of serial_chain.py. */
 void find_frames(const Chain *chain, const double *q, double *poses);
 
+/* Write the Jacobian, (6, n), from these: `SerialChain.jacobian`. */
+void find_jacobian(const Chain *chain, const double *poses, double *jacobian);
+
+/* Write the unit quaternion of the matrix in the corner of a pose: `_from_rows` of rotation.py. */
+void quaternion_of(const double *pose, double *q);
+
 /* Return a new array of n doubles. */
 PyObject *array_of(npy_intp n, const double *values);
 
 extern const char inverse_doc[];
 PyObject *inverse(PyObject *module, PyObject *const *args, Py_ssize_t count); /* _closed_form.c */
+
+extern const char tips_doc[], tip_poses_doc[];
+PyObject *tips(PyObject *module, PyObject *const *args, Py_ssize_t count);      /* _tips.c */
+PyObject *tip_poses(PyObject *module, PyObject *const *args, Py_ssize_t count); /* _tips.c */

@@ -24,7 +24,7 @@ try:
 except ImportError:  # there was no compiler, or numpy's inner loops are not where they were
     compiled = None
 
-__all__ = ["Joint", "SerialChain", "SerialChains", "check", "compiled", "jerk_limit"]
+__all__ = ["Joint", "SerialChain", "check", "compiled", "jerk_limit"]
 
 _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 """Index orders for the two products of each element of a cross product."""
@@ -315,33 +315,6 @@ class _Workspace:
         for before, link, after in self._products:
             before(link, after)
         return self._poses.copy()
-
-
-class SerialChains:
-    """Several chains of n joints of the same kinds, at the number of numpy calls of a single chain.
-
-    The frames equal the frames of each `SerialChain.frames` to the bit; Jacobians come from any of the
-    chains.
-    """
-
-    def __init__(self, chains: Sequence[SerialChain]) -> None:
-        """`chains`: k chains."""
-        self._chains, self.prismatic = tuple(chains), chains[0].prismatic
-        self.basis = np.stack([chain.basis for chain in chains])[:, None]  # (k, 1, n, 3, 16)
-        self._tips = np.stack([chain.tip for chain in chains])[:, None]  # (k, 1, 4, 4)
-
-    def frames(self, q: Vector) -> Vector:
-        """Return the poses of all links and tips in the base frames, shape (k, m, n + 1, 4, 4).
-
-        Positions `q` have shape (k, m, n): m configurations of each chain.
-        """
-        if compiled is None:
-            return _frames(q, self.basis, self._tips, self.prismatic)
-        poses = np.empty((*q.shape[:2], q.shape[2] + 1, 4, 4))
-        for chain, positions, found in zip(self._chains, q, poses, strict=True):
-            for i, one in enumerate(positions):
-                found[i] = chain.frames(one)
-        return poses
 
 
 def check() -> tuple[bool, str, str]:

@@ -15,8 +15,8 @@ from robots.dvrk import arm_bodies
 from robots.dvrk.dynamics import STANDARD_GRAVITY, Dynamics
 from robots.dvrk.linkage import MTM, Linkage
 from robots.dvrk.setup_joints import DrivenArm
-from robots.rotation import from_matrices
-from robots.serial_chain import SerialChain, SerialChains
+from robots.serial_chain import SerialChain
+from robots.tips import Tips, tip_poses
 from schemas.vectors import Vector
 
 __all__ = ["KnownWeight", "Telemetry", "TelemetryRow", "body_to_spatial"]
@@ -78,11 +78,9 @@ class Telemetry:
         for arm in arms:
             kinds.setdefault(tuple(joint.kind for joint in arm[1].joints), []).append(arm)
         count = len(arms)
-        self._given, self._seen = np.zeros((count, 20)), b""
-        self._base = self._given[:, :16].reshape(count, 4, 4)
-        self._ratio, self._switches = self._given[:, 16:18], self._given[:, 18:]
+        self._base, self._given, self._seen = np.zeros((count, 4, 4)), np.zeros((count, 4)), b""
+        self._ratio, self._switches = self._given[:, :2], self._given[:, 2:]
         self._tips, self._local = np.zeros((count, 2, 4, 4)), np.zeros((count, 2, 6))
-        self._frames = np.zeros((count, 5, 4, 4))
         self._poses, self._twists = np.zeros((count, 5, 7)), np.zeros((count, 4, 6))
         self._ratios = np.zeros((count, 3))
         self._groups: list[_Group] = []
@@ -130,7 +128,7 @@ class Telemetry:
         if changed := self._changed_groups():
             for group in changed:
                 group.update_tips()
-            self._update_poses()
+            tip_poses(self._base, self._tips, self._poses)
             self._update_twists()
             self._behind = [group for group in self._groups if group in changed or group in self._behind]
         if wrenches and self._behind:
@@ -139,7 +137,7 @@ class Telemetry:
 
     def _changed_groups(self) -> list[_Group]:
         """Return the groups with changed input bits."""
-        given = self._given.tobytes()
+        given = self._base.tobytes() + self._given.tobytes()
         changed = [group for group in self._groups if group.is_new()] if given == self._seen else self._groups
         if given != self._seen:
             self._seen = given
@@ -159,14 +157,6 @@ class Telemetry:
         self._ratios[:, :2] = self._ratio
         self._ratios[:, 2] = np.where(faster == harder, faster, 0.0)
 
-    def _update_poses(self) -> None:
-        """Write the poses of the bases, and of the tips as commanded and as measured."""
-        frames = self._frames
-        frames[:, 0], frames[:, 1::2] = self._base, self._tips
-        np.matmul(self._base[:, None], self._tips, out=frames[:, 2::2])
-        self._poses[..., :3] = frames[..., :3, 3]
-        self._poses[..., 3:] = from_matrices(frames.reshape(-1, 4, 4)).reshape(-1, 5, 4)
-
     def _update_twists(self) -> None:
         self._twists[:, ::2] = self._local
         parts = self._base[:, None, None, :3, :3] @ self._local.reshape(-1, 2, 2, 3, 1)
@@ -181,20 +171,18 @@ class _Group:
     ) -> None:
         """`tips`, (k, 2, 4, 4), `twists`, (k, 2, 6): written; commanded and measured, in base frames."""
         k, n = len(arms), len(arms[0][1].joints)
-        self._chain, self._by_arm = arms[0][1], {arm: chain for arm, chain, _ in arms}
-        self._chains = SerialChains(list(self._by_arm.values()))
+        self._arms = [arm for arm, *_ in arms]
         self._weights = [weight for *_, weight in arms]
         self.state, self._seen = np.zeros((k, 2, 3, n)), b""
         """Positions, velocities and efforts as commanded, then as measured."""
-        self._tips, self._twists, self._jacobian = tips, twists, np.zeros((k, 6, n))
+        self._poses, self._tips = tips, Tips([chain for _, chain, _ in arms], self.state, tips, twists)
         self._jacobians, self._wrenches = np.zeros((k, 2, 6, n)), np.zeros((k, 2, 6))  # body, then spatial
         self._carried = np.zeros((k, n))
 
     def fit(self, arm: str, chain: SerialChain) -> None:
         """Take over the kinematics of the instrument of `arm`, if that is one of these."""
-        if arm in self._by_arm and self._by_arm[arm] is not chain:
-            self._by_arm[arm], self._seen = chain, b""
-            self._chains = SerialChains(list(self._by_arm.values()))
+        if arm in self._arms and self._tips.chains[i := self._arms.index(arm)] is not chain:
+            self._tips.chains[i], self._seen = chain, b""
 
     def outputs_of(self, i: int, arm: str) -> dict[str, Vector]:
         """Return the outputs of arm number `i` with the name `arm`."""
@@ -219,10 +207,7 @@ class _Group:
     def update_tips(self) -> None:
         """Write poses and twists of the tips."""
         self._seen = self.state.tobytes()
-        frames = self._chains.frames(self.state[:, :, 0])  # (k, 2, n + 1, 4, 4)
-        jacobian = self._chain.jacobian(frames)  # (k, 2, 6, n)
-        self._tips[:], self._jacobian = frames[:, :, -1], jacobian[:, 1]
-        self._twists[:] = (jacobian @ self.state[:, :, 1, :, None])[..., 0]
+        self._tips.update()
 
     def update_wrenches(self, spatial: Vector, base: Vector, switches: Vector) -> None:
         """Write the Jacobians of the measured positions, the wrenches balancing the efforts, and weight.
@@ -232,9 +217,9 @@ class _Group:
             base: poses of the base frames, shape (k, 4, 4).
             switches: switches of `TelemetryRow`, shape (k, 2).
         """
-        k, _, n = self._jacobian.shape
-        to_tip = self._tips[:, 1, None, :3, :3].swapaxes(-1, -2)
-        body = (to_tip @ self._jacobian.reshape(k, 2, 3, n)).reshape(k, 6, n)
+        k, _, n = self._tips.jacobian.shape
+        to_tip = self._poses[:, 1, None, :3, :3].swapaxes(-1, -2)
+        body = (to_tip @ self._tips.jacobian.reshape(k, 2, 3, n)).reshape(k, 6, n)
         self._jacobians[:, 0] = body
         np.matmul(spatial, body, out=self._jacobians[:, 1])
         inverse = _pseudo_inverse(self._jacobians.swapaxes(-1, -2))  # (k, 2, 6, n)
@@ -242,7 +227,7 @@ class _Group:
         for i, (weight, (absolute, carries)) in enumerate(zip(self._weights, switches.tolist(), strict=True)):
             self._carried[i] = carries * weight.effort(self.state[i, 1, 0])
             if absolute:
-                in_reference = base[i, :3, :3] @ self._tips[i, 1, :3, :3]
+                in_reference = base[i, :3, :3] @ self._poses[i, 1, :3, :3]
                 self._wrenches[i, 0] = rotate_twist(in_reference, self._wrenches[i, 0])
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from robots import inverse_kinematics, rotation, serial_chain
 from robots.dvrk import arms, inverse
+from robots.tips import Tips, tip_poses
 from schemas.errors import MotionError
 
 pytestmark = pytest.mark.skipif(serial_chain.compiled is None, reason="built without a compiler")
@@ -70,6 +71,50 @@ def test_the_closed_form_has_the_same_bits_and_refusals(both, arm, tool):
         numbers = inverse._form(chain).numbers
         taken += serial_chain.compiled.inverse(chain.numbers, numbers, pose, near) is not None
     assert taken > COUNT / 4
+
+
+@pytest.mark.parametrize("arm", ["PSM1", "ECM", "MTML"])
+def test_tips_of_several_arms_have_the_same_bits_and_are_those_of_each(both, arm):
+    chains, random = [arms.chain(arm), copy.deepcopy(arms.chain(arm))], np.random.default_rng(4)
+    chains[1].tip[:3, 3] += 0.01
+    chains[1] = serial_chain.SerialChain(chains[1].joints, chains[1].tip)
+    n = len(chains[0].joints)
+    state, poses, twists = np.zeros((2, 2, 3, n)), np.zeros((2, 2, 4, 4)), np.zeros((2, 2, 6))
+    tips = Tips(chains, state, poses, twists)
+
+    def states():
+        tips.update()
+        return np.concatenate([each.ravel() for each in (poses, twists, tips.jacobian)])
+
+    for _ in range(COUNT // 10):
+        state[:] = random.uniform(-2.0, 2.0, state.shape)
+        assert len(set(both(states))) == 1
+        frames = chains[1].frames(state[1, 1, 0])
+        assert np.array_equal(poses[1, 1], frames[-1])
+        assert np.array_equal(tips.jacobian[1], chains[1].jacobian(frames))
+        assert np.allclose(twists[1, 1], tips.jacobian[1] @ state[1, 1, 1])
+
+
+@pytest.mark.parametrize("wrong", [None, np.nan, np.inf])
+def test_poses_of_tips_have_the_same_bits(both, wrong):
+    random = np.random.default_rng(5)
+    for _ in range(COUNT // 10):
+        base, tips = np.tile(np.eye(4), (3, 1, 1)), np.tile(np.eye(4), (3, 2, 1, 1))
+        for pose in (*base, *tips.reshape(-1, 4, 4)):
+            pose[:3, :3] = rotation.matrix(rotation.exp(random.normal(0.0, 2.0, 3)))
+            pose[:3, 3] = random.normal(0.0, 1.0, 3)
+        if wrong is not None:
+            tips[1, 0, 2, 1] = wrong
+
+        def written(base=base, tips=tips):
+            poses = np.zeros((3, 5, 7))
+            tip_poses(base, tips, poses)
+            return poses
+
+        with np.errstate(invalid="ignore"):
+            assert len(set(both(written))) == 1
+            outside, found = base[2] @ tips[2, 1], written()[2, 4]
+        assert np.array_equal(found, [*outside[:3, 3], *rotation.from_matrix(outside)])
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e100])

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robots import rotation
-from robots.dvrk import arms, psm
+from robots.dvrk import arms
 from robots.dvrk.instruments import instrument
-from robots.serial_chain import Joint, SerialChain, SerialChains
+from robots.serial_chain import Joint, SerialChain
 from schemas.errors import MotionError
 
 NAMES = ("PSM1", "ECM", "MTML", "MTMR", "SUJ/PSM3")
@@ -171,13 +171,6 @@ def test_a_pose_of_what_is_not_finite_is_refused_naming_the_first():
         pytest.raises(MotionError, match=r"\[0.0, 0.0, nan, 0.0, 0.0, 0.0\] of yaw, pitch"),
     ):
         CHAINS["PSM1"].forward(q)
-
-
-def test_the_frames_of_several_chains_are_those_of_each_to_the_bit():
-    chains = [psm.chain(instrument(number)) for number in ("400006", "420006")]
-    q = np.random.default_rng(3).uniform(chains[0].lower, chains[0].upper, (2, 3, 6))
-    each = np.array([[chain.frames(row) for row in rows] for chain, rows in zip(chains, q, strict=True)])
-    assert SerialChains(chains).frames(q).tobytes() == each.tobytes()
 
 
 def test_a_copy_of_a_chain_computes_for_itself():
