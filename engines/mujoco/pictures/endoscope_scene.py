@@ -35,6 +35,9 @@ __all__ = ["EndoscopeScene", "add_sky"]
 
 _SKY, _GROUND = [0.75, 0.8, 0.85], [0.35, 0.37, 0.4]
 """Behind everything seen from a room, above and below; an endoscope sees only what its own lamp lights."""
+_FLOOR, _FLOOR_M, _BELOW_M = "floor", 0.5, 0.5e-3
+"""Name, half the side and distance below the soft bodies, m, of the floor in plain looks."""
+_SQUARES, _SQUARES_PER_M = ([0.62, 0.67, 0.68], [0.56, 0.61, 0.62]), 100.0
 
 _TONES = {"filmic": "filmic", "linear": "linear"}
 """Filament's names of tone mappings."""
@@ -64,6 +67,8 @@ class EndoscopeScene:
         else:
             if params.view is not None or "ECM" not in params.arms:
                 add_sky(scene)
+                if params.surroundings == "abdomen":
+                    _add_floor(scene, bodies)
             self._skins = Skins(scene, bodies, params.soft_bodies)
         self._model = scene.compile()
         self._data = mujoco.MjData(self._model)
@@ -167,4 +172,30 @@ def add_sky(scene: mujoco.MjSpec) -> None:
         rgb2=_GROUND,
         width=64,
         height=6 * 64,
+    )
+
+
+def _add_floor(scene: mujoco.MjSpec, bodies: Mapping[str, SoftBody]) -> None:
+    """Add a floor with squares of 10 mm under the soft bodies: what lies on nothing seems to float."""
+    lowest = min((float(body.rest[:, 2].min()) for body in bodies.values() if len(body.rest)), default=None)
+    if lowest is None:
+        return
+    scene.add_texture(
+        name=_FLOOR,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=_SQUARES[0],
+        rgb2=_SQUARES[1],
+        width=64,
+        height=64,
+    )
+    material = scene.add_material(name=_FLOOR, texuniform=True, texrepeat=[_SQUARES_PER_M] * 2)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _FLOOR
+    scene.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[_FLOOR_M, _FLOOR_M, 0.1],
+        pos=[0.0, 0.0, lowest - _BELOW_M],
+        material=_FLOOR,
+        contype=0,
+        conaffinity=0,
     )

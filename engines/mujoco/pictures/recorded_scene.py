@@ -228,9 +228,10 @@ class RecordedScene:
         things, tips = sight.seen(self._params.objects)
         points = [body.rest.astype(np.float64) for body in bodies.values()]
         points += [things] if len(things) else []
-        if not points:
+        points = points or [tips]
+        if not points[0].size:
             raise RecordingError(
-                f"'{self._recording.file}': neither soft bodies nor objects to look at; give the overview a"
+                f"'{self._recording.file}': no soft bodies, objects or tips to look at; give the overview a"
                 " position and a target"
             )
         subject = np.concatenate(points)

@@ -222,6 +222,32 @@ def test_a_picture_may_be_larger_than_that_of_a_message(recordings: dict[str, Re
     assert picture.shape == (16, 4096, 3)
 
 
+@pytest.mark.long
+def test_soft_bodies_lie_on_a_floor_with_squares(recordings: dict[str, Recording]) -> None:
+    scene = RecordedScene(recordings["hub"], looks="plain")
+    picture = scene.picture(
+        0, camera="overview", size=(160, 120), position=(0.3, 0.0, 0.2), target=(0.3, 0, 0)
+    )
+    tones = np.unique(picture[::20, ::20].reshape(-1, 3).astype(int).sum(axis=1))
+    assert np.ptp(tones) > 20
+
+
+@pytest.mark.long
+def test_a_scene_of_an_arm_alone_is_seen_at_its_tip(tmp_path: Path) -> None:
+    if not (found := opengl.find()).name:
+        pytest.skip(f"no OpenGL: {found.detail}")
+    arm = "step: 1 ms\nduration: 3 ms\nparticipants:\n  robot: {kind: mujoco, arms: {PSM1: {}}}\n"
+    (tmp_path / "arm.yaml").write_text(f"name: arm\n{arm}")
+    launch(load(str(tmp_path / "arm.yaml")), endpoint="tcp/127.0.0.1:0", record=tmp_path / "run").run()
+    picture = (
+        RecordedScene(Recording(tmp_path / "run"))
+        .picture(0, camera="overview", size=(160, 120))
+        .astype(float)
+    )
+    background, middle = picture[0, 0], picture[40:80, 60:100].reshape(-1, 3)
+    assert np.abs(middle - background).sum(axis=1).max() > 60.0
+
+
 def test_a_recording_without_a_scene_is_refused(recordings: dict[str, Recording]) -> None:
     with pytest.raises(RecordingError, match="no scene of 'robo'; participants of kind mujoco: robot"):
         RecordedScene(recordings["hub"], "robo")
