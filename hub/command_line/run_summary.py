@@ -38,6 +38,9 @@ def show_summary(name: str, summary: Summary, *, again: str = "", everything: bo
         return
     results.print(_sentence(name, summary), soft_wrap=True)
     results.print(_speed(summary), soft_wrap=True)
+    for participant, text in summary.warnings.items():
+        warning = escape(safe_text(f"participant '{participant}' {text}", 1000))
+        results.print(f"[yellow]{warning}[/]", soft_wrap=True)
     results.print()
     results.print(table(_numbers(summary, everything=everything)))
     if everything or summary.late_steps or any(one.lost for one in summary.observers.values()):

@@ -1,4 +1,4 @@
-"""Measures and score cards: the summary's values of output ports during the run."""
+"""Measures, score cards and warnings: the summary's values of output ports during the run."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ import numpy as np
 from hub.observation.contact_watch import ContactWatch
 from hub.planning.measured import measured_port
 from hub.planning.plan import Plan
-from schemas.ros import Float64Message
+from schemas.ros import DiagnosticStatus, Float64Message
 from schemas.scenario import Measure, Scenario
 from schemas.trocar_msgs import ScoreCard
 from schemas.vectors import Vector
 
 __all__ = ["Measures"]
+
+_KEPT = (ScoreCard.ros_type, DiagnosticStatus.ros_type)
+"""Types of messages of which the newest counts."""
 
 
 class _Meter:
@@ -97,8 +100,9 @@ class Measures:
             (planned.name, port.name): []
             for planned in plan.participants.values()
             for port in planned.ports
-            if port.causality == "output" and port.type == ScoreCard.ros_type
+            if port.causality == "output" and port.type in _KEPT and planned.role != "device"
         }
+        self._warnings: dict[str, str] = {}
         self._cards: dict[str, ScoreCard] = {}
         self._lock = threading.Lock()
         for name, measure in scenario.measure.items():
@@ -114,7 +118,7 @@ class Measures:
 
     @property
     def ports(self) -> list[tuple[str, str]]:
-        """The measured (participant, port) pairs, including score cards."""
+        """The measured (participant, port) pairs, including score cards and diagnoses."""
         return list(self.by_port)
 
     @property
@@ -122,10 +126,20 @@ class Measures:
         """The newest score card of each participant with published cards."""
         return dict(self._cards)
 
+    @property
+    def warnings(self) -> dict[str, str]:
+        """What each stepped participant could not do as asked, by its last diagnosis."""
+        return dict(self._warnings)
+
     def add(self, participant: str, port: str, value: Any, time_ns: int) -> None:
         """Add the value of a signal port, or a message of an event port, at a time."""
         if isinstance(value, ScoreCard):
             self._cards[participant] = value
+            return
+        if isinstance(value, DiagnosticStatus):
+            self._warnings.pop(participant, None)
+            if value.level:
+                self._warnings[participant] = value.message
             return
         if isinstance(value, Float64Message):
             value = np.array([value.data])

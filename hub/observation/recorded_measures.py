@@ -7,6 +7,7 @@ import numpy as np
 from hub.observation.measures import Measures
 from hub.recording.recording import Recording
 from schemas.errors import RecordingError
+from schemas.ros import DiagnosticStatus
 from schemas.trocar_msgs import ScoreCard
 
 __all__ = ["recorded_measures"]
@@ -26,9 +27,9 @@ def recorded_measures(recording: Recording) -> Measures:
         if name not in recording:
             continue
         series = recording[name]
-        if recording.ports[name] == ScoreCard.ros_type:
-            for time_s, card in series.messages():
-                measures.add(participant, port, card, round(time_s * 1e9))
+        if recording.ports[name] in (ScoreCard.ros_type, DiagnosticStatus.ros_type):
+            for time_s, message in series.messages():
+                measures.add(participant, port, message, round(time_s * 1e9))
         elif len(series.values):  # none of a type without a vector
             for time_s, value in zip(series.time.tolist(), series.values, strict=True):
                 measures.add(participant, port, np.ascontiguousarray(value), round(time_s * 1e9))

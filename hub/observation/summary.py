@@ -80,6 +80,8 @@ class Summary:
     """Unit of each measure with a unit."""
     scores: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]])
     """The last published score card by participant (`hub/recording/scores.py`)."""
+    warnings: dict[str, str] = field(default_factory=dict[str, str])
+    """What a participant could not do as asked, and from when, by participant: a camera without its looks."""
     ending: str | None = None
     """Participant, simulated time and reason of an end by a participant; else None."""
     profile: dict[str, Any] | None = None

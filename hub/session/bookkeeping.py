@@ -148,6 +148,7 @@ class Bookkeeping:
             missing=self._monitor.measures.missing(),
             units={name: one.si_unit for name, one in self._scenario.measure.items() if one.si_unit},
             scores=scores,
+            warnings=self._monitor.measures.warnings,
             ending=self.detail or None,
             profile=None if profile is None else profile_numbers(profile),
         )

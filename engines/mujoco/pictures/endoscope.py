@@ -10,27 +10,26 @@ import logging
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from io import BytesIO
-from typing import TYPE_CHECKING, ClassVar, cast
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.mujoco.markers.store import shown_markers
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.drawing import Drawing, find_drawing
 from engines.mujoco.pictures.enclosure import enclosing_bodies
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
+from engines.mujoco.pictures.filament.backend import Backend
 from engines.mujoco.pictures.lens import NO_DISTORTION, Distortion
-from engines.mujoco.pictures.soft_body import SoftBody
-from engines.mujoco.ports import position_count
+from engines.mujoco.pictures.scene_apart import DrawingLostError, SceneApart
+from engines.mujoco.pictures.seen_state import SeenState
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, event_out, signal_in, state_hash
 from robots.dvrk.endoscope import EYES, Eye, StereoCamera
-from schemas.codec import decode, encode
 from schemas.crtk import StringStamped
-from schemas.errors import MessageError, MissingExtraError, StateError
+from schemas.errors import MissingExtraError, StateError
 from schemas.message import Message
 from schemas.ports import Port
-from schemas.ros import CameraInfo, CompressedImage, Header, Image, Time
+from schemas.ros import CameraInfo, CompressedImage, DiagnosticStatus, Header, Image, Time
 from schemas.trocar_msgs import ShownMarkers, SoftBodyState, SurfaceChange, SurfaceFilm
 from schemas.vectors import Vector
 
@@ -42,6 +41,9 @@ __all__ = ["Endoscope", "camera_info"]
 
 _log = logging.getLogger(__name__)
 
+_WARNING = 1
+"""Level of a DiagnosticStatus."""
+
 
 class Endoscope(Stepped):
     """Two cameras at the tip of the ECM, or where the scenario puts them."""
@@ -52,9 +54,7 @@ class Endoscope(Stepped):
 
     def __init__(self, name: str, params: EndoscopeParams) -> None:
         super().__init__(name, params)
-        self._positions = np.zeros(position_count(params))
-        self._bodies = {organ: SoftBody(f"{organ}/nodes") for organ in params.soft_bodies}
-        self._shown: ShownMarkers | None = None
+        self._seen = SeenState(params)
         self._frame = f"{name}_left_optical"
         kinds: dict[str, type[Message]] = {} if params.images == "none" else {"camera_info": CameraInfo}
         if params.images in ("raw", "both"):
@@ -68,7 +68,13 @@ class Endoscope(Stepped):
             for eye in EYES
             for kind, model in kinds.items()
         )
-        self._scene: EndoscopeScene | None = None
+        self._events = self._pictures
+        if kinds and params.looks == "endoscope":
+            said = "from when and why looks are plain"
+            self._events += (event_out("status", DiagnosticStatus, said),)
+        self._said: DiagnosticStatus | None = None
+        """To be published with the next step."""
+        self._scene: EndoscopeScene | SceneApart | None = None
         self._truth: CameraTruth | None = None
         self._drawing = Drawing("", "")
         self._entered: set[str] = set()
@@ -83,12 +89,12 @@ class Endoscope(Stepped):
         positions = "joint positions of the scene, as the mujoco engine publishes them"
         nodes = "positions of the nodes of a soft body; the first message brings its surface"
         shown = "all markers to draw, as a participant of kind `markers` publishes them"
-        qpos = signal_in("qpos", description=positions, size=self._positions.size)
+        qpos = signal_in("qpos", description=positions, size=self._seen.positions.size)
         changed = "difference of the surface from that of the first message; may be left unconnected"
         wet = "liquid on the surface; may be left unconnected"
         bodies = (
             port
-            for organ in self._bodies
+            for organ in self._seen.bodies
             for port in (
                 signal_in(f"{organ}/nodes", SoftBodyState, nodes, frame="world"),
                 signal_in(f"{organ}/surface", SurfaceChange, changed, frame="world", start=()),
@@ -96,7 +102,7 @@ class Endoscope(Stepped):
             )
         )
         markers = signal_in("markers", ShownMarkers, shown, frame="world")
-        return (qpos, *bodies, *((markers,) if self.params.markers else ()), *self._pictures)
+        return (qpos, *bodies, *((markers,) if self.params.markers else ()), *self._events)
 
     def configure(self, setup: Setup) -> Outputs:
         """Build the scene, unless soft bodies are missing from it.
@@ -104,7 +110,7 @@ class Endoscope(Stepped):
         Without OpenGL it logs one warning and publishes no pictures; without Filament it logs one and draws
         plain looks.
         """
-        for organ, body in self._bodies.items():
+        for organ, body in self._seen.bodies.items():
             body.may_change = f"{organ}/surface" in setup.connected
             body.may_be_wet = body.may_change and f"{organ}/film" in setup.connected
         if not self._pictures:
@@ -119,58 +125,87 @@ class Endoscope(Stepped):
         opengl.import_mujoco()
         self._drawing = find_drawing(self.params.looks)
         if self._drawing.shortcoming:
-            _log.warning("participant '%s' %s", self.name, self._drawing.shortcoming)
+            self._say(self._drawing.shortcoming)
         elif self.params.truth and not opengl.find().name:
             _log.warning(
                 "participant '%s' publishes no truth: no OpenGL works here. To fix it: %s",
                 self.name,
                 opengl.REMEDY,
             )
-        if self._drawing.engine and not self._bodies:
-            self._build_scene()
+        if not self._seen.bodies:
+            self._build_scene("from the start")
         return self._outputs({})
 
-    def _build_scene(self) -> EndoscopeScene:
-        from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
+    def _say(self, text: str) -> None:
+        """Log and publish what is not as asked; `text`: the end of a sentence about this participant."""
+        _log.warning("participant '%s' %s", self.name, text)
+        self._said = DiagnosticStatus(level=_WARNING, name=self.name, message=text)
 
-        self._scene = EndoscopeScene(self.params, self._drawing.engine, self._bodies)
-        if self.params.truth and opengl.find().name:
+    def _build_scene(self, since: str) -> None:
+        """Prepare to draw, if anything draws; `since`: from when, for a sentence."""
+        if self._scene is None and isinstance(self._drawing.engine, Backend):
+            try:
+                self._scene = SceneApart(self.params, self._drawing.engine, self._seen)
+                opengl.find()  # while the other process prepares: plain looks take over at once if it ends
+                self._scene.wait()
+            except DrawingLostError as error:
+                self._take_plain(since, error)
+        if self._scene is None and isinstance(self._drawing.engine, str) and self._drawing.engine:
+            from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
+
+            self._scene = EndoscopeScene(self.params, self._drawing.engine, self._seen.bodies)
+        if self._truth is None and self._scene and self.params.truth and opengl.find().name:
             from engines.mujoco.truth.camera_truth import CameraTruth
 
-            self._truth = CameraTruth(self.params, self._bodies)
-        return self._scene
+            self._truth = CameraTruth(self.params, self._seen.bodies)
+
+    def _take_plain(self, since: str, error: DrawingLostError) -> None:
+        """Draw plain looks from now on, as the process that drew has ended."""
+        self._scene, self._drawing = None, find_drawing("plain")
+        instead = self._drawing.shortcoming or "draws plain looks"
+        self._say(f"{instead} {since}: the process that drew endoscope looks {error}")
+
+    def _draw(self, t: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]] | None:
+        """Return both pictures of the newest state; None: nothing draws."""
+        since = f"from {t * 1e-9:.3f} s on"
+        self._build_scene(since)
+        if isinstance(self._scene, SceneApart):
+            try:
+                return self._scene.draw(t)
+            except DrawingLostError as error:
+                self._take_plain(since, error)
+                self._build_scene(since)
+        if self._scene is None or isinstance(self._scene, SceneApart):
+            return None
+        return self._scene.draw(self._seen.positions, self._seen.markers, t)
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Draw the state at `t`.
 
         Raises SessionError if a soft body is not what it was, or its surface unknown.
         """
-        self._positions[:] = inputs["qpos"]
-        for organ, body in self._bodies.items():
-            change = inputs.message(f"{organ}/surface") if body.may_change else None
-            film = inputs.message(f"{organ}/film") if body.may_be_wet else None
-            body.accept(inputs.message(f"{organ}/nodes"), change, film)
-        if self.params.markers:
-            self._shown = cast("ShownMarkers | None", inputs.message("markers"))
-        if not self._drawing.engine:
-            return self._outputs({})
-        scene = self._scene or self._build_scene()
-        header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
-        markers = () if self._shown is None else tuple(shown_markers(self._shown))
-        pictures = scene.draw(self._positions, markers, t)
-        self._warn_inside(scene.lens, t)
-        messages = {
-            f"{eye}/{name}": message
-            for eye, pixels in zip(EYES, pictures, strict=True)
-            for name, message in self._messages(eye, pixels, header)
-        }
-        if self._truth is not None:
-            messages |= dict(self._truth.messages(self._positions, header))
+        self._seen.accept(inputs)
+        messages = dict(self._drawn(t)) if self._drawing.engine else {}
+        if self._said is not None:
+            messages["status"], self._said = self._said, None
         return self._outputs(messages)
+
+    def _drawn(self, t: int) -> Iterator[tuple[str, Message]]:
+        """Yield what is published of the newest state, by port."""
+        pictures = self._draw(t)
+        if pictures is None or self._scene is None:
+            return
+        header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
+        self._warn_inside(self._scene.lens, t)
+        for eye, pixels in zip(EYES, pictures, strict=True):
+            for name, message in self._messages(eye, pixels, header):
+                yield f"{eye}/{name}", message
+        if self._truth is not None:
+            yield from self._truth.messages(self._seen.positions, header)
 
     def _warn_inside(self, lens: Vector, t: int) -> None:
         """Log a warning, once for each soft body, if the cameras are inside; `lens`: shape (3,), m."""
-        for organ in enclosing_bodies(lens, self._bodies):
+        for organ in enclosing_bodies(lens, self._seen.bodies):
             if organ not in self._entered:
                 self._entered.add(organ)
                 _log.warning(
@@ -203,7 +238,7 @@ class Endoscope(Stepped):
             )
 
     def _outputs(self, messages: Mapping[str, Message]) -> Outputs:
-        names = (port.name for port in self._pictures)
+        names = (port.name for port in self._events)
         return {name: (messages[name],) if name in messages else () for name in names}
 
     def _compress_picture(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -224,35 +259,16 @@ class Endoscope(Stepped):
 
     def save(self) -> bytes:
         """Return the positions last drawn, the state of the soft bodies, and the markers."""
-        bodies = b"".join(body.save() for body in self._bodies.values())
-        markers = b"" if self._shown is None else encode(self._shown)
-        return self._positions.tobytes() + bodies + markers
+        return self._seen.save()
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if it does not fit this scene."""
-        size, rest = self._positions.nbytes, state[self._positions.nbytes :]
-        for body in self._bodies.values():
-            rest = body.restore(rest)
-        shown = None
-        if self.params.markers and rest:
-            shown, rest = self._restored_markers(rest), b""
-        if len(state) < size or rest:
-            raise StateError(
-                f"participant '{self.name}': a saved state of {len(state)} bytes does not fit; was it saved"
-                " by another scene?"
-            )
-        self._positions[:] = np.frombuffer(state, np.float64, self._positions.size)
-        self._shown = shown
-        if self._bodies:
-            self.close()  # their surfaces may be others
-
-    def _restored_markers(self, state: bytes) -> ShownMarkers:
         try:
-            return decode(ShownMarkers, state)
-        except MessageError as error:
-            raise StateError(
-                f"participant '{self.name}': a saved state with markers that cannot be read: {error}"
-            ) from error
+            self._seen.restore(state)
+        except StateError as error:
+            raise StateError(f"participant '{self.name}': {error}") from error
+        if self._seen.bodies:
+            self.close()  # their surfaces may be others
 
     def close(self) -> None:
         """Free the OpenGL contexts."""
