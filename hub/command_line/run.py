@@ -9,13 +9,14 @@ from typing import Annotated, Literal
 import typer
 
 from hub.command_line.display import RunProgress, console
+from hub.command_line.last_runs import remember_run
 from hub.command_line.open_page import page_of_this_process
 from hub.command_line.options import Certificates, Json, Overrides, ScenarioName, with_places
 from hub.command_line.record_option import Overwrite, RecordTo, delete_earlier, recording_directory
 from hub.command_line.run_summary import show_summary
 from hub.command_line.scenarios import print_scenarios
 from hub.observation.summary import Summary
-from hub.planning.scenario_file import load
+from hub.planning.scenario_file import installed_scenarios, load
 from hub.session.launch import launch
 from hub.transport.loopback_port import listening_ports
 
@@ -87,6 +88,7 @@ def run(
         print_scenarios()
         return
     name = Path(scenario).stem
+    as_installed = scenario in installed_scenarios() and not (overrides or one_host or profile)
     directory = recording_directory(record, name, overwrite=overwrite)
     pace = pace or ("realtime" if programs else None)
     file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())], programs=programs)
@@ -106,6 +108,8 @@ def run(
         with page_of_this_process() if open_page or (led and open_page is None) else nullcontext():
             with RunProgress(session.scenario, name) as progress:
                 summary = session.run(progress)
+            if as_installed:
+                remember_run(name, summary)
             show_summary(
                 name, summary, again=f"trocar run {scenario}", everything=everything, as_json=as_json
             )

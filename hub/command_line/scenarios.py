@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.text import Text
 
 from hub.command_line.display import results, show_commands
+from hub.command_line.last_runs import last_wall_times
 from hub.planning import registry
 from hub.planning.scenario_file import ScenarioFile, installed_scenarios, load, scenario_families
 from hub.planning.scenario_source import Source, read
@@ -22,12 +23,17 @@ from schemas.keys import valid_session_name
 __all__ = ["list_scenarios", "new", "print_scenarios"]
 
 _SCHEMA = "scenario.schema.json"
+_LONG, _HERE = 13, 8
+"""Width of the column with times, and its growth where wall times are known."""
 _LEADS = 17
 """Width of the column with the kinds that lead, so that 80 columns have room for what happens."""
 
 
 def list_scenarios() -> None:
-    """List the installed scenarios by family: what happens, what leads it, how long it takes."""
+    """List the installed scenarios by family: what happens, what leads it, how long it takes.
+
+    A scenario that you have run on this machine has the wall time of its last run in brackets.
+    """
     print_scenarios()
 
 
@@ -35,17 +41,23 @@ def print_scenarios() -> None:
     """Print the installed scenarios by family, and what to do with one."""
     installed = installed_scenarios()
     width = max(map(len, installed)) + 1
+    here = last_wall_times()
+    long_width = _LONG + (_HERE if here else 0)
     for family, names in scenario_families().items():
         results.print(f"[bold]{escape(family)}[/]")
         for name in names:
             what, leads, long = _columns(read(installed[name]))
-            start = f"  {name:{width}}{long:13}"
+            taken = f" ({here[name]:.0f} s)" if name in here else ""
+            start = f"  {name:{width}}{long + taken:{long_width}}"
             if not results.is_terminal:  # a file has any width
                 results.print(Text(f"{start}{leads:29}{what}"), soft_wrap=True)
                 continue
             leads = leads if len(leads) < _LEADS else f"{leads[: _LEADS - 2]}…"
             results.print(Text(f"{start}{leads:{_LEADS}}{what}"), no_wrap=True, overflow="ellipsis")
         results.print()
+    also = "; in brackets: wall time of your last run on this machine" if here else ""
+    results.print(f"Times are simulated{also}.", soft_wrap=True)
+    results.print()
     show_commands(
         [
             ("trocar run NAME --open", "run one, and watch it in the browser"),

@@ -3,9 +3,11 @@
 import sys
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from hub.command_line.last_runs import last_wall_times, remember_run
 from hub.planning.scenario_file import installed_scenarios, load, scenario_families
 from hub.planning.scenario_source import read
 from hub.recording.file_hashes import file_hashes
@@ -25,8 +27,31 @@ def test_every_installed_scenario_is_in_one_family():
     assert sorted(chain.from_iterable(scenario_families().values())) == sorted(installed_scenarios())
 
 
+@pytest.fixture
+def no_runs_yet(monkeypatch, tmp_path):
+    for place in ("XDG_CONFIG_HOME", "APPDATA"):
+        monkeypatch.setenv(place, str(tmp_path))
+
+
 @pytest.mark.long
-def test_they_are_listed_a_line_each(trocar):
+def test_a_listed_scenario_has_the_wall_time_of_its_last_whole_run(trocar, no_runs_yet):
+    for state, wall_s in (("done", 31.4), ("stopped", 2.0)):
+        remember_run("palpation", SimpleNamespace(state=state, ending=None, wall_time_s=wall_s))
+    out = trocar("list")[1]
+    line = next(line for line in out.splitlines() if line.startswith("  palpation "))
+    assert "20 s (31 s)" in line
+    assert "in brackets: wall time of your last run" in out
+
+
+def test_a_file_of_last_runs_that_is_no_such_file_is_left_alone(no_runs_yet, tmp_path):
+    assert last_wall_times() == {}
+    (tmp_path / "trocar").mkdir()
+    (tmp_path / "trocar" / "last_runs.json").write_text("{")
+    assert last_wall_times() == {}
+
+
+@pytest.mark.long
+def test_they_are_listed_a_line_each(trocar, no_runs_yet):
     code, out, err = trocar("list")
     assert (code, err) == (0, "")
     lines = {line.split()[0]: line for line in out.splitlines() if line.startswith("  ")}
