@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import tan
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from engines.mujoco.markers.solids import Solid
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
+from engines.mujoco.pictures.filament.ambient import add_ambient
 from engines.mujoco.pictures.filament.backend import Backend
 from engines.mujoco.pictures.filament.drawn_body import DrawnBody
 from engines.mujoco.pictures.filament.drawn_geoms import DrawnGeoms
@@ -40,13 +40,19 @@ _BACKGROUND = (0.42, 0.45, 0.48)
 """Colour where nothing is: an even room."""
 _TRIES = 6
 """Most pictures until the light of the first one is right."""
-_AMBIENT: Mapping[str, tuple[float, tuple[float, float, float]]] = {
-    "abdomen": (9_000.0, (1.0, 0.76, 0.67)),
-    "subhepatic": (6_000.0, (1.0, 0.82, 0.74)),
-    "dry-lab": (7_000.0, (0.92, 0.96, 1.0)),
-    "none": (9_000.0, (1.0, 1.0, 1.0)),
+_WHITE = 1.0, 1.0, 1.0
+_WARM, _COLD = (1.25, 0.88, 0.79), (0.91, 1.035, 1.07)
+"""Colour of light from all sides where tissue is all around, and factors of the lamp, so that both together
+are nearly white: light that tissue has scattered is redder, so what turns away from the lamp, or lies in a
+shadow, is warm.
+"""
+_AMBIENT: Mapping[str, tuple[float, tuple[float, float, float], tuple[float, float, float]]] = {
+    "abdomen": (9_000.0, _WARM, _COLD),
+    "subhepatic": (6_000.0, _WARM, _COLD),
+    "dry-lab": (7_000.0, _WHITE, _WHITE),
+    "none": (9_000.0, _WHITE, _WHITE),
 }
-"""Light from all sides by place, lux and colour: tissue reflects the lamp, a room has lamps of its own."""
+"""Light from all sides by place: lux, its colour, and factors of the colour of the lamp."""
 
 
 class FilamentRenderer:
@@ -100,13 +106,12 @@ class FilamentRenderer:
         pixels = _ROOM_SHADOW_PIXELS if is_room else _SHADOW_PIXELS
         if params.shadows is False:
             pixels = 0
+        self._brightness, colour, factors = _AMBIENT[params.surroundings]
+        lamp_colour = variation.lamp_colour * factors
         # shadows of two lamps would cost a fifth of a picture more
-        self._lamp = Lamp(self._context, self._scene, 0 if is_room else pixels, variation.lamp_colour)
-        self._room_lamp = (
-            RoomLamp(self._context, self._scene, pixels, variation.lamp_colour) if is_room else None
-        )
-        self._brightness, colour = _AMBIENT[params.surroundings]
-        self._ambient = _add_ambient(self._context, self._scene, self._brightness, colour)
+        self._lamp = Lamp(self._context, self._scene, 0 if is_room else pixels, lamp_colour)
+        self._room_lamp = RoomLamp(self._context, self._scene, pixels, lamp_colour) if is_room else None
+        self._ambient = add_ambient(self._context, self._scene, self._brightness, colour)
         recipes = body_recipes(skins, {name: body.rest for name, body in bodies.items()})
         self._bodies = [
             DrawnBody(
@@ -214,26 +219,3 @@ class FilamentRenderer:
         # the newest attribute first and the context last: what is in a context must not outlive it
         while self.__dict__:
             self.__dict__.popitem()
-
-
-def _add_ambient(
-    context: mjrf.Context, scene: mjrf.Scene, brightness: float, colour: tuple[float, float, float]
-) -> tuple[mjrf.Texture, mjrf.Light]:
-    """Add light from all sides, and what metal reflects: the environment that MuJoCo's Studio brings."""
-    file = (Path(mujoco.__file__).parent / "studio" / "assets" / "ibl.ktx").read_bytes()
-    texture = context.create_texture(
-        mjrf.TextureConfig(
-            width=len(file),
-            height=0,
-            format=mjrf.PixelFormat.PIXEL_FORMAT_KTX,
-            sampler_type=mjrf.SamplerType.TEXTURE_CUBE,
-        )
-    )
-    data = mjrf.TextureData()
-    data.set_image(file)
-    texture.upload(data)
-    light = context.create_light(
-        mjrf.LightParams(type=mjrf.LightType.LIGHT_IMAGE, texture=texture, intensity=brightness, color=colour)
-    )
-    scene.add_light(light)
-    return texture, light
