@@ -636,6 +636,8 @@ def test_keys_move_slowly_with_shift_and_are_marked_while_they_are_held(person):
         "gripper": 1,
         "dead_man": True,
         "jaw": False,
+        "pedal": False,
+        "rinse": False,
     }
     assert one.page.evaluate(held) == ["w", "space", "v"]
     one.page.keyboard.down("Shift")
