@@ -1,48 +1,49 @@
-"""Felt force of a hand that leads from a page: the force on the instrument under the hand's lead."""
+"""Force felt by a hand that leads from a page: on the instrument led, or on the hand that holds a master."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
-from schemas.scenario import Scenario
+from schemas.scenario import Connection, Scenario
+from webconsole.led_hands import led_hands
 
 __all__ = ["felt_wrenches"]
 
-_WRENCH = "/tip_wrench"
-_KIND = "browser"
+_WRENCHES = ("/tip_wrench", "/hand_cf")
+"""Ends of the names: on an instrument, and on a hand that holds a master."""
 
 
 def felt_wrenches(scenario: Scenario, numbers: Collection[str]) -> dict[str, tuple[str, ...]]:
-    """Return the outlets of the wrenches (N, N m) on the moved instruments, by device led from pages.
+    """Return the outlets of the wrenches (N, N m) on what each hand led from pages moves, by the hand.
 
-    `numbers`: the numeric outlets. Connections are followed from the device to the robot; where the ports
-    name an arm, only the instrument of this arm is meant.
+    `numbers`: the numeric outlets. Connections are followed from the hand to the robot; where the ports name
+    an arm, only this arm is meant.
     """
-    wrenches = {name for name in numbers if name.endswith(_WRENCH)}
-    arms = {name.partition(".")[2].removesuffix(_WRENCH) for name in wrenches}
-    led = [name for name, spec in scenario.participants.items() if spec.kind == _KIND]
-    return {device: found for device in led if (found := _find_wrenches(scenario, device, wrenches, arms))}
+    wrenches = {name for name in numbers if name.endswith(_WRENCHES)}
+    arms = {name.partition(".")[2].rpartition("/")[0] for name in wrenches}
+    found = {
+        hand.name: _find_wrenches(scenario, hand.connections(scenario), wrenches, arms)
+        for hand in led_hands(scenario)
+    }
+    return {name: felt for name, felt in found.items() if felt}
 
 
 def _find_wrenches(
-    scenario: Scenario, device: str, wrenches: Collection[str], arms: Collection[str]
+    scenario: Scenario, first: Iterable[Connection], wrenches: Collection[str], arms: Collection[str]
 ) -> tuple[str, ...]:
-    waiting, found = deque([(device, "")]), set[str]()
-    seen = {*waiting}
+    waiting, found = deque((connection, "") for connection in first), set[str]()
+    seen = set[tuple[str, str]]()
     while waiting:
-        participant, arm = waiting.popleft()
-        wrench = f"{participant}.{arm}{_WRENCH}"
-        if wrench in wrenches:
-            found.add(wrench)  # what the robot publishes goes back to who moves it
+        connection, before = waiting.popleft()
+        named = connection.target.port.partition("/")[0]
+        arm = named if named in arms else before
+        participant = connection.target.participant
+        if (before and arm != before) or (participant, arm) in seen:
             continue
-        for connection in scenario.connections:
-            named = connection.target.port.partition("/")[0]
-            of = named if named in arms else arm
-            if connection.source.participant != participant or (arm and of != arm):
-                continue
-            reached = connection.target.participant, of
-            if reached not in seen:
-                seen.add(reached)
-                waiting.append(reached)
+        seen.add((participant, arm))
+        felt = {f"{participant}.{arm}{end}" for end in _WRENCHES} & {*wrenches}
+        found |= felt
+        if not felt:  # what the robot publishes goes back to who moves it
+            waiting += ((one, arm) for one in scenario.connections if one.source.participant == participant)
     return tuple(sorted(found))

@@ -8,11 +8,12 @@ from typing import NamedTuple
 from schemas.codec import decode
 from schemas.ros import BoolMessage, StringMessage
 from schemas.scenario import Scenario
+from webconsole.led_hands import led_hands
 from webconsole.source import Value
 
 __all__ = ["Follower", "find_followers", "find_pedals"]
 
-_KIND = "browser"
+_FOLLOWING = "following"
 _PEDALS = {"energy": "pedal", "suction": "pedal", "irrigation": "rinse"}
 """Buttons of a hand by the outputs of its follower."""
 
@@ -25,7 +26,7 @@ class Follower(NamedTuple):
     @property
     def following(self) -> str:
         """The outlet that says whether the arm follows the hand."""
-        return f"{self.participant}.following"
+        return f"{self.participant}.{_FOLLOWING}"
 
     @property
     def warning(self) -> str:
@@ -50,14 +51,21 @@ class Follower(NamedTuple):
 
 
 def find_followers(scenario: Scenario, outlets: Collection[str]) -> dict[str, list[Follower]]:
-    """Return the followers of each device led from pages, with both outlets among `outlets`."""
-    found: dict[str, list[Follower]] = {
-        name: [] for name, spec in scenario.participants.items() if spec.kind == _KIND
-    }
-    for connection in scenario.connections:
-        follower, device = Follower(connection.target.participant), connection.source.participant
-        if device in found and follower not in found[device] and {*follower.outlets} <= {*outlets}:
-            found[device].append(follower)
+    """Return the followers of each hand led from pages, with both outlets among `outlets`.
+
+    Where a page's hand holds a master, the follower is the one of the master.
+    """
+    found: dict[str, list[Follower]] = {}
+    for hand in led_hands(scenario):
+        led = {connection.target.participant for connection in hand.connections(scenario)}
+        heard = (one for one in scenario.connections if one.target.participant in led)
+        followers = [
+            *sorted(led),
+            *(one.source.participant for one in heard if one.target.port == _FOLLOWING),
+        ]
+        found[hand.name] = [
+            one for one in map(Follower, dict.fromkeys(followers)) if {*one.outlets} <= {*outlets}
+        ]
     return found
 
 

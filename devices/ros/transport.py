@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
+from time import monotonic
 from typing import Protocol
 
 from devices.ros.topics.row import Row
@@ -79,7 +80,7 @@ class Transport(ABC):
     changed: Callable[[], None] = staticmethod(lambda: None)
     """Is called, in any thread, when a publisher has become `wanted` or is so no longer, and by newcomers."""
     joined_s = -inf
-    """When the last program joined the graph, by the monotonic clock (s), where the middleware knows."""
+    """When the last program joined the graph, by the monotonic clock (s)."""
     endpoint = ""
     """Where programs reach the graph, in words: a master, a domain."""
 
@@ -107,6 +108,11 @@ class Transport(ABC):
 
         Called once a second: must be cheap.
         """
+
+    def note_newcomer(self) -> None:
+        """Note that a program joins; may be called from any thread."""
+        self.joined_s = monotonic()
+        self.changed()
 
     def announce_ready(self) -> None:  # noqa: B027 - a middleware may have no use for it
         """Note that all rows are advertised, subscribed to or served."""

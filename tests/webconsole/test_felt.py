@@ -38,3 +38,12 @@ def test_two_hands_feel_an_arm_each():
         }
     )
     assert felt_wrenches(scenario, WRENCHES) == {"right": (WRENCHES[0],), "left": (WRENCHES[1],)}
+
+
+def test_a_pair_of_hands_on_masters_feels_each_master():
+    pair = ["participants.lead={kind: browser-pair, host: remote}"]
+    felt = ("robot.MTML/hand_cf", "robot.MTMR/hand_cf", "robot.PSM1/tip_wrench")
+    assert felt_wrenches(load("system", pair).scenario, felt) == {
+        "lead/right": (felt[1],),
+        "lead/left": (felt[0],),
+    }

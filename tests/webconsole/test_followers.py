@@ -21,6 +21,15 @@ def test_it_is_the_controller_that_the_hand_is_connected_to():
     assert find_followers(load("palpation", []).scenario, TELEOP.outlets) == {}
 
 
+def test_of_a_hand_on_a_master_it_is_the_follower_of_the_master():
+    scenario = load("system", ["participants.lead={kind: browser-pair, host: remote}"]).scenario
+    right, left = Follower("right"), Follower("left")
+    assert find_followers(scenario, [*right.outlets, *left.outlets, "right_hand.warning"]) == {
+        "lead/right": [right],
+        "lead/left": [left],
+    }
+
+
 def test_pedals_are_those_that_do_something_at_the_led_instruments():
     followers = {"left": [TELEOP, Follower("other")], "right": [Follower("other")]}
     assert find_pedals(followers, ["teleop.energy", "teleop.irrigation", "other.suction", "energy"]) == {

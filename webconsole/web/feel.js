@@ -16,11 +16,16 @@ export class Feel {
 
   take(device, force) { this.forces.set(device, { force, at: performance.now() }) }
 
+  // In N; 0 where nothing touches, or nothing is known any more.
+  force(device) {
+    const { force, at } = this.forces.get(device) ?? { force: 0, at: 0 }
+    return force >= LEAST_N && performance.now() - at <= SILENCE_MS ? force : 0
+  }
+
   // From 0 to 1.
   strength(device) {
-    const { force, at } = this.forces.get(device) ?? { force: 0, at: 0 }
-    if (!(force >= LEAST_N) || performance.now() - at > SILENCE_MS) return 0
-    return WEAKEST + (1 - WEAKEST) * Math.min(force / FULL_N, 1)
+    const force = this.force(device)
+    return force && WEAKEST + (1 - WEAKEST) * Math.min(force / FULL_N, 1)
   }
 
   // Let the hand that leads a device feel it; `held`: whether its dead-man is.

@@ -230,7 +230,9 @@ export class Pilot {
   mark() {
     const dead = document.getElementById("dead-man")
     if (!dead) return
-    const why = this.hindrance(), text = why ? `holding: ${why}` : "moving: dead-man held"
+    const why = this.hindrance(), force = this.feel.force(this.device)
+    const felt = force ? `, ${force.toFixed(1)} N` : ""
+    const text = why ? `holding: ${why}` : `moving: dead-man held${felt}`
     if (dead.textContent !== text) dead.textContent = text
     dead.classList.toggle("held", !why)
     document.getElementById("pad")?.classList.toggle("held", this.dragging)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from time import monotonic
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
@@ -73,7 +72,7 @@ class DdsTransport(Transport):
         self._participant = DomainParticipant(number, Qos(Policy.Userdata(b"enclave=/;")))
         self._guid = self._participant.guid.bytes
         services.ignore(self._guid)
-        services.joined = self._note_newcomer
+        services.joined = self.note_newcomer
         self._waitset = ReaderWaitSet(self._participant, "DDS discovery")
         self._discovery = Discovery(self._participant, self._waitset, lambda: self.changed())
         self._topics: set[str] = set()
@@ -121,10 +120,6 @@ class DdsTransport(Transport):
             # deletes it now, with all its entities, and not with the last reference to one of them
             self._participant.__del__()
             del self._domain
-
-    def _note_newcomer(self) -> None:
-        self.joined_s = monotonic()
-        self.changed()
 
     def _writer(
         self, topic: str, type_: type[Payload], quality: Qos, ros_type: str = ""

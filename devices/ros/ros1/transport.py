@@ -153,6 +153,7 @@ class Ros1Transport(Transport):
             return ApiResult(0, f"'{self._node}' does not publish '{topic}'", 0)
         if ["TCPROS"] not in [protocol[:1] for protocol in protocols]:
             return ApiResult(0, f"'{self._node}' supports TCPROS only", 0)
+        self.note_newcomer()  # it may read a state as soon as it has connected
         return success(["TCPROS", self._host, self._listener.port])
 
     def _shut_down(self, caller: str, reason: str = "") -> ApiResult:

@@ -43,16 +43,17 @@ class Graph:
         self._left: deque[bytes] = deque(maxlen=_LEFT)
         """Hashes of the removed tokens of publishers."""
 
-    def add(self, key: str) -> None:
-        """Add the token with this key."""
+    def add(self, key: str) -> bool:
+        """Add the token with this key; return whether it is the first of a program."""
         token = GraphToken.parse_token(key)
         if token is None or token.session == self._own:
-            return
+            return False
         with self._changing:
             self._tokens[key] = token
-            if token.session not in self._names:
+            if is_new := token.session not in self._names:
                 taken = token.node in self._names.values()
                 self._names[token.session] = f"{token.node} ({token.session})" if taken else token.node
+            return is_new
 
     def remove(self, key: str) -> None:
         """Remove the token with this key."""

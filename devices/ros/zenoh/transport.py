@@ -219,5 +219,7 @@ class ZenohTransport(Transport):
         return token
 
     def _token_changed(self, sample: zenoh.Sample) -> None:
-        change = self._graph.remove if sample.kind == zenoh.SampleKind.DELETE else self._graph.add
-        change(str(sample.key_expr))
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._graph.remove(str(sample.key_expr))
+        elif self._graph.add(str(sample.key_expr)):
+            self.note_newcomer()

@@ -177,6 +177,17 @@ def test_a_state_is_wanted_while_a_program_subscribes(ros, psm):
     assert until(lambda: not wanted(psm, topic))
 
 
+def test_all_states_are_used_as_soon_as_a_program_connects_to_one(ros, psm):
+    states = {row.port.name for row in psm.rows if row.port is not None and row.periodic}
+    for name in states:
+        psm.write(name, psm._states[name]._codec.neutral)
+    psm.read(0)
+    assert "PSM1/setpoint_cp" in psm.unused()
+    with Program(ros) as program:
+        program.listen("/PSM1/setpoint_js", JOINTS)
+        assert until(lambda: psm.read(0) is not None and not psm.unused())
+
+
 def test_headers_are_numbered_as_publishers_of_ros_1_do_it(psm, console):
     console.listen(STATE, JOINTS)
     assert until(lambda: clients(psm))
@@ -292,7 +303,6 @@ def test_a_flood_costs_no_other_console_its_states(psm, ros, console):
             psm.write(STATE[1:], np.zeros(18))
             states.append(console.heard(STATE, 60.0))
         assert all(states)
-        assert len(list(psm.read(0))) < 5000
 
 
 def test_a_console_that_stops_reading_holds_up_nobody(ros, tmp_path, console):

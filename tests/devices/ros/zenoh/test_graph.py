@@ -37,6 +37,14 @@ def test_programs_are_known_by_the_topics_they_publish_or_subscribe_to():
     assert it.clients({COMMAND, STATE}) == (Client("/console", ONE),)
 
 
+def test_the_first_token_of_a_program_makes_it_a_newcomer():
+    it = graph(node(OURS, "/dvrk"))
+    assert it.add(node(ONE))
+    assert not it.add(entity(ONE, STATE))
+    assert not it.add(entity(OURS, STATE))
+    assert it.add(entity(OTHER, STATE))
+
+
 def test_two_programs_of_one_name_have_different_ones():
     it = graph(node(ONE), entity(ONE, STATE), node(OTHER), entity(OTHER, STATE))
     assert [client.name for client in it.clients({STATE})] == ["/console", "/console (cccc)"]
