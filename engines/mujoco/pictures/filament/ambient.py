@@ -9,6 +9,8 @@ from pathlib import Path
 import mujoco
 from mujoco import mjrf
 
+from engines.mujoco.pictures.filament.upload import hold
+
 __all__ = ["add_ambient", "tinted_environment"]
 
 _HARMONICS = re.compile(rb"sh\0[-0-9. \n]+")
@@ -36,6 +38,7 @@ def add_ambient(
     data = mjrf.TextureData()
     data.set_image(file)
     texture.upload(data)
+    hold(context, data)
     light = context.create_light(
         mjrf.LightParams(type=mjrf.LightType.LIGHT_IMAGE, texture=texture, intensity=brightness)
     )

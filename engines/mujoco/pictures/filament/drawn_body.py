@@ -171,7 +171,7 @@ class _Skin:
     def __init__(
         self, context: mjrf.Context, mesh: SkinMesh, frames: TangentFrames, kinds: NDArray[np.uint8]
     ) -> None:
-        self._mesh, self._frames, self.kinds = mesh, frames, kinds
+        self._context, self._mesh, self._frames, self.kinds = context, mesh, frames, kinds
         self.faces = frames.faces.astype(np.uint32)
         self._layout = vertex_layout(len(frames.source), self.faces.size)
         self.drawn = context.create_mesh(self._layout)
@@ -179,7 +179,7 @@ class _Skin:
     def write(self, nodes: Vector) -> NDArray[np.float32]:
         """Move the vertices to where `nodes`, shape (n, 3), m, put them; return them, shape (v, 9)."""
         vertices = self._frames.vertices(self._mesh.vertices(nodes))
-        write_mesh(self.drawn, self._layout, vertices, self.faces)
+        write_mesh(self._context, self.drawn, self._layout, vertices, self.faces)
         return vertices
 
     def spread(self, values: NDArray[Any]) -> Vector:

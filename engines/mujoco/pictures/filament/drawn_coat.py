@@ -24,7 +24,7 @@ class DrawnCoat:
         roughness: float,
     ) -> None:
         """Prepare a coat for `faces`, drawn vertices of shape (m, 3)."""
-        self._scene, self._faces, self._roughness = scene, faces, roughness
+        self._context, self._scene, self._faces, self._roughness = context, scene, faces, roughness
         self._layout = vertex_layout(int(faces.max()) + 1, faces.size)
         self._mesh = context.create_mesh(self._layout)
         self._texture = make_texture(context, texture, mjrf.ColorSpace.COLORSPACE_SRGB)
@@ -55,7 +55,8 @@ class DrawnCoat:
         coat[:, :3] += lift[:, None] * _normals(vertices[:, 3:7])
         coat[:, 7:] = uv
         # an upload has as many faces as its mesh: bare ones shrink to a point
-        write_mesh(self._mesh, self._layout, coat, self._faces * is_coated[:, None].astype(np.uint32))
+        faces = self._faces * is_coated[:, None].astype(np.uint32)
+        write_mesh(self._context, self._mesh, self._layout, coat, faces)
         if not self._is_shown:
             self._renderable.set_mesh(self._mesh, 0, self._faces.size)
             self._renderable.set_material(

@@ -60,5 +60,5 @@ def _upload(context: mjrf.Context, model: mujoco.MjModel, mesh: int, tile: float
     frames.set_uv((np.einsum("nj,nij->ni", vertices[frames.source], axes) / tile).astype(np.float32))
     layout = vertex_layout(len(frames.source), frames.faces.size)
     drawn = context.create_mesh(layout)
-    write_mesh(drawn, layout, frames.vertices(vertices), frames.faces.astype(np.uint32))
+    write_mesh(context, drawn, layout, frames.vertices(vertices), frames.faces.astype(np.uint32))
     return drawn

@@ -56,7 +56,8 @@ def _add(
     frames.set_uv(part.uv[frames.source])
     layout = vertex_layout(len(frames.source), frames.faces.size)
     mesh = context.create_mesh(layout)
-    write_mesh(mesh, layout, frames.vertices(part.vertices), frames.faces.astype(np.uint32), behind)
+    vertices = frames.vertices(part.vertices)
+    write_mesh(context, mesh, layout, vertices, frames.faces.astype(np.uint32), behind)
     renderable = context.create_renderable(
         mjrf.RenderableParams(cast_shadow=False, receive_shadow=part.is_shaded)
     )

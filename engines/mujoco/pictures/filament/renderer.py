@@ -21,6 +21,7 @@ from engines.mujoco.pictures.filament.drawn_solids import DrawnSolids
 from engines.mujoco.pictures.filament.focus import Focus
 from engines.mujoco.pictures.filament.lamp import Lamp, RoomLamp
 from engines.mujoco.pictures.filament.light_control import LightControl
+from engines.mujoco.pictures.filament.upload import take_held
 from engines.mujoco.pictures.skin_params import body_recipes
 from engines.mujoco.pictures.soft_body import SoftBody
 from engines.mujoco.pictures.variation import Variation
@@ -183,6 +184,8 @@ class FilamentRenderer:
         left, right = self._pixels[:, :width, :3], self._pixels[:, width:, :3]
         for _ in range(1 if self._control is None or self._is_lit else _TRIES):
             self._context.wait_for_frame(self._context.render(requests, [self._read]))
+            for uploaded in take_held(self._context):
+                uploaded.free()
             if self._control is None or not self._adjust_light(self._control, left):
                 break
         self._is_lit = True
@@ -216,6 +219,9 @@ class FilamentRenderer:
 
     def close(self) -> None:
         """Free everything in the renderer's memory. May be called twice."""
+        held = take_held(self._context) if self.__dict__ else ()
         # the newest attribute first and the context last: what is in a context must not outlive it
         while self.__dict__:
             self.__dict__.popitem()
+        for data in held:  # of a scene that was never drawn
+            data.free()

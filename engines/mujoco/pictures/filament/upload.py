@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,22 @@ from numpy.typing import NDArray
 from engines.mujoco.textures.surface import Maps, Pixels
 from schemas.vectors import Vector
 
-__all__ = ["Textures", "make_texture", "vertex_layout", "write_mesh"]
+__all__ = ["Textures", "hold", "make_texture", "take_held", "vertex_layout", "write_mesh"]
+
+_held: dict[int, list[mjrf.TextureData | mjrf.MeshData]] = {}
+"""Data on their way into the memory of a renderer, by its context. The renderer reads them until the next
+picture is drawn, and does not free them: without that each picture of a liver would keep 0.2 MB for ever.
+"""
+
+
+def hold(context: mjrf.Context, data: mjrf.TextureData | mjrf.MeshData) -> None:
+    """Keep data until `take_held`."""
+    _held.setdefault(id(context), []).append(data)
+
+
+def take_held(context: mjrf.Context) -> Sequence[mjrf.TextureData | mjrf.MeshData]:
+    """Return all data that were held, to be freed once a picture has been drawn, or the context is gone."""
+    return _held.pop(id(context), ())
 
 
 class Textures(NamedTuple):
@@ -58,6 +74,7 @@ def make_texture(context: mjrf.Context, pixels: Pixels, space: mjrf.ColorSpace) 
     data = mjrf.TextureData()
     data.set_image(pixels.tobytes())
     texture.upload(data)
+    hold(context, data)
     return texture
 
 
@@ -85,6 +102,7 @@ def vertex_layout(vertices: int, indices: int) -> mjrf.MeshConfig:
 
 
 def write_mesh(
+    context: mjrf.Context,
     mesh: mjrf.Mesh,
     layout: mjrf.MeshConfig,
     vertices: NDArray[np.float32],
@@ -94,6 +112,7 @@ def write_mesh(
     """Upload a mesh.
 
     Args:
+        context: of the mesh.
         mesh: to be written.
         layout: of the mesh.
         vertices: position, quaternion of the tangent frame, uv, shape (n, 9).
@@ -110,3 +129,4 @@ def write_mesh(
     data.set_vertices(layout, vertices.tobytes())
     data.set_indices(layout, faces.tobytes())
     mesh.upload(data)
+    hold(context, data)

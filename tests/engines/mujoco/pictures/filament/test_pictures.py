@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator
 
 import numpy as np
@@ -96,6 +97,40 @@ def test_pictures_of_tissue(shown: Shown) -> None:
     assert left[1] > 2.0 * right[1]
     dry = shown.draw(parted, np.zeros(len(parted), np.int64))
     assert dry[HEIGHT // 2, -WIDTH // 8, 1] > 2.0 * right[1]
+
+
+class Allocated(ctypes.Structure):
+    """`struct mallinfo2` of glibc (mallinfo(3))."""
+
+    _fields_ = [
+        (name, ctypes.c_size_t)
+        for name in [
+            "arena",
+            "ordblks",
+            "smblks",
+            "hblks",
+            "hblkhd",
+            "usmblks",
+            "fsmblks",
+            "uordblks",
+            "fordblks",
+            "keepcost",
+        ]
+    ]
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="no glibc")
+def test_a_picture_keeps_no_memory(shown: Shown) -> None:
+    count = ctypes.CDLL(None).mallinfo2
+    count.restype = Allocated
+    nodes = shown.block.part(0.0)
+    taken: list[int] = []
+    for pictures in (3, 10):
+        for _ in range(pictures):
+            shown.draw(nodes)
+        taken.append(count().uordblks + count().hblkhd)
+    assert taken[1] - taken[0] < 10 * 4 * nodes.nbytes // 3
 
 
 @pytest.mark.long
