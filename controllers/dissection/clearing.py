@@ -49,6 +49,8 @@ class Clearing(Lifting):
     def may_burn(self) -> bool:
         """Whether the bare end is far enough from organs to be spared."""
         spared = self.seen.spared
+        if self.state.clears:
+            spared = np.concatenate([spared, self.seen.organs])
         return not len(spared) or bool(np.linalg.norm(spared - self.hook.bare_end, axis=1).min() > _SPARED)
 
     @property

@@ -9,11 +9,11 @@ import numpy as np
 from controllers.cholecystectomy.approach import withdraw
 from controllers.cholecystectomy.obstacles import Obstacles
 from controllers.cholecystectomy.surgeon_hand import SurgeonHand
-from controllers.dissection.clearing import Clearing
 from controllers.dissection.hook_hand import HookHand
 from controllers.dissection.params import DissectionParams
 from controllers.dissection.sight import Sight
 from controllers.dissection.step import Failure, Step
+from controllers.dissection.stripping import Stripping
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -41,7 +41,7 @@ _RAISED, _TUCKED = 4.5e-3, 1.5e-3
 """Way of the hook when it lifts fat, along the normal and farther below the fat, m."""
 
 
-class Dissector(Clearing):
+class Dissector(Stripping):
     """Grasps and lifts the gallbladder, and burns what ties it to the liver."""
 
     def __init__(self, params: DissectionParams, hook: HookHand, grasper: SurgeonHand) -> None:
@@ -60,11 +60,17 @@ class Dissector(Clearing):
             Step.RAISE: self._raise,
             Step.BURN: self._burn,
             Step.LEAVE: self._leave,
+            Step.AIM_FOLD: self.aim_fold,
+            Step.HOVER_FOLD: self.hover_fold,
+            Step.REACH_FOLD: self.reach_fold,
+            Step.PINCH: self.pinch,
+            Step.STRIP: self.strip,
+            Step.RELEASE_FOLD: self.release_fold,
         }
 
     def settles(self, hand: SurgeonHand) -> bool:
         """Whether the measured error of a hand is corrected at the end of its line."""
-        grasps = self.state.step in (Step.HOVER_GRASP, Step.REACH_GRASP)
+        grasps = self.state.step in (Step.HOVER_GRASP, Step.REACH_GRASP, Step.HOVER_FOLD, Step.REACH_FOLD)
         return grasps if hand is self.grasper else self.state.step in (Step.HOVER, Step.REACH, Step.BURN)
 
     def begin(self) -> None:
@@ -129,7 +135,10 @@ class Dissector(Clearing):
             return
         if not self.state.ahead.any():
             self.find_work()
-        self.aim_grasp()
+        if self.state.clears and not self.state.stripped:
+            self.enter(Step.AIM_FOLD)
+        else:
+            self.aim_grasp()
 
     def _lift(self) -> None:
         if self.hook.has_arrived and self.pull():

@@ -54,6 +54,12 @@ class DissectionState(Record):
     """Whether fat is cleared; else the plate is freed."""
     whole = number()
     """Area where fat was tied at the beginning, m^2."""
+    stripped = flag()
+    """Whether the grasper has stripped off what it could."""
+    folds = integer()
+    """Folds of fat that the grasper has closed on."""
+    over = array(3)
+    """Direction from a fold over what is tied."""
     inside = flag()
     """Whether the hook is in the tissue."""
     bed = array(3)

@@ -35,7 +35,7 @@ class DissectionParams(RoutineParams):
     spare: tuple[Name, ...] = Field(
         default=("common_bile_duct", "hepatic_artery"),
         max_length=16,
-        description="organs near which the hook pulls without power",
+        description="organs near which the hook pulls without power, and the grasper takes no fat",
     )
     part: Literal["all", "lower third"] = Field(
         default="all",

@@ -89,6 +89,11 @@ class Sight:
         return Obstacles.join([Obstacles.points(own, np.zeros(len(own))) for own in nodes])
 
     @property
+    def organs(self) -> Vector:
+        """Nodes of the organs that the shaft of the hook keeps away from, m, shape (n, 3)."""
+        return np.concatenate([np.zeros((0, 3)), *map(self._nodes, self._params.avoid)])
+
+    @property
     def is_held(self) -> bool:
         """Whether the grasper holds tissue."""
         return float(self._inputs[f"{self._params.grasper}/held"][0]) > 0.0

@@ -28,6 +28,13 @@ class Step(IntEnum):
     LEAVE = 10
     DONE = 11
     FAILED = 12
+    AIM_FOLD = 13
+    """The grasper strips fat off first: the next fold is chosen."""
+    HOVER_FOLD = 14
+    REACH_FOLD = 15
+    PINCH = 16
+    STRIP = 17
+    RELEASE_FOLD = 18
 
 
 class Failure(IntEnum):

@@ -154,7 +154,9 @@ def test_the_hook_keeps_clear_of_what_lies_in_its_way():
 
 @pytest.mark.long
 def test_fat_is_lifted_without_power_then_burnt_and_the_lower_third_follows():
-    world = Triangle().run(120.0)
+    world = Triangle("attempts=1")
+    world.firm[:] = True
+    world.run(120.0)
     assert world.state.done
     assert len(world.fat) <= 2
     assert world.routine.ended == "cystic_plate is free (lower third), after 0 recoveries"
@@ -169,8 +171,8 @@ def test_fat_is_lifted_without_power_then_burnt_and_the_lower_third_follows():
 
 
 def test_weak_fat_comes_off_without_power():
-    world = Triangle()
-    world.weak[:] = True
+    world = Triangle("attempts=1")
+    world.firm[:] = world.weak[:] = True
     while world.state.clears or world.state.step < Step.PLAN:
         world.step()
     assert not world.burns
@@ -180,6 +182,7 @@ def test_weak_fat_comes_off_without_power():
 @pytest.mark.long
 def test_fat_beside_the_common_duct_is_not_burnt_and_given_up():
     world = Triangle("attempts=1")
+    world.firm[:] = True
     world.common_duct += [-0.009, 0.0, 0.012]
     world.run(120.0)
     assert world.state.failure is Failure.NOT_PARTED
@@ -187,8 +190,19 @@ def test_fat_beside_the_common_duct_is_not_burnt_and_given_up():
     assert (duct > 0.006).all()
 
 
+def test_fat_is_stripped_by_folds_without_power_before_anything_is_held():
+    world = Triangle()
+    while Step.LIFT not in world.steps:
+        world.step()
+    assert len(world.fat) <= 2
+    assert 0 < world.folds <= 4
+    assert not any(world.powers)
+    assert world.steps[1:5] == [Step.HOVER_FOLD, Step.REACH_FOLD, Step.PINCH, Step.STRIP]
+
+
 def test_the_gallbladder_is_grasped_beside_the_fat():
     world = Triangle()
+    world.firm[:] = True
     while not world.state.grasped:
         world.step()
     tip = world.tip("PSM2")
@@ -197,7 +211,8 @@ def test_the_gallbladder_is_grasped_beside_the_fat():
 
 
 def test_fat_that_hangs_loose_below_is_not_what_the_hook_lifts():
-    world = Triangle()
+    world = Triangle("attempts=1")
+    world.firm[:] = True
     world.sheet = np.concatenate([world.sheet, world.sheet - [0.0, 0.0, 0.025]])
     while world.state.step is not Step.RAISE:
         world.step()

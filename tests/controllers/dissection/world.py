@@ -3,6 +3,7 @@
 import numpy as np
 
 from controllers.dissection.controller import Dissection
+from controllers.dissection.step import Step
 from hub.participant import Inputs, Setup
 from hub.planning.scenario_file import load
 from robots.dvrk.inverse import inverse
@@ -162,6 +163,12 @@ class Triangle(World):
         """Ties of the fat that neither pull nor heat parts."""
         self.weak = np.zeros(len(self.fat), np.bool_)
         """Ties of the fat that part when they are lifted."""
+        self.firm = np.zeros(len(self.fat), np.bool_)
+        """Ties of the fat that the grasper does not strip."""
+        self.fold = None
+        """Place where the grasper holds a fold, m."""
+        self.folds = 0
+        """How many folds have been held."""
         self.lifted_from = np.full(len(self.fat), np.nan)
         self.burns = []
         """Places of the hook with power at the fat, m."""
@@ -176,8 +183,29 @@ class Triangle(World):
             for organ, points in nodes.items()
         }
 
+    def _grasp(self, closes):
+        if self.state.step is not Step.PINCH and self.fold is None:
+            super()._grasp(closes)
+            return
+        tip = self.tip("PSM2")
+        ends = tip[:3, 3] + self.hands["PSM2"].jaw.length * tip[:3, 2]
+        self.held = bool(closes and np.linalg.norm(self.sheet - ends, axis=1).min() < 5e-3)
+        self.fold, self.grip = ends if self.held else None, tip[:3, 3]
+        self.folds += self.held
+
+    def _strip(self):
+        if self.fold is not None and np.linalg.norm(self.tip("PSM2")[:3, 3] - self.grip) > 8e-3:
+            self._keep((np.linalg.norm(self.fat - self.fold, axis=1) > 13e-3) | self.firm)
+
+    def _keep(self, kept):
+        self.fat, self.glued, self.weak, self.firm = (
+            one[kept] for one in (self.fat, self.glued, self.weak, self.firm)
+        )
+        self.lifted_from = self.lifted_from[kept]
+
     def _burn(self, power):
         super()._burn(power)
+        self._strip()
         end = self.hands["PSM1"].bare_end
         near = np.linalg.norm(self.fat - end, axis=1) < 0.012
         self.lifted_from[near] = np.fmin(self.lifted_from, end[2])[near]
@@ -187,6 +215,4 @@ class Triangle(World):
             self.delivered += 0.5 * power * PERIOD * 1e-9
             self.burns.append(end.copy())
             burnt = near & (np.linalg.norm(self.fat - end, axis=1) < 0.010)
-        kept = ~((lifted | burnt) & ~self.glued)
-        self.fat, self.glued, self.weak = self.fat[kept], self.glued[kept], self.weak[kept]
-        self.lifted_from = self.lifted_from[kept]
+        self._keep(~((lifted | burnt) & ~self.glued))
