@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-import trocar
+import trocar.sessions  # before numpy: state hashes are those of `trocar run`
 from anatomy.params import AnatomyParams
 from schemas.ros import StringMessage
 from schemas.trocar_msgs import TissueEvent
