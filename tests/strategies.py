@@ -6,7 +6,7 @@ import math
 from typing import Any, get_args, get_origin
 
 import numpy as np
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
@@ -65,8 +65,11 @@ def _field(model: type[Message], ros_type: str, name: str) -> st.SearchStrategy[
 
 MODELS = [model for _, model in sorted(message_types().items())]
 """All types of messages. A test of each of them draws one message of a type after the other."""
-of_each_type = settings(max_examples=settings().max_examples // 4)
-"""Number of examples of such a test: each example has a message of every type."""
+of_each_type = settings(
+    max_examples=settings().max_examples // 4,
+    suppress_health_check=[*settings().suppress_health_check, HealthCheck.data_too_large],
+)
+"""Number of examples of such a test: each is large, as it has a message of every type."""
 
 _unit_quaternions = (
     vectors(4)

@@ -65,4 +65,4 @@ def test_events_of_tissue_are_summed_by_kind():
 
     cut, burnt = tissue_figures(Changed({"tissue.liver/events": Events()}))
     assert (cut.title, cut.caption) == ("tissue.liver: cut", "5 mm² cut, 2 times.")
-    assert (burnt.title, burnt.caption) == ("tissue.liver: burnt", "1 mm³ burnt, 1 times.")
+    assert (burnt.title, burnt.caption) == ("tissue.liver: burnt", "1 mm³ burnt, 1 time.")
