@@ -126,7 +126,7 @@ def test_documents_have_the_fields_of_dvrk_data(session: Path) -> None:
     tags = document(session / "session_tags.json")
     assert fits(tags, TAGS)
     assert tags["type"] == "dvrk_data:session_tags@1.0.0"
-    assert tags["stages"][0]["name"] == "pick_and_place"
+    assert tags["stages"][0]["name"] == "pick-and-place"
 
 
 @pytest.mark.long
