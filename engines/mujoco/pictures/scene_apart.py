@@ -20,6 +20,7 @@ from engines.mujoco.pictures.drawing_frames import read_frame, write_frame
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.filament.backend import Backend
 from engines.mujoco.pictures.seen_state import SeenState
+from schemas.errors import TrocarError
 from schemas.vectors import Vector
 
 __all__ = ["DrawingLostError", "SceneApart"]
@@ -31,7 +32,7 @@ _LONGEST = 300
 """Characters of what a driver says last."""
 
 
-class DrawingLostError(Exception):
+class DrawingLostError(TrocarError):
     """The process that draws has ended; the text is the end of a sentence about its end."""
 
 
@@ -152,8 +153,12 @@ _idle: dict[int, _Process] = {}
 
 
 def _take_idle() -> _Process | None:
+    """Return the process that waits, if it has not ended meanwhile."""
     process = _idle.pop(os.getpid(), None)
-    return process if process is not None and process.is_free else None
+    if process is None or process.is_free:
+        return process
+    process.close()
+    return None
 
 
 def _leave_idle(process: _Process) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures import opengl, scene_apart
 from engines.mujoco.pictures.filament import backend
 from hub.observation.summary import Progress, Summary
 from hub.planning.scenario_file import load
@@ -113,3 +113,13 @@ def test_in_real_time_as_well(tmp_path: Path) -> None:
         run(tmp_path, *changes, progress=end_when_said)
     (status,) = Recording(tmp_path / "recording").messages(STATUS)
     assert "was killed by SIGKILL" in decode(DiagnosticStatus, status.payload).message
+
+
+def test_a_process_that_ended_while_it_waited_for_a_scene_is_closed() -> None:
+    scene_apart._end_idle()
+    process = scene_apart._Process()
+    scene_apart._leave_idle(process)
+    os.kill(process.pid, signal.SIGKILL)
+    process._process.wait()
+    assert scene_apart._take_idle() is None
+    assert process._errors.closed
