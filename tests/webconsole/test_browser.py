@@ -618,7 +618,8 @@ def test_keys_move_slowly_with_shift_and_are_marked_while_they_are_held(person):
         """async () => {
           const { Pilot } = await import("/web/pilot.js"), panel = document.getElementById("lead")
           window.sent = []
-          const pilot = new Pilot(panel, { send: (one) => sent.push(one) }, { pulse() {}, force() { return 0 } })
+          const feel = { pulse() {}, force() { return 0 } }
+          const pilot = new Pilot(panel, { send: (one) => sent.push(one) }, feel)
           pilot.show([{ device: "hand", pilot: "you" }], "operator", "running")
         }"""
     )
