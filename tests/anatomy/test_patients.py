@@ -128,7 +128,9 @@ def check_organs(given):
         assert organs[name].solid.longest_step > 25e-6
     for name, attachment in given.attachments.items():
         one, other = (organs[organ] for organ in attachment.organs)
-        chosen = given.organs[one.name].surface(AnchorParams(surface=attachment.surface))
+        chosen = np.ones(len(one.mesh.nodes), dtype=np.bool_)
+        if attachment.surface is not None:
+            chosen = given.organs[one.name].surface(AnchorParams(surface=attachment.surface))
         ties = find_ties(one, other, chosen, attachment.within)
         assert len(ties.areas) >= LEAST_TIES.get(name, 25)
     for name in ("cystic_duct", "cystic_artery"):
