@@ -88,9 +88,9 @@ def run(
         print_scenarios()
         return
     name = Path(scenario).stem
-    as_installed = scenario in installed_scenarios() and not (overrides or one_host or profile)
     directory = recording_directory(record, name, overwrite=overwrite)
     pace = pace or ("realtime" if programs else None)
+    as_installed = scenario in installed_scenarios() and not (overrides or pace or one_host or profile)
     file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())], programs=programs)
     inside, outside = listening_ports(listen or ())
     with with_places(file.source):
