@@ -51,9 +51,14 @@ class Gamepad:
                 self._button_pair(pygame.CONTROLLER_BUTTON_DPAD_UP, pygame.CONTROLLER_BUTTON_DPAD_DOWN),
             ),
             angular=(
-                -self._axis_share(pygame.CONTROLLER_AXIS_RIGHTY),
-                self._axis_share(pygame.CONTROLLER_AXIS_RIGHTX),
+                0.0,
+                0.0,
                 self._button_pair(pygame.CONTROLLER_BUTTON_DPAD_RIGHT, pygame.CONTROLLER_BUTTON_DPAD_LEFT),
+            ),
+            turn=(
+                0.0,
+                self._axis_share(pygame.CONTROLLER_AXIS_RIGHTY),
+                -self._axis_share(pygame.CONTROLLER_AXIS_RIGHTX),
             ),
             gripper=max(0.0, self._axis_share(pygame.CONTROLLER_AXIS_TRIGGERLEFT)) - close,
             dead_man=bool(self._pad.get_button(pygame.CONTROLLER_BUTTON_LEFTSHOULDER)),

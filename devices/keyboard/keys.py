@@ -15,10 +15,10 @@ KEYS: dict[str, tuple[str, Wish]] = {
     "d": ("right", Wish(linear=(0.0, -1.0, 0.0))),
     "r": ("up", Wish(linear=(0.0, 0.0, 1.0))),
     "f": ("down", Wish(linear=(0.0, 0.0, -1.0))),
-    "up": ("point up", Wish(angular=(1.0, 0.0, 0.0))),
-    "down": ("point down", Wish(angular=(-1.0, 0.0, 0.0))),
-    "left": ("point left", Wish(angular=(0.0, -1.0, 0.0))),
-    "right": ("point right", Wish(angular=(0.0, 1.0, 0.0))),
+    "up": ("point up", Wish(turn=(0.0, -1.0, 0.0))),
+    "down": ("point down", Wish(turn=(0.0, 1.0, 0.0))),
+    "left": ("point left", Wish(turn=(0.0, 0.0, 1.0))),
+    "right": ("point right", Wish(turn=(0.0, 0.0, -1.0))),
     "q": ("roll left", Wish(angular=(0.0, 0.0, -1.0))),
     "e": ("roll right", Wish(angular=(0.0, 0.0, 1.0))),
     "space": ("button 0, the dead-man", Wish(dead_man=True)),
@@ -27,7 +27,10 @@ KEYS: dict[str, tuple[str, Wish]] = {
     "x": ("button 2, power or suction", Wish(pedal=True)),
     "z": ("button 3, saline", Wish(rinse=True)),
 }
-"""Meaning in words and command of each key, by the key's name in pygame."""
+"""Meaning in words and command of each key, by the key's name in pygame.
+
+Keys that point turn about the axes of the base frame, so that up stays up however the stylus is rolled.
+"""
 
 
 def wish_of(pressed: Collection[str]) -> Wish:

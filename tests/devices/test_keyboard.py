@@ -313,6 +313,24 @@ def test_the_twist_is_the_rate_of_the_pose():
     )
 
 
+@pytest.mark.parametrize(
+    ("key", "axis"), [("up", [0, -1, 0]), ("down", [0, 1, 0]), ("left", [0, 0, 1]), ("right", [0, 0, -1])]
+)
+def test_a_rolled_stylus_points_where_the_key_says(key, axis):
+    stylus = VirtualStylus(0.1, 1.0)
+    for wish in ("q", "up", "left"):
+        stylus.advance(wish_of([wish]), 0.7)
+    stylus.advance(wish_of([key]), 0.1)
+    assert np.allclose(stylus.twist[1], axis)
+
+
+def test_a_roll_turns_about_the_point_of_the_stylus():
+    stylus = VirtualStylus(0.1, 1.0)
+    stylus.advance(wish_of(["left"]), np.pi / 2)
+    stylus.advance(wish_of(["e"]), 0.1)
+    assert np.allclose(stylus.twist[1], [0, 1, 0])
+
+
 def test_every_key_is_known_to_pygame():
     desk = Desk()
     desk.read()  # key names need the display

@@ -7,8 +7,8 @@ const KEYS = {
   w: ["ahead", { linear: [1, 0, 0] }], s: ["back", { linear: [-1, 0, 0] }],
   a: ["left", { linear: [0, 1, 0] }], d: ["right", { linear: [0, -1, 0] }],
   r: ["up", { linear: [0, 0, 1] }], f: ["down", { linear: [0, 0, -1] }],
-  arrowup: ["point up", { angular: [1, 0, 0] }], arrowdown: ["point down", { angular: [-1, 0, 0] }],
-  arrowleft: ["point left", { angular: [0, -1, 0] }], arrowright: ["point right", { angular: [0, 1, 0] }],
+  arrowup: ["point up", { turn: [0, -1, 0] }], arrowdown: ["point down", { turn: [0, 1, 0] }],
+  arrowleft: ["point left", { turn: [0, 0, 1] }], arrowright: ["point right", { turn: [0, 0, -1] }],
   q: ["roll left", { angular: [0, 0, -1] }], e: ["roll right", { angular: [0, 0, 1] }],
   " ": ["hold to move", { dead_man: true }], shift: ["slowly", {}],
   c: ["close", { gripper: -1, jaw: true }], v: ["open", { gripper: 1 }],
@@ -260,7 +260,8 @@ function gamepad({ axes, buttons }) {
   const button = (i) => buttons[i]?.value ?? 0
   return {
     linear: [-axis(1), -axis(0), button(12) - button(13)],
-    angular: [-axis(3), axis(2), button(15) - button(14)],
+    angular: [0, 0, button(15) - button(14)],
+    turn: [0, axis(3), -axis(2)],
     gripper: button(6) - button(7), dead_man: button(4) > 0.5, jaw: button(7) > 0,
     pedal: button(5) > 0.5, rinse: button(0) > 0.5,
   }
