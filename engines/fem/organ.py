@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from math import sqrt
 from typing import Any
@@ -102,17 +102,21 @@ class Organ:
         """Faces with a free node, shape (f, 3)."""
         self.events = TissueEvents()
         self._edges = NO_EDGES
-        self._reach = float(np.linalg.norm(np.ptp(self.mesh.nodes, axis=0)))
+        self.reach = float(np.linalg.norm(np.ptp(self.mesh.nodes, axis=0)))
+        """Diagonal of the organ, m."""
+        self._farthest = (_FOLDED if divisible else 1.0) * self.reach
+        """Displacement of an unstable organ, m."""
         self._slowest = params.frequencies[1]
         if self._slowest is not None:
             self._slowest /= sqrt(params.inertia)
         if self._slowest is None and is_carried:
-            self._slowest = _slowest_on_a_bed(material, self._reach)
+            self._slowest = _slowest_on_a_bed(material, self.reach)
         self._presses = self._free = np.ones(0, np.uint8)
         self.mesh_version = 0
         """Count of the changes of the mesh."""
         self._loose = np.array([self._loose_share()])
         self.nodes: Vector = self.mesh.nodes
+        self._carried: Callable[[], NDArray[np.integer]] = self._held_now
 
     @property
     def anchored(self) -> NDArray[np.bool_]:
@@ -212,10 +216,10 @@ class Organ:
         """Read the nodes. Raises SessionError if the tissue has become unstable by `time_ns`."""
         self.nodes = self.solid.nodes
         moved = self._largest_move()
-        if self.solid.divisible and moved >= self._reach:
+        if self.solid.divisible and moved >= self.reach:
             self._drop_loose_pieces()
             moved = self._largest_move()
-        if not moved < (_FOLDED if self.solid.divisible else 1.0) * self._reach:
+        if not moved < self._farthest:
             raise SessionError(
                 f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from"
                 f" its place. {self._likely_cause(moved)}"
@@ -246,11 +250,10 @@ class Organ:
         return float(moves.max()) if moves.size else 0.0
 
     def _drop_loose_pieces(self) -> None:
-        """Take away loose pieces that have fallen farther than the organ is large."""
-        far = np.abs(self.solid.displacement[:, :3]).max(axis=1) >= self._reach
+        """Take away pieces that nothing carries and that have fallen farther than the organ is large."""
+        far = np.abs(self.solid.displacement[:, :3]).max(axis=1) >= self.reach
         pieces = self.solid.pieces
-        tied = self._pieces_with(self.anchored | self.held, pieces)
-        fallen = np.setdiff1d(self._pieces_with(far, pieces), [-1, *tied])
+        fallen = np.setdiff1d(self._pieces_with(far, pieces), [-1, *self._carried()])
         elements = np.flatnonzero(np.isin(pieces, fallen))
         if elements.size:
             warn_once(
@@ -258,6 +261,24 @@ class Organ:
                 " those that follow"
             )
             self.remove(elements)
+
+    def hang(self, carried: Callable[[], NDArray[np.integer]], reach: float) -> None:
+        """Be tied to other organs.
+
+        Args:
+            carried: returns the pieces of this organ that something carries, through whole ties too.
+            reach: size of the largest organ that this one may be carried along by, m.
+        """
+        self._carried = carried
+        self._farthest = max(self._farthest, _FOLDED * reach)
+
+    def held_pieces(self, pieces: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return which of the pieces, by element, are anchored or grasped, shape (n,)."""
+        found = self._pieces_with(self.anchored | self.held, pieces)
+        return found[found >= 0]
+
+    def _held_now(self) -> NDArray[np.int32]:
+        return self.held_pieces(self.solid.pieces)
 
     def _pieces_with(self, nodes: NDArray[np.bool_], pieces: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the pieces with any of these nodes, shape (n,)."""

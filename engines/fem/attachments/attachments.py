@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.fem.attachments.carried import carried_pieces
 from engines.fem.attachments.conduction import conduct
 from engines.fem.attachments.params import AttachmentParams
 from engines.fem.attachments.ties import find_ties
@@ -15,6 +17,7 @@ from engines.fem.heat.heat import Heat
 from engines.fem.heat.tissue import BODY
 from engines.fem.organ import Organ
 from engines.fem.spheres import Spheres
+from engines.tissue.meshing.tet_mesh import Indices
 from engines.tissue.organs.anchors import AnchorParams
 from engines.tissue.organs.params import OrganParams
 from hub.participant import Value, signal_out
@@ -123,6 +126,8 @@ class Attachments:
         """Mean force on the first organ in the last step, N, shape (t, 3)."""
         self._known: NDArray[np.bool_] = np.isinf(self.widest)
         """Ties whose parting has been noted, shape (t,)."""
+        for i, organ in enumerate(organs):
+            organ.hang(partial(self._carried, i), max(one.reach for one in organs))
         self._edges: Edges | None = None
         self._before: Vector = np.zeros((0, 2, 3))
 
@@ -190,6 +195,19 @@ class Attachments:
         """Go back to saved openings."""
         self.widest[:] = widest
         self._known[:] = np.isinf(widest)
+
+    def _carried(self, number: int) -> Indices:
+        """Return the pieces of an organ that something carries."""
+        ends = np.stack([self._one, self._element, self._other, self._owners()], axis=1)
+        return carried_pieces(self._organs, ends[~np.isinf(self.widest)])[number]
+
+    def _owners(self) -> NDArray[np.int32]:
+        """Return the element of the second organ at each tie, shape (t,)."""
+        found = np.zeros(len(self.widest), np.int32)
+        for i, organ in enumerate(self._organs):
+            its = self._other == i
+            found[its] = organ.solid.owners[self._slot[its]]
+        return found
 
     def _note(self, parted: NDArray[np.bool_], why: str, spheres: Callable[[], NDArray[np.integer]]) -> None:
         """Part these ties, if they are whole; say so for each pair of organs, by the nearest of the spheres.

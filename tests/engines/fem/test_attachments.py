@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from engines.fem.attachments.carried import carried_pieces
 from engines.fem.engine import FemEngine
 from engines.fem.params import FemParams
 from hub.participant import Inputs
@@ -122,6 +123,29 @@ def test_a_flap_that_has_come_off_lies_on_the_bed_again():
         gap = rig.flap.nodes[:, 2].min() - 0.0
         assert -0.2e-3 < gap < 0.2e-3
         assert rig.freed == pytest.approx(AREA, rel=1e-6)
+
+
+def test_an_organ_that_hangs_on_a_held_one_is_carried_far_and_falls_once_it_is_off():
+    cutting = {"cutting": {}}
+    with PlateRig(gravity=0.0, bed=cutting | {"anchors": []}, flap=cutting) as rig:
+        rig.take()
+        rig.move(rig.at + 600 * UP, 0.72)
+        bed = rig.engine._organs[0]
+        assert bed.solid.displacement[:, 2].min() > bed.reach
+        assert (bed.solid.pieces >= 0).all()
+        assert rig.freed == 0.0
+        rig.ties.widest[:] = np.inf
+        rig.hold(0.05)
+        assert (bed.solid.pieces < 0).all()
+
+
+def test_a_chain_of_organs_is_carried_by_its_only_anchor():
+    with PlateRig(bed={"cutting": {}}, flap={"cutting": {}}) as rig:
+        bed, flap = rig.engine._organs
+        chain, none = np.array([[1, 0, 0, 0]]), np.zeros((0, 4), np.int64)
+        assert [list(one) for one in carried_pieces([bed, flap], chain)] == [[0], [0]]
+        assert [list(one) for one in carried_pieces([bed, flap], none)] == [[0], []]
+        assert [list(one) for one in carried_pieces([flap, bed, flap], chain)] == [[0], [0], []]
 
 
 def test_a_blade_between_the_organs_cuts_the_ties_that_it_passes():
