@@ -157,7 +157,7 @@ export class Timeline {
     const act = { " ": () => this.toggle(), "[": () => this.jump(-1), "]": () => this.jump(1) }[event.key]
     if (!act) return
     event.preventDefault()
-    act()
+    if (!(event.repeat && event.key === " ")) act() // space is still held after a lead that was lost
   }
 
   marks() {
