@@ -118,24 +118,28 @@ def _row(name: str, file: Path) -> dict[str, Any]:
 def numbers_of(recorded: Recorded) -> dict[str, Any]:
     """Return the result of a recorded session: sentence, success, and numbers with units; ready for JSON.
 
-    Raises RecordingError.
+    A number without a value has a `reason`. Raises RecordingError.
     """
     recording = recorded.recording
     scenario, state, file = recording.scenario(), recorded.state, recording.file
     measures = recorded_measures(recording)
-    results = measures.results()
+    results, missing = measures.results(), measures.missing()
     scores = {name: score_numbers(card) for name, card in measures.score_cards.items()}
     found = verdict(scenario, results, scores)
-    numbers: list[tuple[str, float | None, str]] = [
-        ("duration", state["end"] - state["start"], "s"),
-        ("late steps", state["late"], ""),
-        *((name, value, scenario.measure[name].si_unit) for name, value in results.items()),
+    numbers: list[tuple[str, float | None, str, str]] = [
+        ("duration", state["end"] - state["start"], "s", ""),
+        ("late steps", state["late"], "", ""),
+        *(
+            (name, value, scenario.measure[name].si_unit, missing.get(name, ""))
+            for name, value in results.items()
+        ),
     ]
     for card in scores.values():
-        numbers.append(("goals reached", card["reached"], f"of {card['goals']}"))
+        numbers.append(("goals reached", card["reached"], f"of {card['goals']}", ""))
         for group, values in {"": card["metrics"], **card["rules"]}.items():
             numbers += [
-                (f"{group} {name}".strip(), one["value"], one["unit"]) for name, one in values.items()
+                (f"{group} {name}".strip(), one["value"], one["unit"], one.get("reason", ""))
+                for name, one in values.items()
             ]
     return {
         "name": file.parent.name if _is_in_bag(file) else file.name,
@@ -143,6 +147,7 @@ def numbers_of(recorded: Recorded) -> dict[str, Any]:
         "succeeded": found.succeeded,
         "state": state["state"],
         "numbers": [
-            {"name": label(name, unit), "value": value, "unit": unit} for name, value, unit in numbers
+            {"name": label(name, unit), "value": value, "unit": unit, "reason": reason}
+            for name, value, unit, reason in numbers
         ],
     }

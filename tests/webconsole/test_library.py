@@ -26,6 +26,7 @@ participants:
   robot: {kind: mujoco, looks: false}
 measure:
   least_height_m: {kind: least, of: robot.PSM1/measured_cp.position.z, unit: m}
+  later_m: {kind: least, of: robot.PSM1/measured_cp.position.z, unit: m, after: 9 s}
 outcome: {text: "the tip went down to {least_height_m}", success: {least_height_m: {most: 1}}}
 """
 
@@ -76,10 +77,14 @@ def test_the_result_is_that_of_the_run(server, home):
     assert (status, result["succeeded"]) == (200, True)
     assert result["text"].startswith("the tip went down to ")
     summary = trocar.run(home / "short.yaml", one_host=True)
-    (value,) = (one["value"] for one in result["numbers"] if one["name"] == "least height")
+    numbers = {one["name"]: one for one in result["numbers"]}
+    value = numbers["least height"]["value"]
+    assert (numbers["later"]["value"], numbers["least height"]["reason"]) == (None, "")
+    assert numbers["later"]["reason"] == "'robot.PSM1/measured_cp.position.z' published no value after 9 s"
     assert value == summary.measures["least_height_m"]
     assert recorded_measures(Recorded(home / "recordings" / "short-1").recording).results() == {
-        "least_height_m": value
+        "least_height_m": value,
+        "later_m": None,
     }
 
 

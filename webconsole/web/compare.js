@@ -9,6 +9,7 @@ import { short } from "./plots.js"
 import { make } from "./started.js"
 
 const GHOST = 0x2f7dd1, OPACITY = 0.4
+const ABSENT = "not in this recording"
 
 export class Comparison {
   // `dirty`: is called when the scene has changed; `said`: with what cannot be shown.
@@ -115,21 +116,25 @@ function differences(a, b) {
   const head = table.createTHead().insertRow()
   for (const text of ["", a.name, b.name, "difference"]) head.append(make("th", { scope: "col", textContent: text }))
   for (const [at, { numbers }] of [a, b].entries()) {
-    for (const { name, value, unit } of numbers) {
-      if (!rows.has(name)) rows.set(name, { unit, values: [null, null] })
-      rows.get(name).values[at] = value
+    for (const { name, value, unit, reason } of numbers) {
+      if (!rows.has(name)) rows.set(name, { unit, values: [null, null], reasons: [ABSENT, ABSENT] })
+      const row = rows.get(name)
+      row.values[at] = value
+      row.reasons[at] = reason
     }
   }
   const body = table.createTBody(), said = [a, b].map(outcome)
   if (said.some(Boolean)) body.append(make("tr", {}, ...["outcome", ...said, ""].map((text) => make("td", {}, text))))
   const both = ({ values }) => values.every((value) => value != null)
-  for (const [name, { unit, values: [first, second] }] of [...rows].sort(([, a], [, b]) => both(b) - both(a))) {
+  for (const [name, { unit, values: [first, second], reasons }] of [...rows].sort(([, a], [, b]) => both(b) - both(a))) {
     if (first == null && second == null) continue
     const apart = first == null || second == null ? null : second - first
     const row = body.insertRow()
     row.insertCell().textContent = unit ? `${name} (${unit})` : name
-    for (const value of [first, second]) row.insertCell().textContent = value == null ? "–" : short(value)
-    row.insertCell().textContent = apart == null ? "–" : apart === 0 ? "0" : `${apart > 0 ? "+" : "−"}${short(Math.abs(apart))}`
+    for (const [at, value] of [first, second].entries()) {
+      row.append(make("td", { className: value == null ? "why" : "", textContent: value == null ? reasons[at] || "no value" : short(value) }))
+    }
+    row.insertCell().textContent = apart == null ? "" : apart === 0 ? "0" : `${apart > 0 ? "+" : "−"}${short(Math.abs(apart))}`
   }
   return table
 }
