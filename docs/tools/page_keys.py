@@ -1,4 +1,4 @@
-"""Make docs/pictures/gallery/page-keys.webp: keys of the page lead an arm of `browser`, which presses a kidney.
+"""Make docs/pictures/gallery/page-keys.webp: keys of the page lead an arm of `browser` that presses a kidney.
 
 python docs/tools/page_keys.py   (needs trocar[all,test] and Debian's chromium; takes about three minutes)
 
@@ -21,12 +21,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 OUTPUT = Path(__file__).parents[1] / "pictures" / "gallery" / "page-keys.webp"
 LARGEST, LONGEST_S = 3_000_000, 900.0
 """Bytes of the film; wall time in which the kidney has to be pressed."""
-SIZE, WIDTH = {"width": 1200, "height": 860}, 800
+SIZE, WIDTH = ViewportSize(width=1200, height=860), 800
 SHOWN_MS, LAST_MS, QUALITIES = 350, 1500, (60, 45, 30)
 ARM, DEVICE, SPEED, SLOWLY = "PSM1", "right", 12e-3, 0.2
 """Speed of the device, m/s, and its share with Shift."""
@@ -154,7 +154,7 @@ class Person:
         nodes = np.array(self.page.evaluate(KIDNEY)).reshape(-1, 3)
         top = nodes[np.argsort(nodes[:, 2])[-10:]].mean(axis=0)
         for beside, height in ((0.0, ABOVE), (0.0, -DEPTH), (ASIDE, -DEPTH), (ASIDE, 2 * ABOVE)):
-            self.go(top + [beside, 0.0, height])
+            self.go(np.add(top, (beside, 0.0, height)))
             self.picture()
 
 
