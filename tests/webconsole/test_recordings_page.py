@@ -147,6 +147,7 @@ KEEP_THE_LAST_TIME = """
   const { prototype } = CanvasRenderingContext2D, { fillText } = prototype
   prototype.fillText = function (...words) {
     fillText.apply(this, words)
+    if (!/^[0-9.]+ s$/.test(words[0])) return  // numbers of a plot
     const { width, height } = this.canvas
     window.lastTime = Array.from(this.getImageData(width - 240, height - 60, 240, 60).data)
   }
