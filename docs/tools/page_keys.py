@@ -1,6 +1,6 @@
 """Make docs/pictures/gallery/page-keys.webp: keys of the page lead an arm of `browser` that presses a kidney.
 
-python docs/tools/page_keys.py   (needs trocar[all,test] and Debian's chromium; takes about three minutes)
+python docs/tools/page_keys.py   (needs trocar[all,test] and Debian's chromium; takes about a minute)
 
 This program presses the keys, and looks at the page alone: where tip and kidney are drawn. Each picture is
 taken while keys are held. A page without a GPU is slow: the device forgives a second of silence.

@@ -126,8 +126,9 @@ class Attachments:
         """Mean force on the first organ in the last step, N, shape (t, 3)."""
         self._known: NDArray[np.bool_] = np.isinf(self.widest)
         """Ties whose parting has been noted, shape (t,)."""
-        for i, organ in enumerate(organs):
-            organ.hang(partial(self._carried, i), max(one.reach for one in organs))
+        tied = [i for i in range(len(organs)) if ((self._one == i) | (self._other == i)).any()]
+        for i in tied:
+            organs[i].hang(partial(self._carried, i), max(organs[k].reach for k in tied))
         self._edges: Edges | None = None
         self._before: Vector = np.zeros((0, 2, 3))
 
