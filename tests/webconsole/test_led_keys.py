@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from tests.waiting import until
 from tests.webconsole.test_browser import TIP, running
@@ -66,5 +67,44 @@ def test_the_keys_that_move_lead_the_tip_as_the_help_says(browser, tmp_path):
         assert_three_pairs(list(moves.values()))
         assert moves["up"] @ [0, 0, 1] > 0.9
         one.page.keyboard.up("Space")
+        assert one.errors == []
+        one.context.close()
+
+
+def seen_by_an_endoscope(text):
+    described = yaml.safe_load(text)
+    described["scene"]["arms"]["ECM"] = {}
+    camera = {"kind": "endoscope", "host": "cameras", "period": "40 ms", "looks": "plain", "images": "compressed"}
+    described["participants"]["endoscope"] = camera
+    described["order"].append("endoscope")
+    described["connections"].append("robot.qpos -> endoscope.qpos")
+    return yaml.safe_dump(described)
+
+
+def moves(one, pill):
+    """Press the dead-man anew: the page lets go of it when a picture takes the screen."""
+    one.page.keyboard.up("Space")
+    one.page.keyboard.down("Space")
+    one.page.wait_for_timeout(500)
+    return "moving" in pill.inner_text()
+
+
+@pytest.mark.timeout(600)
+def test_keys_lead_in_front_of_a_picture_on_the_whole_screen(browser, tmp_path):
+    """The pill is in the picture, and back in its panel when the picture is small again."""
+    scenario = tmp_path / "led_arm.yaml"
+    scenario.write_text(seen_by_an_endoscope(LED_ARM.read_text()))
+    with running(tmp_path, str(scenario), *SLOWLY) as (_, invite):
+        one = Led(browser, invite("operator"))
+        one.obey()
+        picture = one.page.get_by_role("img", name="Picture of endoscope.left")
+        for place in ("figure:fullscreen", "#lead"):
+            picture.dblclick()
+            pill = one.page.locator(f"{place} #dead-man")
+            pill.wait_for()
+            until(lambda pill=pill: moves(one, pill))
+            move(one, "f")
+            one.page.keyboard.up("Space")
+            until(lambda pill=pill: "press space" in pill.inner_text())
         assert one.errors == []
         one.context.close()

@@ -11,6 +11,9 @@ export function enlargeable(figure, picks = () => false) {
   figure.append(button)
 }
 
+// The figure that has the whole screen, or page; null if none has.
+export function filled() { return document.fullscreenElement ?? document.querySelector("figure.enlarged") }
+
 function toggle(figure) {
   if (document.fullscreenElement) document.exitFullscreen()
   else if (figure.classList.contains("enlarged")) figure.classList.remove("enlarged")

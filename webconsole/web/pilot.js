@@ -3,6 +3,8 @@
 // Inputs are sent by a timer of their own and at each change, whatever the drawing takes. When the page loses the
 // focus or is hidden, everything is let go and nothing more is sent: the device falls silent and the arm holds.
 
+import { filled } from "./enlarge.js"
+
 const KEYS = {
   w: ["ahead", { linear: [1, 0, 0] }], s: ["back", { linear: [-1, 0, 0] }],
   a: ["left", { linear: [0, 1, 0] }], d: ["right", { linear: [0, -1, 0] }],
@@ -41,6 +43,7 @@ export class Pilot {
     this.instruments = [] // of each arm that may get others from this page: device, arm, instruments
     this.pedals = {} // of each device: buttons that do something at the instrument, "pedal" or "rinse"
     this.led = {} // of each device that this page leads: how it follows, and what keeps an arm from following it
+    this.pill = pill()
     addEventListener("keydown", (event) => this.key(event, true))
     addEventListener("keyup", (event) => this.key(event, false))
     addEventListener("blur", () => this.letGo())
@@ -67,6 +70,7 @@ export class Pilot {
     this.device = device
     this.drag = [0, 0, 0]
     this.held.clear()
+    if (!this.leading) this.pill.remove()
     document.body.classList.toggle("leading", this.leading)
   }
 
@@ -87,18 +91,10 @@ export class Pilot {
       return row
     })
     if (!this.leading) return this.panel.replaceChildren(...rows)
-    const first = element("div", "row")
-    first.append(...rows, this.pill())
-    this.panel.replaceChildren(first, ...this.exchange(), this.help())
+    this.first = element("div", "row")
+    this.first.append(...rows)
+    this.panel.replaceChildren(this.first, ...this.exchange(), this.help())
     this.mark()
-  }
-
-  // How the arm follows, and what to press if it does not.
-  pill() {
-    const pill = element("span", "pill")
-    pill.id = "dead-man"
-    pill.setAttribute("role", "status")
-    return pill
   }
 
   // What the led arm may hold, each with its key.
@@ -227,14 +223,16 @@ export class Pilot {
     this.mark()
   }
 
+  // The pill stands in the panel, or in the picture that has the whole screen.
   mark() {
-    const dead = document.getElementById("dead-man")
-    if (!dead) return
+    if (!this.leading) return
+    const place = filled() ?? this.first, { pill } = this
+    if (pill.parentNode !== place) place?.append(pill)
     const why = this.hindrance(), force = this.feel.force(this.device)
     const felt = force ? `, ${force.toFixed(1)} N` : ""
     const text = why ? `holding: ${why}` : `moving: dead-man held${felt}`
-    if (dead.textContent !== text) dead.textContent = text
-    dead.classList.toggle("held", !why)
+    if (pill.textContent !== text) pill.textContent = text
+    pill.classList.toggle("held", !why)
     document.getElementById("pad")?.classList.toggle("held", this.dragging)
     for (const cap of this.panel.querySelectorAll("kbd")) cap.classList.toggle("held", this.held.has(cap.dataset.key))
   }
@@ -271,6 +269,14 @@ function gamepad({ axes, buttons }) {
 function wordsOf(instrument) {
   const [name] = instrument.split(":")
   return name.toLowerCase().replaceAll("_", " ")
+}
+
+// How the arm follows, and what to press if it does not.
+function pill() {
+  const pill = element("span", "pill")
+  pill.id = "dead-man"
+  pill.setAttribute("role", "status")
+  return pill
 }
 
 function element(name, className = "") {
