@@ -26,6 +26,7 @@ docs: $(VENV)/.dev ## the documentation, in build/site
 
 gallery: $(VENV)/.dev ## the pictures and films of docs/gallery.md, drawn from the scenarios
 	python docs/tools/gallery.py
+	python docs/tools/page_looks.py
 
 check: $(VENV)/.dev ## form, types, rules of imports, prose
 	ruff check .

@@ -3,26 +3,21 @@
 python docs/tools/page_gif.py   (needs trocar[all,test] and Debian's chromium; takes about two minutes)
 """
 
-import os
-import re
-import shutil
-import signal
-import subprocess
-import sys
 import tempfile
 from io import BytesIO
 from pathlib import Path
 from time import sleep
 
+from opened_page import opened, wait
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, ViewportSize
 
 OUTPUT = Path(__file__).parents[1] / "pictures" / "page.gif"
-SIZE, WIDTH, COLOURS = {"width": 1100, "height": 700}, 720, 128
+SIZE, WIDTH, COLOURS = ViewportSize(width=1100, height=700), 720, 128
 ACCENTS, STRIPE = ("#f2b705", "#8a5200", "#b3261e", "#00695f", "#1b6e3c", "#0b62a4", "#b84a00"), 16
 """Of arrows, warnings, what stops, what is chosen, and plots."""
 LIVE_FROM_S, LIVE_S, BACK_S = 4.0, 3.0, (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
-TROCAR = (sys.executable, "-P", "-m", "trocar", "run", "palpation", "--open", "--set", "duration=2 min")
+SESSION = ("run", "palpation", "--open", "--set", "duration=2 min")
 
 
 def film(page: Page) -> list[Image.Image]:
@@ -34,15 +29,11 @@ def film(page: Page) -> list[Image.Image]:
         height = round(WIDTH * picture.height / picture.width)
         pictures.append(picture.resize((WIDTH, height), Image.Resampling.LANCZOS))
 
-    def until(expression: str) -> None:
-        while not page.evaluate(expression):  # what waits within the page is against its policy
-            sleep(0.05)
-
-    until("Boolean(window.trocar?.scene?.placed)")
-    until(f"trocar.time > {LIVE_FROM_S}")
+    wait(page, "Boolean(window.trocar?.scene?.placed)")
+    wait(page, f"trocar.time > {LIVE_FROM_S}")
     begin = page.evaluate("trocar.time")
     for share in range(16):
-        until(f"trocar.time > {begin + LIVE_S * share / 15}")
+        wait(page, f"trocar.time > {begin + LIVE_S * share / 15}")
         take()
     slider = page.get_by_role("slider", name="Instant")
     sleep(2.5)  # what has just happened is written
@@ -69,24 +60,11 @@ def _colours(picture: Image.Image) -> Image.Image:
 
 def main() -> None:
     """Run the session, film its page, and write the file."""
-    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    with tempfile.TemporaryDirectory() as place:
-        said = Path(place, "said")
-        with said.open("w") as out:
-            command = [*TROCAR, "--record", str(Path(place, "recorded"))]
-            run = subprocess.Popen(command, stdout=out, stderr=out, env=os.environ | {"BROWSER": "true"})
-        try:
-            while not (link := re.search(r"http://127\S+", said.read_text())):
-                sleep(0.1)
-            with sync_playwright() as driver:
-                browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
-                page = browser.new_page(viewport=SIZE)
-                page.goto(link[0])
-                pictures = film(page)
-                browser.close()
-        finally:
-            run.send_signal(signal.SIGINT)
-            run.wait()
+    with (
+        tempfile.TemporaryDirectory() as place,
+        opened(*SESSION, "--record", str(Path(place, "recorded")), size=SIZE) as page,
+    ):
+        pictures = film(page)
     # one palette for all, so that what stands still stays the same and takes no bytes
     palette = _colours(pictures[8]).quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
     frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]

@@ -6,12 +6,6 @@ This program presses the keys, and looks at the page alone: where tip and kidney
 taken while keys are held. A page without a GPU is slow: the device forgives a second of silence.
 """
 
-import os
-import re
-import shutil
-import signal
-import subprocess
-import sys
 import tempfile
 from io import BytesIO
 from pathlib import Path
@@ -20,8 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from opened_page import opened, wait
 from PIL import Image
-from playwright.sync_api import Page, ViewportSize, sync_playwright
+from playwright.sync_api import Page, ViewportSize
 
 OUTPUT = Path(__file__).parents[1] / "pictures" / "gallery" / "page-keys.webp"
 LARGEST, LONGEST_S = 3_000_000, 900.0
@@ -47,7 +42,8 @@ KIDNEY = "[...(trocar.scene.surfaces[0]?.positions ?? [])]"
 TAKE = f"[...document.querySelectorAll('button')].find(one => one.textContent === 'Lead {DEVICE}')?.click()"
 WAYS = (("d", "a"), ("f", "r"), ("w", "s"))
 """Keys along and against the axes of the picture: right, down, ahead."""
-TROCAR = (sys.executable, "-P", "-m", "trocar", "run", "browser", "--open")
+SESSION = ("run", "browser", "--open")
+SCRIPT = 'localStorage.setItem("trocar-looks", "plain")'
 CHANGES = ("endoscope.images=none", f"{DEVICE}.silence=1 s", f"{DEVICE}.speed={SPEED}")
 
 Vector = NDArray[np.float64]
@@ -158,39 +154,17 @@ class Person:
             self.picture()
 
 
-def wait(page: Page, expression: str) -> None:
-    """Wait until an expression of the page is true; what waits within the page is against its policy."""
-    while not page.evaluate(expression):
-        sleep(0.05)
-
-
 def main() -> None:
     """Run the session, lead, and write the film."""
-    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    changes = [word for change in CHANGES for word in ("--set", f"participants.{change}")]
     with tempfile.TemporaryDirectory() as place:
-        said = Path(place, "said")
-        changes = [word for change in CHANGES for word in ("--set", f"participants.{change}")]
-        with said.open("w") as out:
-            command = [*TROCAR, "--record", str(Path(place, "recorded")), *changes]
-            run = subprocess.Popen(command, stdout=out, stderr=out, env=os.environ | {"BROWSER": "true"})
-        try:
-            while not (link := re.search(r"http://127\S+(?=\s)", said.read_text())):
-                sleep(0.1)
-            with sync_playwright() as driver:
-                browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
-                page = browser.new_page(viewport=SIZE)
-                page.set_default_timeout(600_000)
-                page.add_init_script('localStorage.setItem("trocar-looks", "plain")')
-                page.goto(link[0])
-                wait(page, "Boolean(window.trocar?.scene?.placed && trocar.scene.surfaces[0]?.mesh)")
-                page.get_by_role("radio", name="Endoscope").click()
-                person = Person(page)
-                person.lead()
-                person.press()
-                browser.close()
-        finally:
-            run.send_signal(signal.SIGINT)
-            run.wait()
+        command = (*SESSION, "--record", str(Path(place, "recorded")), *changes)
+        with opened(*command, size=SIZE, script=SCRIPT) as page:
+            wait(page, "Boolean(window.trocar?.scene?.placed && trocar.scene.surfaces[0]?.mesh)")
+            page.get_by_role("radio", name="Endoscope").click()
+            person = Person(page)
+            person.lead()
+            person.press()
     durations = [SHOWN_MS] * (len(person.pictures) - 1) + [LAST_MS]
     for quality in QUALITIES:
         options: dict[str, Any] = {"duration": durations, "loop": 0, "quality": quality, "method": 6}

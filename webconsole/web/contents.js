@@ -2,6 +2,7 @@
 
 import * as THREE from "./vendor/three.module.js"
 import { Burns } from "./burns.js"
+import { divisions } from "./division.js"
 import { Film } from "./film.js"
 import { boxSides, creased, gathered, onSide, smooth, splitByChart } from "./mesh.js"
 
@@ -38,7 +39,7 @@ export class Contents {
     const scenes = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)))
     for (const scene of scenes) this.add(scene, buffer, 4 + size)
     this.surfaces = surfaces.map(({ colours }) => ({ colours, mesh: null, triangles: null, changed: null, liquid: null,
-      film: null, burns: null, skin: null, stale: false }))
+      film: null, burns: null, skin: null, divided: [], stale: false }))
     return scenes
   }
 
@@ -107,7 +108,10 @@ export class Contents {
     const surface = this.surfaces[index]
     if (!surface || (!surface.liquid && !film.nodes.length)) return
     surface.liquid = film
-    if (surface.mesh && !surface.stale) this.wet(surface)
+    if (surface.divided?.length) {
+      surface.stale = true
+      this.nodes(index, surface.positions)
+    } else if (surface.mesh && !surface.stale) this.wet(surface)
   }
 
   wet(surface) {
@@ -140,6 +144,8 @@ export class Contents {
     smooth(base.position, base.index, base.normal)
     gathered(base.position, from, position.array)
     gathered(base.normal, from, normal.array)
+    for (const division of surface.divided) division.refine(position.array, normal.array)
+    surface.divided.at(-1)?.light(position.array, normal.array)
     position.needsUpdate = normal.needsUpdate = true
     return first
   }
@@ -154,15 +160,21 @@ export class Contents {
     base.normal = new Float32Array(3 * base.origin.length)
     const charts = surface.skin ? chartsOf(surface, faces, bare, slots) : new Uint32Array(kinds.length)
     const { index, from } = splitByChart(base.index, charts), made = new THREE.BufferGeometry()
-    made.setAttribute("position", attribute(3 * from.length))
-    made.setAttribute("normal", attribute(3 * from.length))
-    made.setIndex(new THREE.BufferAttribute(index, 1))
-    if (surface.skin) made.setAttribute("uv", new THREE.BufferAttribute(coordinates(surface, faces, slots, charts, index, from.length), 2))
+    // Cuts, coats of burns and liquid are made of the faces of the tissue.
+    const divided = surface.changed?.slots.length || surface.liquid ? [] : divisions(index, from)
+    const size = 3 * (divided.at(-1)?.base ?? from).length
+    made.setAttribute("position", attribute(size))
+    made.setAttribute("normal", attribute(size))
+    made.setIndex(new THREE.BufferAttribute(divided.at(-1)?.index ?? index, 1))
+    if (surface.skin) {
+      const uv = divided.reduce((found, division) => division.spread(found, 2), coordinates(surface, faces, slots, charts, index, from.length))
+      made.setAttribute("uv", new THREE.BufferAttribute(uv, 2))
+    }
     for (let begin = 0, end = 0; begin < kinds.length; begin = end) {
       while (end < kinds.length && kinds[end] === kinds[begin]) end++
-      made.addGroup(3 * begin, 3 * (end - begin), kinds[begin])
+      made.addGroup(3 * begin * 4 ** divided.length, 3 * (end - begin) * 4 ** divided.length, kinds[begin])
     }
-    Object.assign(surface, { count, base, from, origin: from.map((vertex) => base.origin[vertex]), stale: false })
+    Object.assign(surface, { count, base, from, divided, origin: from.map((vertex) => base.origin[vertex]), stale: false })
     if (surface.mesh) {
       surface.mesh.geometry.dispose()
       surface.mesh.geometry = made
