@@ -74,8 +74,8 @@ def test_the_keys_that_move_lead_the_tip_as_the_help_says(browser, tmp_path):
 def seen_by_an_endoscope(text):
     described = yaml.safe_load(text)
     described["scene"]["arms"]["ECM"] = {}
-    camera = {"kind": "endoscope", "host": "cameras", "period": "40 ms", "looks": "plain", "images": "compressed"}
-    described["participants"]["endoscope"] = camera
+    camera = {"kind": "endoscope", "host": "cameras", "looks": "plain", "images": "compressed"}
+    described["participants"]["endoscope"] = camera | {"period": "40 ms"}
     described["order"].append("endoscope")
     described["connections"].append("robot.qpos -> endoscope.qpos")
     return yaml.safe_dump(described)
