@@ -35,8 +35,10 @@ OUTLETS = (
     Outlet("tissue", signal_out("block/surface", SurfaceChange)),
     Outlet("tissue", signal_out("block/film", SurfaceFilm)),
 )
-GROUPS = """
-trocar.scene.surfaces[0].mesh.geometry.groups.map(({ count, materialIndex }) => [materialIndex, count / 3])
+PARTS = "(3 * 4 ** trocar.scene.surfaces[0].divided.length)"
+"""Corners of the triangles that a face is divided into."""
+GROUPS = f"""
+trocar.scene.surfaces[0].mesh.geometry.groups.map((group) => [group.materialIndex, group.count / {PARTS}])
 """.strip()
 
 

@@ -44,23 +44,23 @@ export class Burns {
     })
   }
 
-  // `faces`: of the outside, nodes; `kinds`: of each; `corners`: vertices of each; `origin`: node of each vertex; `rest`:
-  // place of each vertex at rest, m; `tiles`: side of a tile of each kind, m.
-  show({ faces, kinds, corners, origin, rest, tiles }) {
+  // `faces`: of the outside, nodes; `kinds`: of each; `corners`: vertices of the triangles of each; `around`: returns values
+  // at all vertices, for a function that returns those at nodes; `rest`: place of each vertex at rest, m; `tiles`: side of a
+  // tile of each kind, m.
+  show({ faces, kinds, corners, around, rest, tiles }) {
     const { attributes } = this.mesh.geometry
     for (const coat of this.coats) {
       const { kind } = coat.userData, share = sharesOf(faces, kinds, kind), made = coat.geometry, index = []
       coat.userData.shown = false
       if (!share.size) continue
       for (let corner = 0; corner < faces.length; corner += 3)
-        if ([0, 1, 2].some((i) => share.has(faces[corner + i]))) index.push(...corners.subarray(corner, corner + 3))
+        if ([0, 1, 2].some((i) => share.has(faces[corner + i]))) index.push(...corners[corner / 3])
       const scale = metresOf(rest, attributes.uv.array, index) / tiles[kind]
       made.setAttribute("position", attributes.position)
       made.setAttribute("normal", attributes.normal)
       made.setAttribute("uv", new THREE.BufferAttribute(attributes.uv.array.map((part) => scale * part), 2))
       made.setAttribute("rest", new THREE.BufferAttribute(rest, 3))
-      const burnt = Float32Array.from(origin, (node) => share.get(node) ?? 0)
-      made.setAttribute("burnt", new THREE.BufferAttribute(burnt, 1))
+      made.setAttribute("burnt", new THREE.BufferAttribute(around((node) => share.get(node) ?? 0), 1))
       made.setIndex(index)
       coat.userData.shown = true
     }

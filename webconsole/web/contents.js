@@ -108,15 +108,14 @@ export class Contents {
     const surface = this.surfaces[index]
     if (!surface || (!surface.liquid && !film.nodes.length)) return
     surface.liquid = film
-    if (surface.divided?.length) {
-      surface.stale = true
-      this.nodes(index, surface.positions)
-    } else if (surface.mesh && !surface.stale) this.wet(surface)
+    if (surface.mesh && !surface.stale) this.wet(surface)
   }
 
   wet(surface) {
+    const { liquid, origin, count } = surface, steps = new Float32Array(count)
+    liquid.nodes.forEach((node, i) => { if (node < count) steps[node] = liquid.thickness[i] })
     surface.film ??= new Film(surface.mesh)
-    surface.film.show(surface.liquid, surface.origin, surface.count)
+    surface.film.show(liquid, spread(surface, Float32Array.from(origin, (node) => steps[node]), 1))
     surface.film.level(this.level)
   }
 
@@ -145,7 +144,7 @@ export class Contents {
     gathered(base.position, from, position.array)
     gathered(base.normal, from, normal.array)
     for (const division of surface.divided) division.refine(position.array, normal.array)
-    surface.divided.at(-1)?.light(position.array, normal.array)
+    surface.divided.at(-1).light(position.array, normal.array)
     position.needsUpdate = normal.needsUpdate = true
     return first
   }
@@ -160,26 +159,24 @@ export class Contents {
     base.normal = new Float32Array(3 * base.origin.length)
     const charts = surface.skin ? chartsOf(surface, faces, bare, slots) : new Uint32Array(kinds.length)
     const { index, from } = splitByChart(base.index, charts), made = new THREE.BufferGeometry()
-    // Cuts, coats of burns and liquid are made of the faces of the tissue.
-    const divided = surface.changed?.slots.length || surface.liquid ? [] : divisions(index, from)
-    const size = 3 * (divided.at(-1)?.base ?? from).length
-    made.setAttribute("position", attribute(size))
-    made.setAttribute("normal", attribute(size))
-    made.setIndex(new THREE.BufferAttribute(divided.at(-1)?.index ?? index, 1))
+    const divided = divisions(index, from), fine = divided.at(-1), parts = 4 ** divided.length // of a face
+    made.setAttribute("position", attribute(3 * fine.base.length))
+    made.setAttribute("normal", attribute(3 * fine.base.length))
+    made.setIndex(new THREE.BufferAttribute(fine.index, 1))
+    Object.assign(surface, { count, base, from, divided, origin: from.map((vertex) => base.origin[vertex]), stale: false })
     if (surface.skin) {
-      const uv = divided.reduce((found, division) => division.spread(found, 2), coordinates(surface, faces, slots, charts, index, from.length))
-      made.setAttribute("uv", new THREE.BufferAttribute(uv, 2))
+      const uv = coordinates(surface, faces, slots, charts, index, from.length)
+      made.setAttribute("uv", new THREE.BufferAttribute(spread(surface, uv, 2), 2))
     }
     for (let begin = 0, end = 0; begin < kinds.length; begin = end) {
       while (end < kinds.length && kinds[end] === kinds[begin]) end++
-      made.addGroup(3 * begin * 4 ** divided.length, 3 * (end - begin) * 4 ** divided.length, kinds[begin])
+      made.addGroup(3 * begin * parts, 3 * (end - begin) * parts, kinds[begin])
     }
-    Object.assign(surface, { count, base, from, divided, origin: from.map((vertex) => base.origin[vertex]), stale: false })
     if (surface.mesh) {
       surface.mesh.geometry.dispose()
       surface.mesh.geometry = made
       if (surface.liquid) this.wet(surface)
-      this.burn(surface, { faces, kinds, bare, index })
+      this.burn(surface, { faces, kinds, bare })
       return
     }
     const materials = surface.colours.map((colour, kind) => this.material([...colour, 1], THREE.DoubleSide, kind === WET))
@@ -189,26 +186,32 @@ export class Contents {
     surface.mesh.frustumCulled = false
     this.own(surface.mesh)
     if (surface.liquid) this.wet(surface)
-    this.burn(surface, { faces, kinds, bare, index })
+    this.burn(surface, { faces, kinds, bare })
   }
 
   // Lay coats over the burnt faces of the outside.
-  burn(surface, { faces, kinds, bare, index }) {
+  burn(surface, { faces, kinds, bare }) {
     if (!surface.burns && !kinds.some((kind) => kind > BURNT + 1)) return // an older instant may have none any more
     surface.burns ??= new Burns(surface.mesh)
     const outer = Array.from(bare.keys()).filter((face) => !bare[face])
-    const picked = (source) => Uint32Array.from(outer.flatMap((face) => [...source.subarray(3 * face, 3 * face + 3)]))
+    const { array } = surface.mesh.geometry.index, parts = 3 * 4 ** surface.divided.length
     const rest = new Float32Array(3 * surface.origin.length)
     surface.origin.forEach((node, vertex) => {
       const at = 3 * restNode(surface, node)
       rest.set(surface.skin.rest.subarray(at, at + 3), 3 * vertex)
     })
-    surface.burns.show({ faces: picked(faces), corners: picked(index), origin: surface.origin, rest, tiles: surface.skin.tiles,
+    surface.burns.show({ faces: Uint32Array.from(outer.flatMap((face) => [...faces.subarray(3 * face, 3 * face + 3)])),
+      corners: outer.map((face) => array.subarray(parts * face, parts * (face + 1))), rest: spread(surface, rest, 3),
+      around: (share) => spread(surface, Float32Array.from(surface.origin, share), 1), tiles: surface.skin.tiles,
       kinds: Uint8Array.from(outer, (face) => (kinds[face] ? kinds[face] - PAINTED : 0)) })
     surface.burns.level(this.level)
   }
 }
 
+// Values, of `size` numbers each, at all vertices of a surface, for values at those that it had before it was divided.
+function spread({ divided }, values, size) {
+  return divided.reduce((found, division) => division.spread(found, size), values)
+}
 
 // The chart of each face: of the outside that of its skin, of other kinds the side of a box at rest.
 function chartsOf(surface, faces, kinds, slots) {

@@ -16,17 +16,19 @@ export class Film {
     mesh.add(this.coat)
   }
 
-  // `film`: link.js, `filmOf`; `origin`: the node of each vertex; `count`: nodes of the surface.
-  show(film, origin, count) {
-    const steps = new Uint8Array(count), { geometry } = this.mesh
-    film.nodes.forEach((node, i) => { if (node < count) steps[node] = film.thickness[i] })
-    this.colour(steps, film.tint, origin)
-    if (!this.texture) this.dress(film.tint)
-    const uv = new Float32Array(2 * origin.length), wet = [], index = geometry.index.array
-    origin.forEach((node, vertex) => uv.set([(steps[node] + 0.5) / STEPS, 0.5], 2 * vertex))
+  // `tint`: of the liquid; link.js, `filmOf`; `steps`: thickness at each vertex, in steps.
+  show({ tint }, steps) {
+    const { geometry } = this.mesh
+    this.colour(steps, tint)
+    if (!this.texture) this.dress(tint)
+    const uv = new Float32Array(2 * steps.length), wet = [], index = geometry.index.array
+    steps.forEach((step, vertex) => {
+      uv[2 * vertex] = (step + 0.5) / STEPS
+      uv[2 * vertex + 1] = 0.5
+    })
     for (let corner = 0; corner < index.length; corner += 3) {
-      const face = index.subarray(corner, corner + 3)
-      if (face.some((vertex) => steps[origin[vertex]])) wet.push(...face)
+      const a = index[corner], b = index[corner + 1], c = index[corner + 2]
+      if (steps[a] || steps[b] || steps[c]) wet.push(a, b, c)
     }
     const made = this.coat.geometry
     made.setAttribute("position", geometry.attributes.position)
@@ -51,16 +53,16 @@ export class Film {
   }
 
   // Give each vertex the colour of its tissue under the liquid there, over the colour of the tissue.
-  colour(steps, tint, origin) {
+  colour(steps, tint) {
     const { geometry, userData: { looks } } = this.mesh
-    if (!geometry.attributes.color) geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(3 * origin.length), 3))
+    if (!geometry.attributes.color) geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(3 * steps.length), 3))
     for (const each of [...looks.plain, ...(looks.simple ?? [])])
       if (!each.vertexColors) Object.assign(each, { vertexColors: true, needsUpdate: true })
     const colours = geometry.attributes.color.array, index = geometry.index.array
     const tables = looks.plain.map(({ color }) => wetColours(color, tint))
     for (const { start, count: corners, materialIndex } of geometry.groups)
       for (let corner = start; corner < start + corners; corner++) {
-        const vertex = index[corner], from = 3 * steps[origin[vertex]]
+        const vertex = index[corner], from = 3 * Math.round(steps[vertex])
         for (let c = 0; c < 3; c++) colours[3 * vertex + c] = tables[materialIndex][from + c]
       }
     geometry.attributes.color.needsUpdate = true
