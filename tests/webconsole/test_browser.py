@@ -65,11 +65,14 @@ class Person:
         """Wait until an expression of the page is true, and return it."""
         return until(lambda: self.page.evaluate(expression))
 
-    def picture(self):
-        """Return the pixels of the scene, once they have been drawn."""
+    def redraw(self):
         drawn = self.page.evaluate("trocar.drawn")
         self.page.evaluate("trocar.scene.dirty()")
         self.sees(f"trocar.drawn > {drawn}")
+
+    def picture(self):
+        """Return the pixels of the scene, once they have been drawn."""
+        self.redraw()
         return self.page.locator("#canvas").screenshot()
 
 

@@ -199,13 +199,17 @@ def test_the_handle_leads_the_tip_while_it_is_held(browser, session):
     one.sees("Boolean(trocar.scene?.placed)")
     one.page.get_by_role("button", name="Lead hand").click()
     one.sees("document.body.classList.contains('leading')")
-    one.page.get_by_role("radio", name="PSM1").click()
+
+    def find_tip():  # a busy machine may have led it out of the picture
+        one.page.get_by_role("radio", name="PSM1").click()
+        one.redraw()
+        return one.page.evaluate(TIP)
 
     ways, turns = itertools.cycle((1, -1)), itertools.cycle((1, -1))
 
     def drag():  # again, the other way, where a busy machine lets go
         way = next(ways)
-        start = one.page.evaluate(TIP)
+        start = find_tip()
         x, y = one.page.evaluate(UP_ARROW)
         one.page.mouse.move(x, y)
         one.page.wait_for_timeout(300)
@@ -217,7 +221,7 @@ def test_the_handle_leads_the_tip_while_it_is_held(browser, session):
         return way * (ended[2] - start[2]) > 0.003 and ended[:2] == pytest.approx(start[:2], abs=1e-3)
 
     def turn():
-        start, before = one.page.evaluate(TIP), np.array(one.page.evaluate(TURN))
+        start, before = find_tip(), np.array(one.page.evaluate(TURN))
         x, y = one.page.evaluate(RING)
         one.page.mouse.move(x, y)
         one.page.wait_for_timeout(300)
