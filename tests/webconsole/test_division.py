@@ -26,7 +26,9 @@ async ([positions, faces]) => {
   for (const division of all) division.refine(position, normal)
   last.light(position, normal)
   const numbers = (values) => Array.from(values)
-  return { first: numbers(position.subarray(0, 3 * one.base.length)), faces: numbers(last.index),
+  const none = new Uint32Array(0)
+  const without = divisions(none, none).map((division) => division.index.length)
+  return { without, first: numbers(position.subarray(0, 3 * one.base.length)), faces: numbers(last.index),
     position: numbers(position), normal: numbers(normal) }
 }
 """
@@ -43,6 +45,7 @@ def test_a_surface_is_divided_as_the_endoscope_divides_it(browser, tmp_path):
     first, position, normal = (np.reshape(found[name], (-1, 3)) for name in ("first", "position", "normal"))
     faces = np.reshape(found["faces"], (-1, 3))
     once = SkinMesh(nodes, triangles, most=4 * len(triangles))
+    assert found["without"] == [0]  # tissue may go, face by face, to the last one
     assert len(first) == len(once.vertices(nodes))
     assert KDTree(first).query(once.vertices(nodes))[0].max() < 1e-7
     assert len(faces) == len(SkinMesh(nodes, triangles).faces)

@@ -7,7 +7,7 @@ const ENOUGH = 12_000 // triangles
 // The divisions of a surface, the coarsest first; `base`: which of its vertices are in one place, with one normal.
 export function divisions(index, base) {
   const made = []
-  while (!made.length || (4 / 3) * index.length <= ENOUGH) {
+  while (!made.length || (index.length && (4 / 3) * index.length <= ENOUGH)) { // of tissue that has gone, no face is left
     made.push(new Division(index, base))
     ;({ index, base } = made.at(-1))
   }
