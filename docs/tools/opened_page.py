@@ -14,7 +14,7 @@ from time import sleep
 
 from playwright.sync_api import Page, ViewportSize, sync_playwright
 
-__all__ = ["opened", "wait"]
+__all__ = ["TROCAR", "opened", "wait"]
 
 TROCAR = (sys.executable, "-P", "-m", "trocar")
 FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")

@@ -24,7 +24,7 @@ async ([positions, faces]) => {
   gathered(positions, origin, position)
   smooth(position.subarray(0, 3 * origin.length), index, normal.subarray(0, 3 * origin.length))
   for (const division of all) division.refine(position, normal)
-  last.light(position, normal)
+  smooth(position, last.index, normal, last.base)
   const numbers = (values) => Array.from(values)
   const none = new Uint32Array(0)
   const without = divisions(none, none).map((division) => division.index.length)

@@ -144,7 +144,8 @@ export class Contents {
     gathered(base.position, from, position.array)
     gathered(base.normal, from, normal.array)
     for (const division of surface.divided) division.refine(position.array, normal.array)
-    surface.divided.at(-1).light(position.array, normal.array)
+    const fine = surface.divided.at(-1)
+    smooth(position.array, fine.index, normal.array, fine.base)
     position.needsUpdate = normal.needsUpdate = true
     return first
   }

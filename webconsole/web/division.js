@@ -45,7 +45,7 @@ class Division {
       (faces.get(corner(base[ends[2 * i]], base[ends[2 * i + 1]])) === 2 ? 1 / 8 : 0))
   }
 
-  // Write the middles of the edges after the corners: positions, and unit normals.
+  // Write the middles of the edges after the corners: positions, and unit normals for the next division.
   refine(position, normal) {
     const { ends, bends, first } = this
     for (let i = 0, at = 3 * first; i < bends.length; i++, at += 3) {
@@ -75,27 +75,5 @@ class Division {
       }
     }
     return found
-  }
-
-  // Write the normals of all vertices, from the areas of the faces about each place.
-  light(position, normal) {
-    const { index, base } = this, sum = (this.sum ??= new Float32Array(3 * (1 + base.reduce((most, one) => Math.max(most, one), 0))))
-    sum.fill(0)
-    for (let f = 0; f < index.length; f += 3) {
-      const a = 3 * index[f], b = 3 * index[f + 1], c = 3 * index[f + 2]
-      const ux = position[b] - position[a], uy = position[b + 1] - position[a + 1], uz = position[b + 2] - position[a + 2]
-      const vx = position[c] - position[a], vy = position[c + 1] - position[a + 1], vz = position[c + 2] - position[a + 2]
-      const nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx
-      for (let corner = 0; corner < 3; corner++) {
-        const at = 3 * base[index[f + corner]]
-        sum[at] += nx
-        sum[at + 1] += ny
-        sum[at + 2] += nz
-      }
-    }
-    for (let vertex = 0; vertex < base.length; vertex++) {
-      const at = 3 * base[vertex], size = Math.hypot(sum[at], sum[at + 1], sum[at + 2]) || 1
-      for (let axis = 0; axis < 3; axis++) normal[3 * vertex + axis] = sum[at + axis] / size
-    }
   }
 }

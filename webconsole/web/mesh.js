@@ -45,20 +45,22 @@ function cross(p, a, b, c) {
   return [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx]
 }
 
-// Write the normals of the vertices, from the areas of their faces, into `normals`.
-export function smooth(positions, index, normals) {
-  normals.fill(0)
+// Write the normals of the vertices, from the areas of their faces, into `normals`. Vertices of the same number in `base`
+// are in one place and have one normal; without it each has its own.
+export function smooth(positions, index, normals, base = null) {
+  const sums = base ? new Float32Array(normals.length) : normals.fill(0)
   for (let f = 0; f < index.length; f += 3) {
     const n = cross(positions, index[f], index[f + 1], index[f + 2])
     for (let corner = 0; corner < 3; corner++) {
-      const at = 3 * index[f + corner]
-      normals[at] += n[0]; normals[at + 1] += n[1]; normals[at + 2] += n[2]
+      const vertex = index[f + corner], at = 3 * (base ? base[vertex] : vertex)
+      sums[at] += n[0]; sums[at + 1] += n[1]; sums[at + 2] += n[2]
     }
   }
-  for (let at = 0; at < normals.length; at += 3) {
-    const length = Math.hypot(normals[at], normals[at + 1], normals[at + 2]) || 1
-    normals[at] /= length; normals[at + 1] /= length; normals[at + 2] /= length
+  for (let at = 0; at < sums.length; at += 3) {
+    const length = Math.hypot(sums[at], sums[at + 1], sums[at + 2]) || 1
+    sums[at] /= length; sums[at + 1] /= length; sums[at + 2] /= length
   }
+  if (base) gathered(sums, base, normals)
 }
 
 export function gathered(positions, origin, target) {
