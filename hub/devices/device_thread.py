@@ -9,7 +9,7 @@ from pathlib import Path
 from time import monotonic_ns
 from typing import Protocol
 
-from hub.devices.simulated_devices import open_device
+from hub.devices.simulated_devices import close_device, open_device
 from hub.participant import Device, Sample, Value, VectorSample
 from schemas.errors import MessageError
 from schemas.ros import DiagnosticStatus, Joy
@@ -128,4 +128,4 @@ class DeviceThread:
         self._ending = True
         if self._thread.is_alive():
             self._thread.join(timeout=2.0)
-        self._device.close()
+        close_device(self._name, self._device)

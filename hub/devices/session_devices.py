@@ -162,10 +162,10 @@ class SessionDevices:
     def close(self) -> None:
         """Close the devices of this process, and receive no more."""
         sys.setswitchinterval(self._switch_s)
+        for uplink in self._uplinks:  # before the devices: an uplink writes to its device until closed
+            uplink.close()
         for thread in self._threads.values():
             thread.close()
-        for uplink in self._uplinks:
-            uplink.close()
         self._simulated.close()
         for entity in (*self._subscribers, self._statuses, self.network_links, self._diagnostics):
             entity.undeclare()

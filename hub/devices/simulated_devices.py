@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -15,7 +16,9 @@ from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Refusals
 from schemas.errors import ParticipantError
 
-__all__ = ["SimulatedDevices", "open_device"]
+__all__ = ["SimulatedDevices", "close_device", "open_device"]
+
+log = logging.getLogger(__name__)
 
 Take = Callable[[str, Sample, int, Stamp], None]
 """Called with a sample: device, sample, time of arrival (simulated ns), and stamp."""
@@ -65,7 +68,7 @@ class SimulatedDevices:
     def close(self) -> None:
         """Close all."""
         for one in self._devices:
-            one.device.close()
+            close_device(one.name, one.device)
 
 
 class _SimulatedDevice:
@@ -141,3 +144,11 @@ def open_device(name: str, device: Device, directory: Path) -> None:
         device.open(directory)
     except Exception as error:
         raise ParticipantError(name, -1, f"cannot be opened: {error}") from error
+
+
+def close_device(name: str, device: Device) -> None:
+    """Close a device; an error is logged, and does not keep others open."""
+    try:
+        device.close()
+    except Exception:
+        log.exception("device '%s' raised while it was closed", name)

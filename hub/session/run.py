@@ -157,6 +157,8 @@ class Run:
         self.failure = FirstFailure(plan, self.clock, self.host, self.acks, interrupt)
         self.devices = self._devices()
         stack.callback(self.devices.close)
+        # first: else Zenoh calls Python for each reader that leaves, while a closing gateway waits for Zenoh
+        stack.callback(self.wire.close)
         self.observer_reports = ObserverReports(self.connection)
         answering.callback(self.observer_reports.undeclare)
         self.bookkeeping = Bookkeeping(

@@ -1,9 +1,9 @@
 """What Trocar uses of eclipse-zenoh 1.10; the wheel's own stubs leave most results untyped."""
 
 from collections.abc import Callable, Iterator
-from typing import Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
-from zenoh.handlers import Callback, FifoChannel, Handler
+from zenoh.handlers import Callback, FifoChannel, Handler, RingChannel
 
 H = TypeVar("H")
 
@@ -70,7 +70,8 @@ class MatchingStatus:
     @property
     def matching(self) -> bool: ...
 
-class MatchingListener:
+class MatchingListener(Generic[H]):
+    def try_recv(self: MatchingListener[Handler[MatchingStatus]]) -> MatchingStatus | None: ...
     def undeclare(self) -> None: ...
 
 class Publisher:
@@ -81,7 +82,12 @@ class Publisher:
     def put(
         self, payload: bytes | str, *, encoding: Encoding | None = None, attachment: bytes | None = None
     ) -> None: ...
-    def declare_matching_listener(self, handler: Callback[MatchingStatus]) -> MatchingListener: ...
+    @overload
+    def declare_matching_listener(self, handler: Callback[MatchingStatus]) -> MatchingListener[None]: ...
+    @overload
+    def declare_matching_listener(
+        self, handler: RingChannel[MatchingStatus]
+    ) -> MatchingListener[Handler[MatchingStatus]]: ...
     def undeclare(self) -> None: ...
 
 class Subscriber(Generic[H]):

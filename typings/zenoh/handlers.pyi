@@ -13,6 +13,9 @@ class Handler(Generic[T]):
 class FifoChannel(Generic[T]):
     def __init__(self, capacity: int) -> None: ...
 
+class RingChannel(Generic[T]):
+    def __init__(self, capacity: int) -> None: ...
+
 class Callback(Generic[T]):
     def __init__(
         self,

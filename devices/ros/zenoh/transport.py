@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Callable
 from time import time_ns
 
 import zenoh
 from zenoh import ext
-from zenoh.handlers import Callback
+from zenoh.handlers import Callback, RingChannel
 
 from devices.ros.topics.row import Row
 from devices.ros.transport import NODE, Client, MessageHandler, Publisher, ServiceHandler, Transport
@@ -39,15 +40,50 @@ number; we send periodically, because a program no longer reading must not block
 
 
 class _Publisher:
-    """Numbers the messages of a topic."""
+    """Numbers the messages of a topic, and knows whether a program subscribes.
 
-    def __init__(self, publisher: zenoh.Publisher | ext.AdvancedPublisher, gid: bytes) -> None:
-        self._put, self._gid, self._sequence = publisher.put, gid, 0
-        self.wanted = True
+    Changes are looked up: a callback would wait for Python in the thread of Zenoh's runtime that a latched
+    publisher needs to end, while `undeclare` of that publisher waits in Python.
+    """
+
+    def __init__(
+        self, publisher: zenoh.Publisher | ext.AdvancedPublisher, gid: bytes, changed: Callable[[], None]
+    ) -> None:
+        self._publisher, self._gid, self._sequence, self._changed = publisher, gid, 0, changed
+        self._lock = threading.Lock()
+        self._closed, self._wanted, self._changes = False, True, None
+        if isinstance(publisher, zenoh.Publisher):
+            self._changes = publisher.declare_matching_listener(RingChannel(1))
+            self._wanted = publisher.matching_status.matching
+
+    @property
+    def wanted(self) -> bool:
+        """Whether a program subscribes, or may."""
+        if self._changes is None:
+            return True
+        with self._lock:
+            status = None if self._closed else self._changes.try_recv()
+            if status is None or status.matching == self._wanted:
+                return self._wanted
+            self._wanted = status.matching
+        self._changed()
+        return self._wanted
 
     def __call__(self, message: bytes) -> None:
-        self._sequence += 1
-        self._put(message, attachment=packed_attachment(self._sequence, time_ns(), self._gid))
+        with self._lock:  # Zenoh's publisher is borrowed during a put: `undeclare` would raise
+            if not self._closed:
+                self._sequence += 1
+                self._publisher.put(
+                    message, attachment=packed_attachment(self._sequence, time_ns(), self._gid)
+                )
+
+    def undeclare(self) -> None:
+        """Publish no more."""
+        with self._lock:
+            self._closed = True
+            if self._changes is not None:
+                self._changes.undeclare()
+            self._publisher.undeclare()
 
 
 class ZenohTransport(Transport):
@@ -83,17 +119,15 @@ class ZenohTransport(Transport):
         self._graph = Graph(self._id)
         self._topics: set[str] = set()
         self._entities: list[
-            ext.AdvancedPublisher
-            | zenoh.Publisher
+            _Publisher
             | zenoh.Subscriber[None]
             | ext.AdvancedSubscriber
             | zenoh.Queryable[None]
             | zenoh.LivelinessToken
-            | zenoh.MatchingListener
         ] = []
         self._number = 0
         self._closed = False
-        watch = Callback(self._token_changed, indirect=False)
+        watch = Callback(self._token_changed, indirect=True)  # as in `_Publisher`: not in Zenoh's thread
         liveliness = self._session.liveliness()
         self._entities.append(liveliness.declare_subscriber(graph_key(domain), watch, history=True))
         self._entities.append(liveliness.declare_token(GraphToken(self._id, 0, "NN", node).key(domain)))
@@ -117,30 +151,15 @@ class ZenohTransport(Transport):
             publisher = session.declare_publisher(
                 address, encoding=cdr, congestion_control=self._congestion, priority=priority
             )
-        self._entities.append(publisher)
         gid = gid_of(self._announce_entity("MP", row, LATCHED if row.latched else VOLATILE))
-        advertised = _Publisher(publisher, gid)
-        if isinstance(publisher, zenoh.Publisher):
-            self._watch(publisher, advertised)
+        advertised = _Publisher(publisher, gid, lambda: self.changed())
+        self._entities.append(advertised)
         return advertised
 
     def _session_of_pictures(self) -> zenoh.Session:
         if self._pictures is None:
             self._pictures = self._connect_pictures()
         return self._pictures
-
-    def _watch(self, publisher: zenoh.Publisher, advertised: _Publisher) -> None:
-        """Keep up to date whether `advertised` is wanted."""
-
-        def match(status: zenoh.MatchingStatus) -> None:
-            advertised.wanted = status.matching
-            self.changed()
-
-        advertised.wanted = False
-        listener = publisher.declare_matching_listener(Callback(match, indirect=False))
-        self._entities.insert(0, listener)  # it ends before its publisher
-        if publisher.matching_status.matching:
-            advertised.wanted = True
 
     def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
         topic = row.topic

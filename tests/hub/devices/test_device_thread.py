@@ -116,6 +116,19 @@ def test_a_device_that_cannot_be_opened_is_named():
         DeviceThread("pen", Unplugged(), MS, failed=lambda *_: None).start(Path.cwd())
 
 
+def test_a_device_that_raises_while_it_is_closed_keeps_nothing_open(start, caplog):
+    class Stuck(Pen):
+        def close(self):
+            raise OSError("the driver does not answer")
+
+    thread, failures = start(Stuck())
+    thread.close()
+    assert failures == []
+    (record,) = caplog.records
+    assert record.message == "device 'pen' raised while it was closed"
+    caplog.clear()
+
+
 class Doorbell(Pen):
     """Returns from `wait` at once when there is something new."""
 
