@@ -43,9 +43,9 @@ def film_at(block: CutBlock, step: int) -> SurfaceFilm:
     )
 
 
-def write_cut(directory: Path) -> CutBlock:
+def write_cut(directory: Path, *overrides: str) -> CutBlock:
     """Record the block of `palpation`, cut open in the middle of the recording, and burnt beside the cut."""
-    file = load("palpation", [])
+    file = load("palpation", overrides)
     plan, _ = plan_of(file.scenario, file.params)
     keys, qpos = Keys("palpation"), VectorCodec(plan.participants["robot"].port("qpos"))
     attachments = {

@@ -147,6 +147,30 @@ def test_the_view_of_the_endoscope_is_darker_in_its_corners(person):
         person.sees(f"{vignette} === '{seen}'")
 
 
+def test_several_organs_are_first_seen_by_the_endoscope(person):
+    opening = """([surfaces, cameras]) => Reflect.get(Object.getPrototypeOf(trocar.scene), "opening",
+      { surfaces: Array(surfaces), cameras: Array(cameras) })"""
+    seen = [person.page.evaluate(opening, counts) for counts in ([1, 1], [2, 0], [2, 1])]
+    assert seen == ["work", "work", "endoscope"]
+
+
+def test_pictures_of_a_still_recording_take_the_looks_of_the_scene(browser, tmp_path):
+    write_cut(tmp_path / "palpation", "scene.arms.ECM={}")
+    with served(Recorded(tmp_path / "palpation")) as server:
+        one = Person(browser, f"http://127.0.0.1:{server.port}{server.gate.invite('viewer')}")
+        one.page.set_viewport_size(SMALL)
+        looks = one.page.get_by_label("Looks of the scene")
+        drawn = "document.querySelector('#eyes canvas').toDataURL()"
+        looks.select_option("plain")
+        one.sees("trocar.scene.level === 'plain'")
+        one.sees(f"{drawn}.length > 2000")
+        plain = one.page.evaluate(drawn)
+        looks.select_option("full")
+        one.sees(f"{drawn} !== {plain!r}")
+        one.context.close()
+        assert one.errors == []
+
+
 def test_smoke_rises_from_where_tissue_was_burnt_last(person):
     person.page.get_by_role("slider", name="Instant of the recording").fill("0.4")
     person.sees("Boolean(trocar.scene.surfaces[0].burnt)")

@@ -178,7 +178,7 @@ async function makeScene() {
     scene.chosen = showCameras
     capture.begin(scene)
     const { Quality } = await import("./quality.js")
-    quality = scene.quality = new Quality($("view").querySelector(".tools"), () => { dirty = true })
+    quality = scene.quality = new Quality($("view").querySelector(".tools"), () => { dirty = moved = true })
     scene.brightness = tune.light
     const [{ Gizmo }, { Tree }] = await Promise.all([import("./gizmo.js"), import("./tree.js")])
     tree = new Tree($("bodies"))
@@ -233,6 +233,10 @@ function takeFrames() {
   if (frames.length) { link.acknowledge(frames.at(-1).number); counted += frames.length; moved = true }
 }
 
+function lookThroughEyes() {
+  if (scene && $("pictures").checked) eyes.look((side, canvas) => scene.look(side, canvas))
+}
+
 let counted = 0, since = performance.now(), last = since, drawnAt = since, drawing = false, moved = false
 function draw(now) {
   requestAnimationFrame(draw)
@@ -242,7 +246,7 @@ function draw(now) {
     dirty = false
     if (drawing) scene?.pace(now - last, capture.coarsest)
     else scene?.resume(capture.coarsest)
-    if (moved && scene && $("pictures").checked) eyes.look((side, canvas) => scene.look(side, canvas))
+    if (moved) lookThroughEyes()
     moved = false
     scene?.draw()
     capture.take()
@@ -251,7 +255,7 @@ function draw(now) {
     drawnAt = now
   } else if (!headset.worn) {
     drawing = false
-    if (now - drawnAt > STILL_MS && !capture.recorder) scene?.settle(session?.kind !== "recording")
+    if (now - drawnAt > STILL_MS && !capture.recorder) scene?.settle(session?.kind !== "recording", lookThroughEyes)
   }
   last = now
   capture.tick(now)

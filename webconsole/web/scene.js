@@ -33,7 +33,7 @@ export class Scene {
     this.interval = 0
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.002, 50)
     this.camera.layers.enable(FORCES)
-    this.choice = "work"
+    this.choice = ""
     this.orbit = new Orbit(canvas, (moved) => {
       this.touched ||= moved
       if (moved && this.choice === "endoscope") this.choose("work")
@@ -92,6 +92,9 @@ export class Scene {
     this.markers = new Markers((frame) => this.place(frame))
     this.focused = this.touched = false
   }
+
+  // The first view. Several organs lie around the work and hide it, but not from the endoscope.
+  get opening() { return this.surfaces.length > 1 && this.cameras.length ? "endoscope" : "work" }
 
   // Textures and surroundings: the page is drawn plain until they are there.
   async dress() {
@@ -363,7 +366,7 @@ export class Scene {
   draw() {
     if (!this.focused && (this.placed || this.surfaces.some(({ mesh }) => mesh))) {
       this.focused = true
-      this.choose(this.choices.includes(this.choice) ? this.choice : "work")
+      this.choose(this.choices.includes(this.choice) ? this.choice : this.opening)
     }
     if (this.followed) this.orbit.target = this.followed().toArray()
     this.before?.()
@@ -407,12 +410,15 @@ export class Scene {
   }
 
   // Nothing moves: draw once with more pixels than there are, so that edges are smooth; `quick`: not of what runs,
-  // where somebody's hands would wait for that.
-  settle(quick = false) {
+  // where somebody's hands would wait for that. `dressed`: is called before, if the looks are others.
+  settle(quick, dressed) {
     const ratio = quick ? this.finest : SMOOTH, level = quick ? this.level : (this.quality?.still ?? this.level)
     if (this.renderer.getPixelRatio() === ratio && this.level === level) return
-    if (this.level !== level) this.level = level
     this.renderer.setPixelRatio(ratio)
+    if (this.level !== level) {
+      this.level = level
+      dressed()
+    }
     this.draw()
   }
 

@@ -1,6 +1,5 @@
 import itertools
 import sys
-import time
 
 import pytest
 
@@ -24,13 +23,11 @@ DEPTHS = "a0: &a0 [1]\n" + "".join(f"a{i}: &a{i} [*a{i - 1}]\n" for i in range(1
 
 
 def rejected(tmp_path, text, *overrides):
-    """Return what `load` says, within 10 s."""
+    """Return what `load` says."""
     file = tmp_path / "session.yaml"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    started = time.process_time()
     with pytest.raises(ScenarioError) as caught:
         load(str(file), overrides)
-    assert time.process_time() - started < 10.0
     assert len(str(caught.value)) < 10_000
     return str(caught.value).replace(str(file), "FILE")
 
@@ -164,33 +161,43 @@ def test_a_class_without_parameters_is_abstract(install_plugin):
         registry.load("bare:Bare")
 
 
+def counted(function):
+    """Return the result of `function`, and the number of its calls and returns."""
+    count = itertools.count()
+    sys.setprofile(lambda *_: next(count))
+    try:
+        result = function()
+    finally:
+        sys.setprofile(None)
+    return result, next(count)
+
+
 def test_a_chain_of_many_participants_is_planned_with_calls_in_proportion():
     def calls(number):
         # in reverse, so that the order of stepping has to be found
         parts = [Part(f"p{i}", into(), out()) for i in reversed(range(number))]
         parts[-1] = Part("p0", out())
-        counted = itertools.count()
-        sys.setprofile(lambda *_: next(counted))
-        try:
-            plan = plan_of(*parts, connections=[f"p{i}.out -> p{i + 1}.in" for i in range(number - 1)])
-        finally:
-            sys.setprofile(None)
+        connections = [f"p{i}.out -> p{i + 1}.in" for i in range(number - 1)]
+        plan, count = counted(lambda: plan_of(*parts, connections=connections))
         assert plan.order == tuple(f"p{i}" for i in range(number))
-        return next(counted)
+        return count
 
     assert calls(1000) < 12 * calls(100)
 
 
-def test_a_thousand_participants_of_one_kind_are_read_within_seconds(tmp_path):
-    file = tmp_path / "many.yaml"
-    file.write_text(
-        "name: many\nstep: 1 ms\nscene: {length: 1}\nparticipants:\n"
-        + "".join(f"  p{i}: {{kind: pendulum}}\n" for i in range(MAX_PARTICIPANTS))
-    )
-    started = time.process_time()
-    loaded = load(str(file))
-    assert time.process_time() - started < 10.0
-    assert len(loaded.params) == MAX_PARTICIPANTS
+def test_many_participants_of_one_kind_are_read_with_calls_in_proportion(tmp_path):
+    def calls(number):
+        file = tmp_path / f"{number}.yaml"
+        file.write_text(
+            "name: many\nstep: 1 ms\nscene: {length: 1}\nparticipants:\n"
+            + "".join(f"  p{i}: {{kind: pendulum}}\n" for i in range(number))
+        )
+        loaded, count = counted(lambda: load(str(file)))
+        assert len(loaded.params) == number
+        return count
+
+    calls(10)  # what is imported and cached at the first time
+    assert calls(MAX_PARTICIPANTS) < 12 * calls(MAX_PARTICIPANTS // 10)
 
 
 def test_a_text_is_shown_shortened_and_printable():
