@@ -71,6 +71,32 @@ def test_the_keys_that_move_lead_the_tip_as_the_help_says(browser, tmp_path):
         one.context.close()
 
 
+class LedByTheRight(Led):
+    """Somebody who leads the right hand of a pair."""
+
+    def lead(self):
+        self.sees("Boolean(trocar.scene?.placed)")
+        self.page.get_by_role("button", name="Lead hand/right").click()
+        self.page.locator("#dead-man").wait_for()
+
+
+@pytest.mark.timeout(600)
+def test_one_hand_of_a_pair_leads_the_arm(browser, tmp_path):
+    scenario = tmp_path / "led_arm.yaml"
+    text = LED_ARM.read_text().replace("kind: browser,", "kind: browser-pair,")
+    scenario.write_text(text.replace("hand.", "hand.right/"))
+    with running(tmp_path, str(scenario), *SLOWLY) as (_, invite):
+        one = LedByTheRight(browser, invite("operator"))
+        one.obey()
+        assert move(one, "r") @ [0, 0, 1] > 0.9
+        one.page.keyboard.up("Space")
+        said = one.page.locator("#lines").inner_text()
+        assert "no page leads: choose 'Lead hand/left'" in said
+        assert "no page leads" not in one.page.locator("#alerts").inner_text(), "the panel says it"
+        assert one.errors == []
+        one.context.close()
+
+
 def seen_by_an_endoscope(text):
     described = yaml.safe_load(text)
     described["scene"]["arms"]["ECM"] = {}

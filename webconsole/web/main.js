@@ -44,7 +44,7 @@ const link = new Link({
   session: begin,
   state(state) {
     head.show(state)
-    warn(state.log, new Set(state.pilots?.map(({ device }) => device)))
+    warn(state.log, new Set(state.pilots?.map(({ device }) => device.split("/")[0]))) // a pair of hands says it as one
     showCard($("card"), state.card)
     headset.show(state.pilots, session?.role)
     pilot.instruments = session?.instruments ?? []
@@ -106,7 +106,7 @@ foldable($("eyes"), $("plots"), $("log"))
 $("pictures").onchange = ask
 $("frames").onchange = () => scene?.frames($("frames").checked)
 
-// `led`: devices for pages to lead: the panel says how each follows, so their warnings stand in the log alone.
+// `led`: participants for pages to lead: the panel says how each follows, so their warnings stand in the log alone.
 function warn(entries = [], led = new Set()) {
   log.add(entries)
   alerts.leave(led) // a device may be offered to pages only after its first warning
