@@ -43,7 +43,8 @@ _TINTS: Mapping[str, Tint] = {
 }
 """Tints by eye: thin blood is red, as it lets red light through, thick blood is dark.
 
-Clear blood would let red through 450 um (haemoglobin, in the red of a camera); so drawn, a cut glows orange.
+The absorption of haemoglobin alone would let the red of a camera through some 400 um: so drawn, the edge of
+a cut glows.
 """
 
 
