@@ -30,6 +30,8 @@ class Publisher(Protocol):
     def wanted(self) -> bool:
         """Whether a program subscribes, or may; `Transport.changed` is called after every change.
 
+        A change may be noticed only here.
+
         True for latched topics: the last message is for later subscribers.
         """
         ...

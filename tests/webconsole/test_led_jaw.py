@@ -15,9 +15,11 @@ HELD_BY = "Number(document.querySelector('.plot:last-child .legend b')?.textCont
 class Led(Person):
     """Somebody who leads the arm, and does what the page asks for."""
 
+    device = "hand"
+
     def lead(self):
         self.sees("Boolean(trocar.scene?.placed)")
-        self.page.get_by_role("button", name="Lead hand").click()
+        self.page.get_by_role("button", name=f"Lead {self.device}").click()
         self.page.locator("#dead-man").wait_for()
 
     def obey(self, *keys):

@@ -74,10 +74,7 @@ def test_the_keys_that_move_lead_the_tip_as_the_help_says(browser, tmp_path):
 class LedByTheRight(Led):
     """Somebody who leads the right hand of a pair."""
 
-    def lead(self):
-        self.sees("Boolean(trocar.scene?.placed)")
-        self.page.get_by_role("button", name="Lead hand/right").click()
-        self.page.locator("#dead-man").wait_for()
+    device = "hand/right"
 
 
 @pytest.mark.timeout(600)

@@ -178,7 +178,7 @@ async function makeScene() {
     scene.chosen = showCameras
     capture.begin(scene)
     const { Quality } = await import("./quality.js")
-    quality = scene.quality = new Quality($("view").querySelector(".tools"), () => { dirty = moved = true })
+    quality = scene.quality = new Quality($("view").querySelector(".tools"), () => { dirty = eyesDue = true })
     scene.brightness = tune.light
     const [{ Gizmo }, { Tree }] = await Promise.all([import("./gizmo.js"), import("./tree.js")])
     tree = new Tree($("bodies"))
@@ -230,14 +230,14 @@ function takeFrames() {
   const frames = waiting
   waiting = []
   for (const frame of frames) apply(frame)
-  if (frames.length) { link.acknowledge(frames.at(-1).number); counted += frames.length; moved = true }
+  if (frames.length) { link.acknowledge(frames.at(-1).number); counted += frames.length; eyesDue = true }
 }
 
 function lookThroughEyes() {
   if (scene && $("pictures").checked) eyes.look((side, canvas) => scene.look(side, canvas))
 }
 
-let counted = 0, since = performance.now(), last = since, drawnAt = since, drawing = false, moved = false
+let counted = 0, since = performance.now(), last = since, drawnAt = since, drawing = false, eyesDue = false
 function draw(now) {
   requestAnimationFrame(draw)
   timeline.tick(now)
@@ -246,8 +246,8 @@ function draw(now) {
     dirty = false
     if (drawing) scene?.pace(now - last, capture.coarsest)
     else scene?.resume(capture.coarsest)
-    if (moved) lookThroughEyes()
-    moved = false
+    if (eyesDue) lookThroughEyes()
+    eyesDue = false
     scene?.draw()
     capture.take()
     drawn++

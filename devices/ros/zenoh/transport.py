@@ -42,8 +42,8 @@ number; we send periodically, because a program no longer reading must not block
 class _Publisher:
     """Numbers the messages of a topic, and knows whether a program subscribes.
 
-    Changes are looked up: a callback would wait for Python in the thread of Zenoh's runtime that a latched
-    publisher needs to end, while `undeclare` of that publisher waits in Python.
+    Changes are looked up: a callback waits for Python's lock in a thread of Zenoh, and `undeclare` of a
+    latched publisher holds the lock until that thread has time.
     """
 
     def __init__(
