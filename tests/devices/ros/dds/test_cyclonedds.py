@@ -29,8 +29,6 @@ from schemas.errors import DeviceError, MessageError
 from tests.devices.ros.rclpy_peer import free_domain
 from tests.waiting import until
 
-pytestmark = pytest.mark.xdist_group("network")  # an interface that others add and remove stops DDS
-
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
 RELIABLE = Qos(
     Policy.Reliability.Reliable(0),
