@@ -134,8 +134,8 @@ def main() -> None:
     wants_json = parser.parse_args().json
     found, gl = backend.find(), opengl.find()
     if not found.name or not gl.name:
-        sys.exit(f"Filament: {found.detail or 'runs'}; OpenGL: {gl.detail}. To fix it: {backend.REMEDY}")
-    result = {"filament": f"{found.name}{' on the CPU' if found.software else ''}"} | measure(found, gl.name)
+        sys.exit(f"Filament: {found.name or found.detail}; OpenGL: {gl.detail}. To fix it: {backend.REMEDY}")
+    result = {"filament": f"{found.name}, {found.detail}"} | measure(found, gl.name)
     if wants_json:
         print(json.dumps(result | {"truth": measure_truth(gl.name)}, indent=2))
         return

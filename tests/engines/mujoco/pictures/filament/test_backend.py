@@ -28,20 +28,48 @@ def fresh() -> Iterator[None]:
 
 def test_an_interface_that_aborts_its_process_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    assert backend._try("opengl", software=False)
+    works, error = backend._try("opengl", software=False)
+    assert not works
+    assert error
 
 
 def test_all_failures_are_told_and_the_first_that_works_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setattr(backend, "_try", lambda name, *, software: "" if software else f"about {name}")
-    assert backend.find() == Backend("vulkan", True, "")
+    monkeypatch.setattr(backend, "_try", lambda name, *, software: (software, f"about {name}"))
+    assert backend.find() == Backend("vulkan", True, "about vulkan")
     backend.find.cache_clear()
-    monkeypatch.setattr(backend, "_try", lambda name, *, software: f"about {name}")
+    monkeypatch.setattr(backend, "_try", lambda name, *, software: (False, f"about {name}"))
     assert backend.find() == Backend("", False, "vulkan: about vulkan; vulkan on the CPU: about vulkan")
     works, detail, remedy = backend.check()
     assert not works
     assert "about vulkan" in detail
     assert "mesa-vulkan-drivers" in remedy
+
+
+def test_the_driver_is_told() -> None:
+    if not (found := backend.find()).name:
+        pytest.skip(f"no Filament: {found.detail}")
+    assert found.name != "vulkan" or found.detail
+    assert backend.check()[1].startswith(f"Filament with {found.name}")
+    assert found.detail in backend.check()[1]
+
+
+@pytest.mark.parametrize(
+    ("driver", "slow"),
+    [
+        ("llvmpipe Mesa 22.3.6 (LLVM 15.0.6)", True),
+        ("llvmpipe Mesa 25.0.7-2~bpo12+1 (LLVM 15.0.6)", False),
+        ("llvmpipe Mesa 23.2.1 (LLVM 15.0.7)", False),
+        ("radv Mesa 22.3.6", False),
+        ("NVIDIA 570.86.15", False),
+    ],
+)
+def test_a_slow_driver_on_the_cpu_is_said(monkeypatch: pytest.MonkeyPatch, driver: str, slow: bool) -> None:
+    monkeypatch.setattr(backend, "_try", lambda _name, *, software: (not software, driver))
+    works, detail, _ = backend.check()
+    assert works
+    assert detail.startswith(f"Filament with vulkan: {driver}")
+    assert ("Mesa 25 draws" in detail) == slow
 
 
 def test_plain_looks_ask_for_no_filament(monkeypatch: pytest.MonkeyPatch) -> None:

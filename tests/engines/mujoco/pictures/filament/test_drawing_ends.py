@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,10 @@ from engines.mujoco.pictures.filament import backend
 from hub.observation.summary import Progress, Summary
 from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
+from hub.recording.recover import recover
 from hub.session.launch import launch
 from schemas.codec import decode
-from schemas.errors import SessionError
+from schemas.errors import RecordingError, SessionError
 from schemas.ros import DiagnosticStatus, Image
 
 SCENARIO = """
@@ -104,13 +106,15 @@ def test_plain_looks_take_over_and_every_state_stays(
 
 @pytest.mark.long
 def test_in_real_time_as_well(tmp_path: Path) -> None:
-    def end_when_said(_: Progress) -> None:
-        if any(b"draws plain looks" in file.read_bytes() for file in tmp_path.glob("recording/*.mcap")):
-            os.kill(os.getpid(), signal.SIGINT)
+    def end_when_told(progress: Progress) -> None:
+        with suppress(RecordingError):  # nothing is in the file yet
+            so_far = recover(tmp_path / "recording", tmp_path / f"until-{progress.step}").path
+            if any(Recording(so_far).messages(STATUS)):
+                os.kill(os.getpid(), signal.SIGINT)
 
     changes = "pace=realtime", "duration=60 s", f"participants.killer.signal={int(signal.SIGKILL)}"
     with pytest.raises(SessionError, match="interrupted"):
-        run(tmp_path, *changes, progress=end_when_said)
+        run(tmp_path, *changes, progress=end_when_told)
     (status,) = Recording(tmp_path / "recording").messages(STATUS)
     assert "was killed by SIGKILL" in decode(DiagnosticStatus, status.payload).message
 
