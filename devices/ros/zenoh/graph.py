@@ -11,7 +11,7 @@ from xxhash import xxh3_128_digest
 from devices.ros.transport import Client
 from devices.ros.zenoh.layout import GraphToken
 
-__all__ = ["Graph", "gid_of"]
+__all__ = ["Graph", "gid_of", "unidentified"]
 
 _UNIDENTIFIED = "publisher "
 """Beginning of the name of a sender without a known token; its gid follows."""
@@ -22,6 +22,11 @@ _LEFT = 1000
 def gid_of(key: str) -> bytes:
     """Return rmw_zenoh's gid for a token's key: XXH3 with 128 bits, the low half first."""
     return xxh3_128_digest(key.encode())[::-1]
+
+
+def unidentified(gid: bytes) -> str:
+    """Return the name of a sender without a known token."""
+    return f"{_UNIDENTIFIED}{gid.hex()}"
 
 
 class Graph:
@@ -67,12 +72,12 @@ class Graph:
             if all(other.session != token.session for other in self._tokens.values()):
                 del self._names[token.session]
 
-    def sender(self, topic: str, gid: bytes) -> str:
-        """Return the name of the program sending on `topic` as the publisher `gid`.
+    def sender(self, topic: str, gid: bytes) -> str | None:
+        """Return the name of the program sending on `topic` as the publisher `gid`; None without its token.
 
         A publisher with a gid other than the hash of its token's key (clients other than rmw_zenoh) is
         identified as the only unidentified publisher of the topic; two such publishers on a topic from the
-        beginning are named by their gids.
+        beginning are not identified.
         """
         with self._changing:
             key = self._senders.get(gid)
@@ -86,15 +91,19 @@ class Graph:
                 by_hash = next((other for other in others if gid_of(other) == gid), None)
                 key = by_hash if by_hash is not None else others[0] if len(others) == 1 else None
                 if key is None:
-                    return f"{_UNIDENTIFIED}{gid.hex()}"
+                    return None
                 self._senders[gid] = key
             return self._names[self._tokens[key].session]
+
+    def has_left(self, gid: bytes) -> bool:
+        """Return whether the publisher `gid` had a token that is gone."""
+        with self._changing:
+            return gid in self._left
 
     def present_name(self, name: str) -> str | None:
         """Return the present name of the sender once named `name`; None: the program has left.
 
-        A router may deliver a message before the token of its publisher: a sender named by a gid can become
-        a program, and leave.
+        A sender named by a gid (`unidentified`) can become a program, and leave.
         """
         with self._changing:
             if "/" in name:  # of a program

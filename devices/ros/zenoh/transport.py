@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from time import time_ns
 
 import zenoh
@@ -13,6 +14,7 @@ from zenoh.handlers import Callback, RingChannel
 
 from devices.ros.topics.row import Row
 from devices.ros.transport import NODE, Client, MessageHandler, Publisher, ServiceHandler, Transport
+from devices.ros.zenoh.early_messages import EarlyMessages
 from devices.ros.zenoh.graph import Graph, gid_of
 from devices.ros.zenoh.layout import (
     LATCHED,
@@ -117,6 +119,7 @@ class ZenohTransport(Transport):
         self._node, self._congestion = node, congestion
         self._domain, self._id = domain, str(self._session.zid())
         self._graph = Graph(self._id)
+        self._early = EarlyMessages(self._graph)
         self._topics: set[str] = set()
         self._entities: list[
             _Publisher
@@ -172,7 +175,7 @@ class ZenohTransport(Transport):
             except MessageError as error:
                 log.warning("%s: a message is dropped: %s", topic, error)
                 return
-            receive(sample.payload.to_bytes(), self._graph.sender(topic, attached.gid))
+            self._early.receive(topic, attached.gid, sample.payload.to_bytes(), receive)
 
         address, callback = key(self._domain, topic, row.type), Callback(on_sample, indirect=False)
         if row.latched:
@@ -221,11 +224,13 @@ class ZenohTransport(Transport):
     def close(self) -> None:  # noqa: D102
         if not self._closed:
             self._closed = True
-            for entity in self._entities:
-                entity.undeclare()
-            self._session.close()
-            if self._pictures is not None:
-                self._pictures.close()
+            with ExitStack() as last_first:  # each part is closed, whatever another one raises
+                if self._pictures is not None:
+                    last_first.callback(self._pictures.close)
+                last_first.callback(self._early.close)
+                last_first.callback(self._session.close)
+                for entity in reversed(self._entities):
+                    last_first.callback(entity.undeclare)
 
     def _announce_entity(self, kind: EntityKind, row: Row, quality: str) -> str:
         """Declare the liveliness token of a publisher, subscriber or server; return the token's key."""
@@ -240,5 +245,7 @@ class ZenohTransport(Transport):
     def _token_changed(self, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.DELETE:
             self._graph.remove(str(sample.key_expr))
-        elif self._graph.add(str(sample.key_expr)):
-            self.note_newcomer()
+        else:
+            if self._graph.add(str(sample.key_expr)):
+                self.note_newcomer()
+            self._early.note_token()

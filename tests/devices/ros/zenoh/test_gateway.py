@@ -264,6 +264,24 @@ def test_a_request_that_is_none_gets_an_error(psm, peer):
         assert "/PSM1/local/forward_kinematics" in reply.err.payload.to_string()
 
 
+def test_a_command_that_comes_before_its_token_is_of_its_program(psm, peer):
+    """The program has the arm by another publisher already."""
+    topic, said = "/PSM1/servo_jr", complaints(peer)
+    peer.publisher(COMMAND, JOINTS)(joints([0.1] * 6))
+    assert until(lambda: received(psm, COMMAND))
+    early = peer.session.declare_publisher(peer.key(topic, JOINTS))
+    peer.kept.append(early)
+    assert until(lambda: early.matching_status.matching)
+    for number in range(2):
+        payload = bytes(TYPES.serialize_cdr(joints([0.1 * number] * 6), JOINTS))
+        early.put(payload, attachment=struct.pack("<qqB", number, time.time_ns(), 16) + bytes(range(16)))
+    peer._token("MP", topic, JOINTS, TYPES.hash_rihs01(JOINTS), latched=False)
+    heard = []
+    assert until(lambda: heard.extend(received(psm, topic)) or len(heard) == 2)
+    assert [sample.message.position[0] for sample in heard] == [0.0, 0.1]
+    assert said == []
+
+
 def test_a_flood_costs_no_other_console_its_states(psm, hub):
     with Peer(hub, "flood") as flood, Peer(hub, "console") as console:
         publish = flood.publisher(COMMAND, JOINTS)

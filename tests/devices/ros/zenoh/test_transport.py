@@ -47,6 +47,26 @@ def test_it_closes_while_another_thread_publishes(endpoint, latched):
             thread.join()
 
 
+def test_an_error_at_one_part_leaves_no_session_open(endpoint, monkeypatch):
+    sessions = []
+
+    def connect():
+        sessions.append(open_session("client", connect=[endpoint]))
+        return sessions[-1]
+
+    transport = ZenohTransport(connect, 0)
+    broken = transport.advertise(Row("/arm/text", STRING, "publish"))
+    transport.advertise(Row("/endoscope/left/image_raw", "sensor_msgs/msg/Image", "publish"))
+
+    def refuse():
+        raise RuntimeError("Already borrowed")
+
+    monkeypatch.setattr(type(broken), "undeclare", lambda one: refuse() if one is broken else None)
+    with pytest.raises(RuntimeError, match="Already borrowed"):
+        transport.close()
+    assert [session.is_closed() for session in sessions] == [True, True]
+
+
 def test_a_publisher_knows_whether_a_program_subscribes(endpoint):
     transport = ZenohTransport(partial(open_session, "client", connect=[endpoint]), 0)
     changes = []
