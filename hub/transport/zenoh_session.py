@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import json
+import threading
 from collections.abc import Mapping, Sequence
+from time import monotonic
 from typing import Any
 
 import zenoh
@@ -66,3 +69,22 @@ def open_session(
     except zenoh.ZError as error:
         where = f"listen on {', '.join(listen)}" if listen else f"reach {', '.join(connect)}"
         raise ConnectError(f"cannot {where}: {error}") from error
+
+
+_CALLBACK_THREAD = "(pyo3-closure)"
+"""End of the name of a thread in which Zenoh's Python binding calls a function."""
+_PATIENCE_S = 2.0
+"""Longest wait for such threads: those of a session still open stay for ever, asleep."""
+
+
+@atexit.register
+def _await_callbacks() -> None:
+    """Wait for the threads of closed sessions to end.
+
+    One that wakes up in an interpreter at its end aborts the process, after all work is done. Python waits
+    by itself for those that a daemon thread has not started.
+    """
+    due_s = monotonic() + _PATIENCE_S
+    for thread in threading.enumerate():
+        if thread.name.endswith(_CALLBACK_THREAD):
+            thread.join(max(0.0, due_s - monotonic()))
