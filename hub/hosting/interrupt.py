@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
 import signal
 import threading
 from _thread import interrupt_main
+from traceback import walk_stack
 from types import FrameType, TracebackType
 from typing import Any, Self
 
 __all__ = ["Interrupt"]
+
+_IMPORT_SYSTEM = "<frozen importlib._bootstrap>"
+_RETRY_S = 0.05
+"""Time until an interrupt that came during an import is tried again."""
 
 
 class Interrupt:
@@ -16,15 +22,21 @@ class Interrupt:
 
     Calls from any thread are allowed; they send SIGTERM, as programs started by a shell in the background
     ignore SIGINT. Ctrl-C raises as ever, and is noted. Outside the main thread the context does nothing.
+
+    Neither raises during an import, but after it: an exception that reaches the initialisation of a module in
+    C++ ends the process at once (seen with manifold3d), and nothing is closed.
     """
 
     def __init__(self) -> None:
         self._armed = self._raised = False
         self._sending = threading.Lock()
         self._before: dict[signal.Signals, Any] = {}
+        self._imports = 0
+        """Imports in progress where the context was entered."""
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
+            self._imports = _imports_in_progress(inspect.currentframe())
             self._before[signal.SIGTERM] = signal.signal(signal.SIGTERM, self._raise)
             if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
                 self._before[signal.SIGINT] = signal.signal(signal.SIGINT, self._raise)
@@ -54,12 +66,16 @@ class Interrupt:
             else:
                 interrupt_main(signal.SIGTERM)
 
-    def _raise(self, number: int, _frame: FrameType | None) -> None:
+    def _raise(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal, between two instructions of the main thread; after `disarm` only Ctrl-C."""
-        if self._armed:
+        if self._armed and _imports_in_progress(frame) > self._imports:
+            retry = threading.Timer(_RETRY_S, self)
+            retry.daemon = True
+            retry.start()
+        elif self._armed:
             self._armed, self._raised = False, True
             raise KeyboardInterrupt
-        if number == signal.SIGINT:
+        elif number == signal.SIGINT:
             raise KeyboardInterrupt
 
     def check(self) -> None:
@@ -74,3 +90,8 @@ class Interrupt:
             self.disarm()
         for number, handler in self._before.items():
             signal.signal(number, handler)
+
+
+def _imports_in_progress(frame: FrameType | None) -> int:
+    """Return a number that is larger within an import than around it."""
+    return sum(one.f_code.co_filename == _IMPORT_SYSTEM for one, _ in walk_stack(frame))

@@ -1,5 +1,6 @@
 """Ctrl-C, SIGTERM and SIGKILL, sent to `trocar run` as a user or an operating system would."""
 
+import importlib
 import os
 import signal
 import subprocess
@@ -155,6 +156,30 @@ def test_an_interrupt_that_is_lost_in_a_callback_is_raised_again():
             interrupt.check()
         interrupt.disarm()
         interrupt.check()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_waits_for_the_end_of_an_import(tmp_path, monkeypatch, number):
+    """A module in C++ ends the process instead of raising."""
+    (tmp_path / f"half_imported_{int(number)}.py").write_text(
+        f"import os, time\nos.kill(os.getpid(), {int(number)})\ntime.sleep(0.3)\ndone = True\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with Interrupt():
+        module = importlib.import_module(f"half_imported_{int(number)}")
+        with pytest.raises(KeyboardInterrupt):
+            sleep(10.0)
+    assert module.done
+
+
+def test_a_session_that_runs_while_its_script_is_imported_is_interrupted(tmp_path, monkeypatch):
+    (tmp_path / "script_with_session.py").write_text(
+        "import os, signal, time\nfrom hub.hosting.interrupt import Interrupt\n"
+        "with Interrupt():\n    os.kill(os.getpid(), signal.SIGTERM)\n    time.sleep(10.0)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        importlib.import_module("script_with_session")
 
 
 def test_an_interrupt_that_ctypes_has_turned_into_an_error_is_an_interrupt(hub):
