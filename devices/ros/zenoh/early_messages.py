@@ -7,7 +7,7 @@ name, the second publisher of a program that commands an arm would be refused as
 from __future__ import annotations
 
 import threading
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass
 from time import monotonic
 
@@ -40,6 +40,8 @@ class EarlyMessages:
         self._changed = threading.Condition()
         self._held: deque[_Early] = deque()
         """Also holds the message that is being passed on, so that none of its publisher overtakes it."""
+        self._held_of: Counter[bytes] = Counter()
+        """Number of messages held, by publisher."""
         self._without_token: deque[bytes] = deque(maxlen=_WITHOUT_TOKEN)
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="early messages", daemon=True)
@@ -49,8 +51,9 @@ class EarlyMessages:
         """Pass a message of the publisher `gid` on, at once if its program is known."""
         with self._changed:
             name = self._name(topic, gid)
-            if name is None or any(early.gid == gid for early in self._held):
+            if name is None or self._held_of[gid]:
                 self._held.append(_Early(topic, gid, payload, receive, monotonic() + _PATIENCE_S))
+                self._held_of[gid] += 1
                 self._changed.notify()
                 return
         receive(payload, name)
@@ -72,6 +75,7 @@ class EarlyMessages:
             early.receive(early.payload, name)
             with self._changed:
                 self._held.popleft()
+                self._held_of -= Counter((early.gid,))  # keeps no publisher at 0
 
     def _await_first(self) -> tuple[_Early, str] | None:
         """Return the first message held and the name of its program; None at the end."""
