@@ -4,7 +4,8 @@ import { make } from "./started.js"
 
 const FILM_PER_S = 30, BITS_PER_S = 16e6
 const PATIENCE_MS = 500 // for the picture of the last instant: none comes where nothing has changed
-const ENCODING_MS = 1000 // MediaRecorder forgets pictures that are not encoded when it is stopped
+// MediaRecorder forgets pictures that are not encoded when it is stopped, and takes none while too many wait.
+const PART_MS = 100, WAITING_MS = 300, ENCODING_MS = 1000 // encoded parts; then none for so long: none waits, none is encoded
 const KINDS = ["video/mp4;codecs=avc1.640028", "video/webm;codecs=vp9", "video/webm", "video/mp4"]
 
 export class Capture {
@@ -49,7 +50,10 @@ export class Capture {
     this.onto = this.film.getContext("2d")
     this.recorder = new MediaRecorder(this.film.captureStream(FILM_PER_S), { mimeType: this.kind, videoBitsPerSecond: BITS_PER_S })
     const parts = [], from = this.page().time, { stream } = this.recorder
-    this.recorder.ondataavailable = ({ data }) => parts.push(data)
+    this.recorder.ondataavailable = ({ data }) => {
+      parts.push(data)
+      this.encodedAt = performance.now()
+    }
     this.recorder.onstop = () => {
       for (const track of stream.getTracks()) track.stop() // not before: pictures are still being encoded
       const kind = this.kind.split(";")[0]
@@ -59,7 +63,7 @@ export class Capture {
     if (this.plays) this.timeline.play()
     this.scene.draw()
     this.take()
-    this.recorder.start()
+    this.recorder.start(PART_MS)
     this.button.textContent = "End film"
     this.button.setAttribute("aria-pressed", "true")
   }
@@ -92,9 +96,24 @@ export class Capture {
     this.ended = this.page().time
     this.recorder = null
     this.button.disabled = true
-    setTimeout(() => { recorder.stop(); this.button.disabled = false }, ENCODING_MS)
     this.button.textContent = "Film"
     this.button.setAttribute("aria-pressed", "false")
+    this.finish(recorder)
+  }
+
+  // The last picture comes twice: on a slow machine the first time may have been one too many.
+  async finish(recorder) {
+    await this.encoded(WAITING_MS)
+    this.onto.drawImage(this.film, 0, 0)
+    await this.encoded(ENCODING_MS)
+    recorder.stop()
+    this.button.disabled = false
+  }
+
+  // Wait until nothing has been encoded for a while.
+  async encoded(quiet) {
+    this.encodedAt = performance.now()
+    while (performance.now() - this.encodedAt < quiet) await new Promise((done) => setTimeout(done, PART_MS))
   }
 }
 
