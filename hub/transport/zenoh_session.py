@@ -22,7 +22,10 @@ The end of a process is known at once, by the closing of the sockets; a process 
 silent for seconds.
 """
 
-
+_CALLBACK_THREAD = "(pyo3-closure)"
+"""End of the name of a thread in which Zenoh's Python binding calls a function."""
+_PATIENCE_S = 2.0
+"""Longest wait for such threads: those of a session still open stay for ever, asleep."""
 _EVENT_BATCHES = 16
 """Batches of 64 KiB for events waiting to be sent, the most Zenoh allows: three pictures.
 
@@ -69,12 +72,6 @@ def open_session(
     except zenoh.ZError as error:
         where = f"listen on {', '.join(listen)}" if listen else f"reach {', '.join(connect)}"
         raise ConnectError(f"cannot {where}: {error}") from error
-
-
-_CALLBACK_THREAD = "(pyo3-closure)"
-"""End of the name of a thread in which Zenoh's Python binding calls a function."""
-_PATIENCE_S = 2.0
-"""Longest wait for such threads: those of a session still open stay for ever, asleep."""
 
 
 @atexit.register

@@ -5,7 +5,8 @@ import { make } from "./started.js"
 const FILM_PER_S = 30, BITS_PER_S = 16e6
 const PATIENCE_MS = 500 // for the picture of the last instant: none comes where nothing has changed
 // MediaRecorder forgets pictures that are not encoded when it is stopped, and takes none while too many wait.
-const PART_MS = 100, WAITING_MS = 300, ENCODING_MS = 1000 // encoded parts; then none for so long: none waits, none is encoded
+const PART_MS = 100 // period at which it hands over what is encoded, if anything
+const WAITING_MS = 300, ENCODING_MS = 1000 // after so long without a part it takes pictures again; has encoded all
 const KINDS = ["video/mp4;codecs=avc1.640028", "video/webm;codecs=vp9", "video/webm", "video/mp4"]
 
 export class Capture {

@@ -27,7 +27,7 @@ _DRIVER = re.compile(r"^Vulkan device driver: (.+)$", re.MULTILINE)
 """Filament's line on its standard output: `llvmpipe Mesa 25.0.7 (LLVM 15.0.6)`."""
 
 _SLOW_DRIVER = re.compile(r"^llvmpipe Mesa (1\d|2[0-2])\.")
-"""Mesa on the CPU at a third less speed than Mesa 25; versions 23 and 24 were not measured (decision 167)."""
+"""Mesa on the CPU, slower than Mesa 25 (decision 167); versions 23 and 24 were not measured."""
 
 REMEDY = "apt-get install mesa-vulkan-drivers libvulkan1 (draws on the CPU), or the Vulkan driver of the GPU"
 
