@@ -104,17 +104,17 @@ export class Capture {
 
   // The last picture comes twice: on a slow machine the first time may have been one too many.
   async finish(recorder) {
-    await this.encoded(WAITING_MS)
+    await this.encoderIdle(WAITING_MS)
     this.onto.drawImage(this.film, 0, 0)
-    await this.encoded(ENCODING_MS)
+    await this.encoderIdle(ENCODING_MS)
     recorder.stop()
     this.button.disabled = false
   }
 
-  // Wait until nothing has been encoded for a while.
-  async encoded(quiet) {
+  // Wait until nothing has been encoded for so long (ms).
+  async encoderIdle(duration) {
     this.encodedAt = performance.now()
-    while (performance.now() - this.encodedAt < quiet) await new Promise((done) => setTimeout(done, PART_MS))
+    while (performance.now() - this.encodedAt < duration) await new Promise((done) => setTimeout(done, PART_MS))
   }
 }
 

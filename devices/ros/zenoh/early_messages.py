@@ -24,6 +24,8 @@ _WITHOUT_TOKEN = 1000
 
 @dataclass(frozen=True, slots=True)
 class _Early:
+    """A message held, and what takes it."""
+
     topic: str
     gid: bytes
     payload: bytes
